@@ -296,6 +296,30 @@ class EvalTest(ProgramTest):
         self.assertNotEqual(box, self.evaluate("--randomize", 0.25, "--randomize-length", 0))
         self.assertEqual(usual, self.evaluate("--randomize", 0))
 
+    def test_a_twins_posterior_is_drawn_said_and_recorded(self):
+        def conditions(*more):
+            return self.evaluate("--plant", "realaigym-twin", *more)
+
+        usual = conditions()
+        drawn = conditions("--randomize-posterior")
+        self.assertIs(drawn["randomize"]["randomize_posterior"], True)
+        self.assertTrue(drawn["randomize"]["posterior"].startswith("center1 "))
+        self.assertEqual(drawn["plant"], usual["plant"])
+        self.assertNotEqual(drawn["return"], usual["return"])
+        self.assertEqual(drawn, conditions("--randomize-posterior", "--threads", 3))
+        table = self.succeed("eval", self.policy, "--episodes", 20, "--plant", "realaigym-twin",
+                             "--randomize-posterior", "--episodes-csv", "drawn.csv")
+        self.assertIn("randomize_posterior true\n", table)
+        # Every episode has a centre of mass of its own, within five deviations of 2 mm.
+        with open(self.folder / "drawn.csv", encoding="utf-8") as file:
+            centers = {float(row["center1"]) for row in csv.DictReader(file)}
+        self.assertEqual(len(centers), 20)
+        for center in centers:
+            self.assertAlmostEqual(center, usual["plant"]["center1"], delta=0.0104)
+        for plant in ((), ("--plant", "realaigym")):
+            self.refuse(["eval", self.policy, *plant, "--randomize-posterior"],
+                        "randomize_posterior: expected --plant with a twin that has a covariance")
+
     def test_random_plants_are_the_same_in_closed_form(self):
         usual, twin = (self.evaluate("--randomize", 0.25, "--physics", physics)
                        for physics in ("mujoco", "closed-form"))

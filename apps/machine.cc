@@ -32,7 +32,7 @@ namespace {
 struct MachineArguments {
   std::string action;
   std::vector<std::string> logs;
-  std::string columns, figure, plant, out;
+  std::string columns, figure, plant, out, csv;
   std::vector<std::string> against;
   int64_t folds = 5, threads = 0;
   double seconds = 1;
@@ -201,12 +201,15 @@ int RunValidate(const MachineArguments& a) {
         "machine validate: expected logs with a motion of 0.2 s away from upright, got none");
   }
   if (!a.figure.empty()) DrawErrors(logs, predictors, a.figure, &pool);
+  if (!a.csv.empty()) WriteNamedFile(a.csv, MotionCsv(logs, predictors));
   if (a.as_json) {
     fmt::print("{}\n", PrintableJson({{"errors", ErrorsJson(rows, predictors)}}));
     return 0;
   }
   PrintErrors(rows, predictors);
-  if (!a.figure.empty()) fmt::print("written {}\n", Printable(a.figure));
+  for (const std::string& written : {a.figure, a.csv}) {
+    if (!written.empty()) fmt::print("written {}\n", Printable(written));
+  }
   return 0;
 }
 
@@ -311,10 +314,11 @@ void CheckOptions(const CommandLine& line, const std::string& action) {
     const char* option;
     std::vector<std::string> actions;
   };
-  const std::array<Owned, 5> kOwned{{{"--plant", {"identify"}},
+  const std::array<Owned, 6> kOwned{{{"--plant", {"identify"}},
                                      {"--out", {"identify"}},
                                      {"--folds", {"identify"}},
                                      {"--seconds", {"identify"}},
+                                     {"--csv", {"validate"}},
                                      {"--against", {"identify", "validate"}}}};
   for (const auto& [option, actions] : kOwned) {
     if (!line.Has(option) || std::ranges::count(actions, action) > 0) continue;
@@ -330,6 +334,7 @@ int RunMachine(const MachineArguments& a) {
     CheckWritable("--figure", a.figure);
     CheckCanDraw();
   }
+  if (!a.csv.empty()) CheckWritable("--csv", a.csv);
   if (a.action == "check") return RunCheck(a);
   return a.action == "identify" ? RunIdentify(a) : RunValidate(a);
 }
@@ -347,6 +352,8 @@ void AddMachine(CommandLine& line) {
   line.Text("--columns", a.columns, "FILE",
             "TOML file that names the columns and units (default: those of RealAIGym)");
   line.Text("--figure", a.figure, "FILE", "figure of a log to draw, .svg or .png");
+  line.Text("--csv", a.csv, "FILE",
+            "validate: CSV file to write, measured and predicted angles of 1 s of each log");
   line.Text("--plant", a.plant, "FILE",
             "identify: plant file or shipped plant with masses, lengths and first guesses");
   line.Text("--out", a.out, "FILE", "identify: TOML file of the twin to write");

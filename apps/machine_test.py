@@ -172,6 +172,7 @@ class Machine(ProgramTest):
                 (["machine", "check", good, "--against", "plant.toml"], "no --against",
                  "identify and validate"),
                 (["machine", "validate", "plant.toml", good, "--seconds", "1"], "no --seconds"),
+                (["machine", "check", good, "--csv", "x.csv"], "belongs to validate"),
                 (["machine", "validate", good, "plant.toml"], "the twin's file before the logs"),
                 (["machine", "validate", "plant.toml"], "a twin and at least one log"),
                 (["machine", "validate", "plant.toml", good, "--against", "plant.toml",
@@ -205,6 +206,24 @@ class Machine(ProgramTest):
         self.assertEqual(done.returncode, 0)
         self.assertRegex(done.stderr, r"\Aupswing: warning: log.csv: velocity 2: .*opposite sign"
                                       r"; machine check lists all faults\n\Z")
+
+    def test_a_table_of_measured_and_predicted_angles(self):
+        self.write("plant.toml", "[plant]\nmass1 = 0.5\n")
+        self.write("log.csv", log())
+        said = self.succeed("machine", "validate", "plant.toml", "log.csv", "--against",
+                            "realaigym", "--csv", "motion.csv")
+        self.assertIn("written motion.csv\n", said)
+        rows = [row.split(",") for row in (self.folder / "motion.csv").read_text().splitlines()]
+        self.assertEqual(rows[0][:6], ["log", "time", "measured 1", "measured 2", "plant 1",
+                                       "plant 2"])
+        numbers = [[float(cell) for cell in row[1:]] for row in rows[1:]]
+        self.assertAlmostEqual(numbers[-1][0] - numbers[0][0], 1, delta=0.05)
+        # The first row of the log at or after each multiple of 10 ms.
+        for k, row in enumerate(numbers):
+            self.assertGreaterEqual(row[0] - numbers[0][0], 0.01 * k - 1e-4)
+        # All predictions begin in the same state, near the measured one.
+        self.assertEqual(numbers[0][3:5], numbers[0][5:7])
+        self.assertAlmostEqual(numbers[0][1], numbers[0][3], delta=0.01)
 
     def test_models_with_equal_names(self):
         self.write("log.csv", log())

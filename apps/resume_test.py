@@ -152,6 +152,19 @@ class ResumeTest(ProgramTest):
         self.assertIn("randomize_length2 = 0.25",
                       (self.folder / "mujoco-run/config.toml").read_text())
 
+    def test_more_steps_on_a_posterior_equal_a_run_of_that_many(self):
+        for physics in ("mujoco", "closed-form"):
+            changes = {"physics": physics, "episode_seconds": 0.42, "plant": "realaigym-twin",
+                       "randomize_posterior": True}
+            self.succeed(*small(steps=4000, threads=1, out=f"{physics}-run", **changes))
+            # The run folder has the covariance, so resuming needs no plant.
+            self.succeed("train", "--resume", f"{physics}-run", "--steps", 8000, "--threads", 2)
+            self.succeed(*small(steps=8000, out=f"{physics}-at-once", **changes))
+            self.assert_same_run(f"{physics}-run", f"{physics}-at-once")
+        config = (self.folder / "mujoco-run/config.toml").read_text()
+        self.assertIn("randomize_posterior = true", config)
+        self.assertRegex(config, r'posterior = "center1 \S+; inertia1 ')
+
     def test_more_steps_with_encoders_equal_a_run_of_that_many(self):
         for physics in ("mujoco", "closed-form"):
             changes = {"physics": physics, "episode_seconds": 0.42, "identify": True,

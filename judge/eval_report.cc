@@ -24,6 +24,12 @@ ordered_json FigureJson(const Quartiles& q) {
   return {{"median", q.median}, {"quartiles", {q.low, q.high}}};
 }
 
+ordered_json JsonOf(const Option& option) {
+  if (const auto* on = std::get_if<bool*>(&option.target)) return **on;
+  if (const auto* text = std::get_if<std::string*>(&option.target)) return **text;
+  return option.number();
+}
+
 /// Whether a figure has a value to print.
 bool IsKnown(const EvaluationFigure& figure, bool upright, bool settled, bool valued) {
   using enum EvaluationFigure::Known;
@@ -187,7 +193,10 @@ std::string EvalJson(const EvalReport& report) {
   if (report.known_plant) j["known_plant"] = NumDesigned(report);
   const TrialConditions conditions{report.env.disturbance(0), report.env.randomization};
   const Options options = OptionsOf(conditions);
-  for (const Option& option : options.all()) j[option.section][option.name] = option.number();
+  for (const Option& option : options.all()) {
+    if (option.name == "posterior" && conditions.randomization.posterior.empty()) continue;
+    j[option.section][option.name] = JsonOf(option);
+  }
   AddFigures(report.figures, report.spec, report.knows_values, j);
   return PrintableJson(j);
 }

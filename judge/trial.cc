@@ -84,12 +84,13 @@ EnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded)
     }
     PlantFile file = ReadPlantFile(a.plant);
     plant = file.plant;
-    flags = std::move(file.disturbance);
+    flags = std::move(file.conditions);
   }
   flags.insert(flags.end(), a.flags.begin(), a.flags.end());
   const TrialConditions conditions = ConditionsOf(flags);
   env.disturbances = {conditions.disturbance};
   env.randomization = conditions.randomization;
+  (void)env.randomization.MakePosterior();  // throws if there is none to draw from
   if (a.unknown_plant && loaded == nullptr) {
     throw BadInput("--unknown-plant: expected a policy with it, got none");
   }
@@ -116,6 +117,7 @@ std::string ChangesText(const EnvConfig& env) {
   const TrialConditions now{env.disturbance(0), env.randomization}, usual;
   std::vector<std::string> texts;
   for (const auto& [option, before] : Differences(OptionsOf(now), OptionsOf(usual))) {
+    if (option.name == "posterior") continue;  // numbers of randomize_posterior
     texts.push_back(Concat(option.name, " ", option.text()));
   }
   if (env.assumed_plant) texts.emplace_back("the plant unknown to the policy");

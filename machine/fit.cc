@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/format.h"
 #include "core/text.h"
+#include "sim/posterior.h"
 
 // Symbols: θ values shared by all windows, x start state of a window, r residuals, J = ∂r/∂θ,
 // K = ∂r/∂x; H.. blocks of the Gauss-Newton matrix, g. gradients.
@@ -28,10 +29,6 @@ constexpr double kStartWeight = 0.05;
 // Limits of the scales of the robust cost.
 constexpr double kSmallestScale = 1e-5, kLargestScale = 0.1;  // rad
 constexpr double kSmallestTorqueScale = 1e-3;                 // N·m
-
-// Smallest distance of a link's centre of mass (m), and smallest inertia of a link (kg·m²). A plant
-// file's 0 means a capsule.
-constexpr double kSmallestLink = 1e-5;
 
 /// Typical size of a value, for finite differences.
 double ScaleOf(const std::string& name) {
@@ -128,9 +125,8 @@ class Problem {
     const Options options = OptionsOf(twin_);
     for (const std::string& name : names) {
       const Option& option = *options.Find(name, "identify").front();
-      Range range = option.range;
-      if (name.starts_with("center") || name.starts_with("inertia")) range.low = kSmallestLink;
-      values_.push_back({name, ScaleOf(name), -1, range, WeightOf(PriorDeviation(name))});
+      values_.push_back(
+          {name, ScaleOf(name), -1, UncertainRange(option), WeightOf(PriorDeviation(name))});
       if (SessionDeviation(name) == 0) continue;
       for (int s = 0; s < static_cast<int>(sessions_.size()); ++s) {
         values_.push_back({name, ScaleOf(name), s, {}, WeightOf(SessionDeviation(name))});

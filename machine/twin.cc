@@ -11,50 +11,30 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "run/covariance.h"
 #include "run/plant_file.h"
 #include "setup/toml_settings.h"
 #include "sim/disturbance.h"
+#include "sim/posterior.h"
 
 namespace upswing {
 namespace {
 
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-constexpr size_t kMostUncertain = 32;
 constexpr size_t kMostSessions = 1000;
 
-/// Reads the table [covariance]: for each value, a list with its covariances with all of them.
-void ReadCovariance(const toml::table& table, const std::string& where, Twin& twin) {
+/// Takes the table [covariance] out of a document. Throws BadInput.
+void ReadCovariance(toml::table& document, const std::string& where, Twin& twin) {
   const Options options = OptionsOf(twin);
-  if (table.size() > kMostUncertain) {
-    throw BadInput(Concat(PlaceOf(table, where), ": [covariance]: expected at most ",
-                          kMostUncertain, " values, got ", table.size()));
-  }
-  // The order of the rows in the file gives the order of the columns.
-  std::vector<std::pair<toml::source_position, std::string>> order;
-  for (const auto& [name, node] : table) {
-    order.emplace_back(name.source().begin, std::string(name.str()));
-  }
-  std::ranges::sort(order, [](const auto& a, const auto& b) { return a.first < b.first; });
-  const size_t n = order.size();
-  for (const auto& [position, name] : order) {
-    const toml::node& node = *table.get(name);
-    const std::string place = Concat(PlaceOf(node, where), ": ", name);
-    options.Find(name, Concat(PlaceOf(node, where), ": [covariance]"));
-    const toml::array* row = node.as_array();
-    if (row == nullptr || row->size() != n) {
-      throw BadInput(Concat(place, ": expected a list of ", n, " numbers, one for each row, got ",
-                            row == nullptr ? "no list" : std::to_string(row->size())));
+  if (const toml::table* table = document["covariance"].as_table()) {
+    for (const auto& [name, node] : *table) {
+      options.Find(std::string(name.str()), Concat(PlaceOf(node, where), ": [covariance]"));
     }
-    for (const toml::node& item : *row) {
-      const std::optional<double> value = item.value<double>();
-      if (!value || !std::isfinite(*value)) {
-        throw BadInput(Concat(place, ": expected finite numbers, got another value"));
-      }
-      twin.covariance.push_back(*value);
-    }
-    twin.uncertain.push_back(name);
   }
+  Covariance covariance = TakeCovariance(document, where);
+  twin.uncertain = std::move(covariance.names);
+  twin.covariance = std::move(covariance.values);
 }
 
 /// A factor L of the covariance L L'. Throws BadInput if the matrix is not a covariance.
@@ -71,9 +51,6 @@ Matrix Factor(const Twin& twin, const std::string& where) {
     }
   }
   constexpr double kRounding = 1e-6;
-  if (!correlation.isApprox(correlation.transpose(), kRounding)) {
-    throw BadInput(Concat(where, ": [covariance]: expected a symmetric matrix, got another one"));
-  }
   const Eigen::LDLT<Matrix> factors(correlation);
   const Eigen::VectorXd D = factors.vectorD();
   if (covariance.diagonal().minCoeff() < 0 || D.minCoeff() < -kRounding) {
@@ -226,9 +203,7 @@ Twin ParseTwin(std::string_view text, const std::string& where) {
     return *node.as_table();
   };
   table.erase("disturbance");  // follows from the other values
-  take("covariance", [&](const toml::node& node, const std::string& place) {
-    ReadCovariance(table_of(node, place), where, twin);
-  });
+  ReadCovariance(table, where, twin);
   take("sessions", [&](const toml::node& node, const std::string& place) {
     ReadSessions(table_of(node, place), where, twin);
   });
@@ -295,7 +270,8 @@ Twin DrawTwin(const Twin& twin, Rng& rng) {
   for (int i = 0; i < n; ++i) {
     const Option& option = *options.Get(twin.uncertain[static_cast<size_t>(i)]);
     double& value = *std::get<double*>(option.target);
-    value = std::clamp(value + change(i), option.range.low, option.range.high);
+    const Range range = UncertainRange(option);
+    value = std::clamp(value + change(i), range.low, range.high);
   }
   return drawn;
 }

@@ -59,9 +59,13 @@ TEST(Twin, IsAPlantFile) {
   EXPECT_EQ(file.plant.center2, 0.25);
   EXPECT_EQ(file.plant.coulomb1, 0.1);
   // One cycle of 2 ms, and delay and lag of the motors.
-  const auto latency = std::ranges::find(file.disturbance, "sensor_latency", &FlagValue::name);
-  ASSERT_NE(latency, file.disturbance.end());
+  const auto latency = std::ranges::find(file.conditions, "sensor_latency", &FlagValue::name);
+  ASSERT_NE(latency, file.conditions.end());
   EXPECT_NEAR(std::stod(latency->text), 0.005, 1e-12);
+  // Simulated tasks have no zeros of encoders; a deviation of the lag is one of the latency.
+  const auto posterior = std::ranges::find(file.conditions, "posterior", &FlagValue::name);
+  ASSERT_NE(posterior, file.conditions.end());
+  EXPECT_EQ(posterior->text, "center2 4e-06; sensor_latency 0 1e-08");
 }
 
 TEST(Twin, DrawsWithItsCovariance) {
@@ -85,10 +89,14 @@ TEST(Twin, DrawsWithItsCovariance) {
 TEST(Twin, DrawsStayWithinTheRanges) {
   Twin twin = SomeTwin();
   twin.plant.coulomb1 = 0.001;
-  twin.uncertain = {"coulomb1"};
-  twin.covariance = {1};
+  twin.uncertain = {"coulomb1", "center2"};
+  twin.covariance = {1, 0, 0, 1};
   Rng rng(1, "test");
-  for (int i = 0; i < 100; ++i) EXPECT_GE(DrawTwin(twin, rng).plant.coulomb1, 0);
+  for (int i = 0; i < 100; ++i) {
+    const Plant plant = DrawTwin(twin, rng).plant;
+    EXPECT_GE(plant.coulomb1, 0);
+    EXPECT_GT(plant.center2, 0);  // 0 is half of the length
+  }
 }
 
 TEST(Twin, RefusesCovariancesThatAreNone) {

@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 
+#include "core/csv.h"
 #include "core/format.h"
 #include "core/text.h"
 #include "report/figure.h"
@@ -110,6 +111,14 @@ const LogWindow& MedianWindow(const MachineLog& log, const Twin& twin,
   return windows[static_cast<size_t>(place)];
 }
 
+/// A twin's prediction of a window, driven by commanded torques.
+Motion MotionIn(const MachineLog& log, const Twin& twin, const LogWindow& w) {
+  Motion motion;
+  Predict(BodyOf(twin), Drive::Commanded(log, twin), {twin.sensors.zero1, twin.sensors.zero2},
+          w.start, log, w.first, w.last, 0, motion);
+  return motion;
+}
+
 /// The measured and predicted angles of log `i` in one of its windows.
 Panel AnglesPanel(std::span<const MachineLog> logs, std::span<const Predictor> predictors, size_t i,
                   std::span<const LogWindow> windows) {
@@ -130,10 +139,7 @@ Panel AnglesPanel(std::span<const MachineLog> logs, std::span<const Predictor> p
   };
   for (int j = 0; j < 2; ++j) add(j, "measured", [&](int k) { return log.angle[k]; });
   for (const Predictor& p : predictors) {
-    const Twin& twin = p.twins[i];
-    Motion motion;
-    Predict(BodyOf(twin), Drive::Commanded(log, twin), {twin.sensors.zero1, twin.sensors.zero2},
-            w.start, log, w.first, w.last, 0, motion);
+    const Motion motion = MotionIn(log, p.twins[i], w);
     for (int j = 0; j < 2; ++j) {
       add(j, p.name, [&](int k) { return motion.angle[k - w.first]; }).dotted_from = -1e9;
     }
@@ -193,6 +199,36 @@ std::vector<ErrorRow> CompareErrors(std::span<const MachineLog> logs,
     }
   }
   return rows;
+}
+
+std::string MotionCsv(std::span<const MachineLog> logs, std::span<const Predictor> predictors) {
+  constexpr double kRowSeconds = 0.01, kDigits = 1e4;
+  CsvTable csv;
+  for (size_t i = 0; i < logs.size(); ++i) {
+    const MachineLog& log = logs[i];
+    const auto windows = WindowsOf(log, predictors.front().twins[i], 1);
+    if (windows.empty()) continue;
+    const LogWindow& w = MedianWindow(log, predictors.front().twins[i], windows);
+    std::vector<Motion> motions;
+    for (const Predictor& p : predictors) motions.push_back(MotionIn(log, p.twins[i], w));
+    const auto add = [&](const std::string& name, const Joints& angle) {
+      for (int j = 0; j < 2; ++j) {
+        csv.Add(Concat(name, " ", j + 1), std::round(kDigits * angle[j]) / kDigits);
+      }
+    };
+    for (int k = w.first, rows = 0; k < w.last; ++k) {
+      if (log.time[k] - log.time[w.first] < rows * kRowSeconds) continue;
+      ++rows;
+      csv.Add("log", log.name);
+      csv.Add("time", std::round(kDigits * log.time[k]) / kDigits);
+      add("measured", log.angle[k]);
+      for (size_t p = 0; p < motions.size(); ++p) {
+        add(predictors[p].name, motions[p].angle[k - w.first]);
+      }
+      csv.EndRow();
+    }
+  }
+  return csv.text();
 }
 
 void DrawErrors(std::span<const MachineLog> logs, std::span<const Predictor> predictors,

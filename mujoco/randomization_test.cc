@@ -263,6 +263,33 @@ TEST_P(RandomizedEnvs, LoadedStateContinuesWithTheSameBits) {
   ExpectLoadedGoesOn(Config(3), 8);  // in the second episode
 }
 
+TEST_P(RandomizedEnvs, APosteriorDrawsPlantsAndLatencies) {
+  PendulumEnvConfig config = Config(3);
+  config.randomization = Randomization();
+  config.randomization.from_posterior = true;
+  EXPECT_THROW(PendulumEnv{config}, Error);
+  config.randomization.posterior =
+      "center1 1e-4; coulomb1 0 1e-2; inertia2 1e-6 0 1e-6; sensor_latency 0 0 0 1e-6";
+  for (Plant& plant : config.plants) {
+    plant.center1 = 0.25;
+    plant.coulomb1 = 0.3;
+    plant.inertia2 = 0.03;
+  }
+  config.disturbances.front().sensors.latency = 0.01;
+  const PendulumEnv env(config);
+  for (int i = 1; i < 3; ++i) {
+    EXPECT_NE(env.plant(i).center1, env.plant(0).center1);
+    EXPECT_NE(env.plant(i).coulomb1, env.plant(0).coulomb1);
+    EXPECT_NE(env.disturbance(i).sensors.latency, env.disturbance(0).sensors.latency);
+    EXPECT_EQ(env.plant(i).mass1, 1);
+  }
+  // The number of environments changes no plant.
+  config.num_envs = 9;
+  EXPECT_EQ(PendulumEnv(config).plant(2).inertia2, env.plant(2).inertia2);
+  config.num_envs = 3;
+  ExpectLoadedGoesOn(config, 8);  // in the second episode
+}
+
 TEST(RandomizedEnv, BothPhysicsAgreeOverManyResets) {
   constexpr int kEnvs = 9;  // more than one MuJoCo batch
   PendulumEnvConfig config;

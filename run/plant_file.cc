@@ -10,6 +10,7 @@
 #include "core/text.h"
 #include "io/file.h"
 #include "io/streams.h"
+#include "run/covariance.h"
 #include "run/shipped_plants.h"
 #include "setup/toml_settings.h"
 
@@ -20,8 +21,7 @@ namespace {
 constexpr size_t kMostPlantBytes = 1 << 20;
 
 /// Tables of a plant file with the other parts of a machine.
-constexpr std::array<std::string_view, 5> kOtherTables{"actuator", "sensors", "loop", "covariance",
-                                                       "sessions"};
+constexpr std::array<std::string_view, 4> kOtherTables{"actuator", "sensors", "loop", "sessions"};
 
 /// The settings of a plant file.
 struct PlantSettings {
@@ -37,7 +37,7 @@ struct PlantSettings {
 /// Removes kOtherTables and the machine's name. Throws BadInput unless each table left is one of a
 /// plant file.
 void TakeOwnTables(toml::table& table, const std::string& where) {
-  std::vector<std::string> known{"plant", "disturbance"};
+  std::vector<std::string> known{"plant", "disturbance", "covariance"};
   if (const toml::node* name = table.get("name")) {
     if (!name->is_string()) {
       throw BadInput(Concat(PlaceOf(*name, where), ": name: expected a text, got another type"));
@@ -76,10 +76,14 @@ PlantFile ParsePlantFile(std::string_view toml, const std::string& where) {
   TakeOwnTables(table, where);
   PlantSettings settings;
   PlantFile file;
+  const Covariance covariance = TakeCovariance(table, where);
   const Options of_plant = OptionsOf(settings.plant), all = OptionsOf(settings);
   for (FlagValue& flag : ApplyTable(all, table, where, false)) {
     const std::string& first = all.Find(flag.name, where).front()->name;
-    if (of_plant.Get(first) == nullptr) file.disturbance.push_back(std::move(flag));
+    if (of_plant.Get(first) == nullptr) file.conditions.push_back(std::move(flag));
+  }
+  if (const std::string posterior = PosteriorText(covariance); !posterior.empty()) {
+    file.conditions.push_back({"posterior", posterior, Concat(where, ": [covariance]")});
   }
   file.plant = settings.plant;
   file.name = where;
@@ -115,7 +119,7 @@ std::vector<FlagValue> WithPlantFile(const std::vector<FlagValue>& flags) {
     }
     const PlantFile file = ReadPlantFile(flag.text, flag.where.empty() ? "--plant" : flag.where);
     result = file.PlantFlags();
-    result.insert(result.end(), file.disturbance.begin(), file.disturbance.end());
+    result.insert(result.end(), file.conditions.begin(), file.conditions.end());
   }
   result.insert(result.end(), others.begin(), others.end());
   return result;

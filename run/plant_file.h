@@ -8,12 +8,13 @@
 #include "sim/double_pendulum.h"
 
 /// A machine's plant in a file: a TOML table [plant] with the settings of Plant, and perhaps a
-/// table [disturbance] with the settings of Disturbance.
+/// table [disturbance] with the settings of Disturbance. A twin also has a table [covariance].
 namespace upswing {
 
 struct PlantFile {
-  Plant plant;                         // settings that the file leaves out have their defaults
-  std::vector<FlagValue> disturbance;  // the settings of [disturbance]
+  Plant plant;  // settings that the file leaves out have their defaults
+  // The settings of [disturbance]; with a covariance of the plant, also the setting `posterior`.
+  std::vector<FlagValue> conditions;
 
   /// Each setting of the plant, as a flag.
   std::vector<FlagValue> PlantFlags() const;

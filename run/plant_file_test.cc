@@ -23,7 +23,10 @@ encoder_counts = 4096
 anything = "belongs to others"
 
 [covariance]
-mass1 = [[1, 2], [2, 1]]
+damping1 = [4e-4, 1e-6, 2e-8, 0]
+delay = [1e-6, 9e-8, 1e-9, 0]
+lag = [2e-8, 1e-9, 4e-8, 0]
+zero1 = [0, 0, 0, 9e-4]
 )";
 
 std::string ErrorOf(const std::string& toml) {
@@ -45,10 +48,13 @@ TEST(PlantFile, HasThePlantAndTheDisturbanceOfAMachine) {
   EXPECT_EQ(file.plant.inertia2, 0.02);
   EXPECT_EQ(file.plant.armature, 0);
   EXPECT_EQ(file.plant.mass2, Plant().mass2);
-  ASSERT_EQ(file.disturbance.size(), 2);
-  EXPECT_EQ(file.disturbance[0].name, "delay");
-  EXPECT_EQ(file.disturbance[0].where, "m.toml:9: delay");
-  EXPECT_EQ(file.disturbance[1].text, "4096");
+  ASSERT_EQ(file.conditions.size(), 3);
+  EXPECT_EQ(file.conditions[0].name, "delay");
+  EXPECT_EQ(file.conditions[0].where, "m.toml:9: delay");
+  EXPECT_EQ(file.conditions[1].text, "4096");
+  // Variances of delay and lag, and twice their covariance: 9e-8 + 4e-8 + 2 · 1e-9.
+  EXPECT_EQ(file.conditions[2].name, "posterior");
+  EXPECT_EQ(file.conditions[2].text, "damping1 4e-04; sensor_latency 1.02e-06 1.32e-07");
 }
 
 TEST(PlantFile, ItsFlagsMakeThePlant) {
@@ -74,6 +80,32 @@ TEST(PlantFile, MistakesHaveTheirLineAndASuggestion) {
   EXPECT_NE(ErrorOf("mass1 = 1\n[plant]").find("expected in section [plant]"), std::string::npos);
   EXPECT_EQ(ErrorOf("[sensors]"), "m.toml: expected a table [plant], got none");
   EXPECT_EQ(ErrorOf("plant = 1"), "m.toml: expected a table [plant], got none");
+}
+
+TEST(PlantFile, RefusesACovarianceThatIsNone) {
+  const std::string plant = "[plant]\n[covariance]\n";
+  EXPECT_NE(ErrorOf(plant + "mass1 = [1, 0]").find("m.toml:3: mass1: expected a list of 1"),
+            std::string::npos);
+  EXPECT_NE(ErrorOf(plant + "mass1 = [nan]").find("finite"), std::string::npos);
+  EXPECT_NE(ErrorOf(plant + "mass1 = [1, 0.5]\nmass2 = [0, 1]").find("symmetric"),
+            std::string::npos);
+  EXPECT_NE(ErrorOf("covariance = 1\n[plant]").find("expected a table"), std::string::npos);
+}
+
+TEST(PlantFile, ItsCovarianceCanRandomizeATraining) {
+  const std::vector<FlagValue> flags{{"randomize_posterior", "true"}};
+  const auto with = [&](const std::string& plant) {
+    std::vector<FlagValue> all = flags;
+    all.push_back({"plant", plant});
+    return BuildConfig("", all);
+  };
+  EXPECT_TRUE(with("realaigym-twin").randomization.MakePosterior().has_value());
+  // The recorded configuration has it, too.
+  const std::string text = ConfigToml(with("realaigym-twin"), false);
+  EXPECT_EQ(ConfigIn(text, "config.toml").randomization.posterior,
+            with("realaigym-twin").randomization.posterior);
+  EXPECT_THROW(with("realaigym"), Error);
+  EXPECT_THROW(BuildConfig("", flags), Error);
 }
 
 TEST(PlantFile, IsALayerBetweenAgentAndFlags) {

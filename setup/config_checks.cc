@@ -42,6 +42,7 @@ void CheckTask(Config& config, const std::string& where) {
 void CheckSettings(Config& config, const std::string& where) {
   try {
     config.learner().Check(config.train.envs);
+    (void)config.randomization.MakePosterior();  // throws if there is none to draw from
   } catch (const Error& error) {
     throw BadInput(Concat(where, where.empty() ? "" : ": ", error.what()));
   }

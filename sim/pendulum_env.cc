@@ -55,7 +55,8 @@ PendulumEnv::PendulumEnv(const PendulumEnvConfig& config)
       spec_(PendulumSpec(config)),
       physics_(config.engine->make(config)),
       episode_steps_(std::max<int64_t>(1, std::llround(config_.episode_seconds / kControlPeriod))),
-      disturber_(MakeDisturber(config)) {
+      disturber_(MakeDisturber(config)),
+      posterior_(config.randomization.MakePosterior()) {
   const auto n = static_cast<size_t>(config_.num_envs);
   step_counts_.resize(n);
   obs_.resize(n * static_cast<size_t>(spec_.obs_size));
@@ -133,7 +134,8 @@ void PendulumEnv::Randomize(int env) {
   const Randomization& random = config_.randomization;
   plant_seeds_[i] = plant_rngs_[i];
   plants_[i] = random.Draw(config_.plant(env), plant_rngs_[i]);
-  const Disturbance disturbance = random.Draw(config_.disturbance(env), plant_rngs_[i]);
+  Disturbance disturbance = random.Draw(config_.disturbance(env), plant_rngs_[i]);
+  if (posterior_) posterior_->Deviate(plants_[i], disturbance, plant_rngs_[i]);
   physics_->SetPlant(env, plants_[i]);
   if (disturber_) disturber_->Set(env, disturbance);
 }

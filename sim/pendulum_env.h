@@ -129,6 +129,7 @@ class PendulumEnv : public VectorEnv {
   std::unique_ptr<Physics> physics_;
   int64_t episode_steps_;
   std::optional<Disturber> disturber_;  // none if sensors and motors are perfect
+  std::optional<Posterior> posterior_;  // if plants and sensors are drawn from it
   std::vector<Rng> rngs_;               // (N)
   // Only with randomised plants, else empty:
   std::vector<Plant> plants_;         // (N) plants of the running episodes

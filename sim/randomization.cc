@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/error.h"
+
 namespace upswing {
 namespace {
 
@@ -34,6 +36,13 @@ void Randomization::Describe(Options& o) {
   o.Add(&sensor_latency, "randomize_sensor_latency", {0, kLongestLatency}, "s",
         "largest random increase of sensor_latency, drawn for each episode")
       .implied = true;
+  o.Add(&from_posterior, "randomize_posterior",
+        "draw the plant and the latency for each episode from the covariance of a twin (--plant)")
+      .implied = true;
+  o.Add(&posterior, "posterior",
+        "covariance for randomize_posterior, rows NAME NUMBERS of its lower triangle with ; "
+        "between them; --plant sets it")
+      .implied = true;
   o.Alias(
       "randomize",
       {"randomize_mass1", "randomize_mass2", "randomize_length1", "randomize_length2",
@@ -46,8 +55,18 @@ void Randomization::Describe(Options& o) {
 }
 
 bool Randomization::any() const {
-  return sensor_noise > 0 || delay > 0 || sensor_latency > 0 ||
+  return from_posterior || sensor_noise > 0 || delay > 0 || sensor_latency > 0 ||
          std::ranges::any_of(plant, [](double x) { return x > 0; });
+}
+
+std::optional<Posterior> Randomization::MakePosterior() const {
+  if (!from_posterior) return std::nullopt;
+  if (posterior.empty()) {
+    throw BadInput(
+        "randomize_posterior: expected --plant with a twin that has a covariance of its plant, "
+        "got none");
+  }
+  return Posterior::Parse(posterior, "posterior");
 }
 
 Plant Randomization::Draw(const Plant& nominal, Rng& rng) const {
@@ -74,7 +93,7 @@ Disturbance Randomization::Largest(const Disturbance& nominal) const {
   largest.sensor_noise += sensor_noise;
   largest.delay += delay;
   largest.sensors.latency += sensor_latency;
-  return largest;
+  return from_posterior ? MakePosterior()->Largest(largest) : largest;
 }
 
 }  // namespace upswing

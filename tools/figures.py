@@ -356,6 +356,67 @@ def realaigym_robustness():
     return fig
 
 
+@figure("machine-motion")
+def machine_motion():
+    """Measured angles of left-out runs, and those that the twin and the benchmark's own model predict."""
+    from matplotlib.lines import Line2D
+    runs = {}
+    for row in data_of(CSV / "machine-motion.csv"):
+        runs.setdefault(row["log"], []).append(row)
+    names = [name[:-2] for name in next(iter(runs.values()))[0] if name.endswith(" 1") and name != "measured 1"]
+    styles = dict(zip(names, ("--", ":")))
+    fig = canvas(800, 580)
+    for place, (log, rows) in enumerate(runs.items()):
+        folder, file = log.split("/")[-2:]
+        axes = panel(fig, 72 + 380 * (place % 2), 75 + 250 * (place // 2), 330, 190)
+        time = [float(row["time"]) - float(rows[0]["time"]) for row in rows]
+        for joint, color in ((1, LINK1), (2, LINK2)):
+            axes.plot(time, [float(row[f"measured {joint}"]) for row in rows], color=color, linewidth=5, alpha=0.35)
+            for name, dashes in styles.items():
+                axes.plot(time, [float(row[f"{name} {joint}"]) for row in rows], dashes, color=color, linewidth=2)
+        robot, pushed = file.split("-")[0], ", pushed" if folder == "pushed" else ""
+        axes.set_title(f"{robot}, TVLQR{pushed}", fontsize=13, loc="left", color=INK)
+        axes.set_xlim(0, 1)
+        if place % 2 == 0:
+            axes.set_ylabel("angle [rad]")
+        if place // 2 == 1:
+            axes.set_xlabel("time since the start of the prediction [s]")
+    lines = [Line2D([], [], color=MUTED, linewidth=5, alpha=0.35),
+             *(Line2D([], [], color=MUTED, linestyle=dashes) for dashes in styles.values()),
+             Line2D([], [], color=LINK1, linewidth=5), Line2D([], [], color=LINK2, linewidth=5)]
+    fig.legend(lines, ["measured", *names, "joint 1", "joint 2"], loc="upper center", ncols=5, handlelength=2.2,
+               bbox_to_anchor=(0.52, 0.99))
+    return fig
+
+
+@figure("machine-outcomes")
+def machine_outcomes():
+    """Successes of the published TVLQR: the real runs with Wilson's 95% intervals, and the twin's machines."""
+    columns, rows = table("machine-closed-loop")
+    fig = canvas(800, 60 + 52 * len(rows) + 60)
+    axes = panel(fig, 170, 50, 600, 52 * len(rows))
+    for y, row in enumerate(rows):
+        successes, runs = (int(text) for text in row[columns.index("real successes")].split(" of "))
+        low, high = wilson(successes, runs)
+        axes.hlines(y, 100 * low, 100 * high, color=LINK1, linewidth=3)
+        axes.plot(100 * successes / runs, y, "o", color=LINK1, markersize=11, markeredgecolor=PAPER, clip_on=False)
+        axes.plot(number(row[columns.index("twin")]), y, "D", color=LINK2, markersize=10, markeredgecolor=PAPER,
+                  clip_on=False)
+    from matplotlib.lines import Line2D
+    real = Line2D([], [], color=LINK1, marker="o", markersize=11, linewidth=3)
+    twin = Line2D([], [], color=LINK2, marker="D", markersize=10, linestyle="none")
+    fig.legend([real, twin], ["ten real runs, bar: 95% interval", "1,000 machines of the twin"], loc="upper center",
+               ncols=2, bbox_to_anchor=(0.6, 0.99))
+    axes.set_yticks(range(len(rows)), [row[0] for row in rows])
+    axes.set_ylim(len(rows) - 0.5, -0.5)
+    axes.set_xlim(-2, 102)
+    axes.grid(axis="y", visible=False)
+    axes.spines["left"].set_visible(False)
+    axes.tick_params(axis="y", length=0)
+    axes.set_xlabel("successes [%]")
+    return fig
+
+
 def success_map(axes, grid, extent):
     """Success from 0 to 1, with the same colours in every map."""
     return axes.imshow(grid, origin="lower", extent=extent, cmap="viridis", vmin=0, vmax=1, interpolation="nearest",
