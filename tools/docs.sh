@@ -46,7 +46,8 @@ docs() {
 
   if [ "$setup" = yes ]; then
     set_up_docs
-    set_up release upswing
+    packages="$packages $bench_packages"
+    set_up release upswing upswing-bench
     build_docs
   fi
   [ -f "$docs/index.html" ] || fail "the documentation is not built: run ./upswing docs once" \

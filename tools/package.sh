@@ -55,10 +55,10 @@ package() {
   [ "$setup" = yes ] || bad_input "expected ./upswing package without --no-setup"
   [ "$(uname -m)" = x86_64 ] || bad_input "expected a machine of x86-64, got $(uname -m)"
 
-  packages="$packages $window_packages $deb_packages python3-dev"
+  packages="$packages $window_packages $deb_packages $bench_packages python3-dev"
   viewer=yes
   set_up_docs
-  set_up release upswing
+  set_up release upswing upswing-bench
   build_docs
   build_demo
   [ "$arch" = x86-64 ] || set_up_arm64
