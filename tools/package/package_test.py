@@ -126,6 +126,16 @@ class PackageTest(unittest.TestCase):
         self.assertFalse((self.folder / "none").exists())
 
 
+class VersionTest(unittest.TestCase):
+    def test_files_agree_with_cmake(self):
+        def found(pattern, name):
+            return re.search(pattern, (ROOT / name).read_text(encoding="utf-8"), re.MULTILINE)[1]
+
+        version = found(r"project\(upswing VERSION ([\d.]+)", "CMakeLists.txt")
+        self.assertEqual(found(r"^version: (.*)$", "CITATION.cff"), version)
+        self.assertEqual(found(r"^## \[([\d.]+)\]", "CHANGELOG.md"), version)
+
+
 class LauncherTest(unittest.TestCase):
     def test_bad_arguments(self):
         for words, message in ((["zip"], 'expected tarball, deb or wheels, got "zip"'),
