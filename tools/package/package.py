@@ -132,7 +132,7 @@ class Packager:
         shutil.copytree(self.page, self.tree / "share/upswing/page")
         documents = self.tree / "share/doc/upswing"
         shutil.copytree(self.docs, documents / "html",
-                        ignore=shutil.ignore_patterns(".buildinfo", "_sources"))
+                        ignore=shutil.ignore_patterns(".buildinfo*", "_sources"))
         (documents / "NOTICE").write_text(notices.notice(), encoding="utf-8")
         (documents / "sbom.cdx.json").write_text(notices.sbom(self.version, self.epoch),
                                                  encoding="utf-8")
