@@ -59,7 +59,7 @@ package() {
   viewer=yes
   set_up_docs
   set_up release upswing upswing-bench
-  rm -rf "$root/build/docs-work" # what an earlier build left could differ
+  rm -rf "$root/build/docs-work" "$docs" # an earlier build leaves pages and words of the index
   build_docs
   build_demo
   [ "$arch" = x86-64 ] || set_up_arm64

@@ -66,12 +66,6 @@ def project_version():
     return re.search(r"project\(upswing VERSION ([\d.]+)", text)[1]
 
 
-def cache_entry(build, name):
-    """An entry of a build's CMakeCache.txt."""
-    text = (build / "CMakeCache.txt").read_text(encoding="utf-8")
-    return re.search(rf"^{name}:\w+=(.*)$", text, re.MULTILINE)[1]
-
-
 def needed_libraries(target, elf):
     return re.findall(r"NEEDED +(\S+)", output(f"{target.tools}objdump", "-p", elf))
 
@@ -79,7 +73,7 @@ def needed_libraries(target, elf):
 def add_libraries(target, program, folder):
     """Copies the shared libraries that `program` needs, except those of every system."""
     folder.mkdir(parents=True, exist_ok=True)
-    compiler = cache_entry(target.build, "CMAKE_CXX_COMPILER")
+    compiler = f"{target.tools}g++"  # knows the folders of the libraries
     waiting = needed_libraries(target, program)
     while waiting:
         name = waiting.pop()
