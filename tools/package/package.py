@@ -251,11 +251,10 @@ Description: controllers that swing up and balance a double pendulum
             "--no-deps", "--no-build-isolation", "--wheel-dir", plain,
             *(f"--config-settings={setting}" for setting in settings), ROOT, env=environment)
         (wheel,) = plain.glob("*.whl")
-        # Gives the wheel its tag, and fails unless that is true. MuJoCo's library is in its own wheel.
-        tag = f"manylinux_{self.glibc().replace('.', '_')}_{self.target.machine}"
+        # Gives the wheel the tag that its symbols allow. MuJoCo's library is in its own wheel.
         audited = self.work / f"audited-{version}"
-        run(sys.executable, "-m", "auditwheel", "repair",
-            "--exclude", "libmujoco.so.4.0.0", "--plat", tag, "--only-plat", "--wheel-dir", audited, wheel,
+        run(sys.executable, "-m", "auditwheel", "repair", "--exclude", "libmujoco.so.4.0.0",
+            "--plat", "auto", "--only-plat", "--wheel-dir", audited, wheel,
             env=environment | {"PATH": f"{sys.prefix}/bin:{os.environ['PATH']}"})
         (wheel,) = audited.glob("*.whl")
         return Path(shutil.copy2(wheel, self.out))
