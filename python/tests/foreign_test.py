@@ -204,6 +204,13 @@ class Closing(unittest.TestCase):
 
 
 class Files(InFolder):
+    def test_the_limit_of_a_wrapper(self):
+        def env():
+            return gym.wrappers.TimeLimit(Reach(length=100), 10)
+
+        self.assertEqual(upswing.train("sac", env=env, **SHORT).episodes,
+                         upswing.train("sac", env=Reach, max_episode_steps=10, **SHORT).episodes)
+
     def test_a_run_has_its_files(self):
         run = self.path / "run"
         training = upswing.train("ppo", env="CartPole-v1", out=run, num_envs=2, horizon=64,

@@ -255,12 +255,23 @@ def _count_of(first: Any, num_envs: int | None) -> int:
     return int(first.num_envs)
 
 
+def _wrapped_limit(env: Any) -> int | None:
+    """The limit of the outermost TimeLimit around an environment; None without one."""
+    while isinstance(env, gym.Wrapper):
+        if isinstance(env, gym.wrappers.TimeLimit):
+            return env._max_episode_steps  # pylint: disable=protected-access
+        env = env.env
+    return None
+
+
 def _limit_of(env: Any, single: Env, asked: int | None) -> int:
     """Largest length of an episode in steps. `single` is an environment like `env`, which may be a
     vector environment. Raises InputError."""
     own = env.spec.max_episode_steps if env.spec is not None else None
     if own is None and isinstance(env, VectorEnv) and single.spec is not None:
         own = single.spec.max_episode_steps
+    if own is None:
+        own = _wrapped_limit(single)
     if asked is None and own is None:
         raise _upswing.InputError(
             "max_episode_steps: expected a number of steps, because "
