@@ -1,7 +1,7 @@
 # shellcheck shell=sh
 # ./upswing package: builds packages for people without a compiler. Read by ./upswing, whose functions it
 # uses, after tools/web.sh, tools/demo.sh and tools/docs.sh.
-: "${root:?}" "${setup:?}" "${packages:?}" "${window_packages:?}"
+: "${root:?}" "${setup:?}" "${packages:?}" "${window_packages:?}" "${bench_packages:?}"
 
 package_usage() {
   cat <<'END_OF_USAGE'
@@ -11,12 +11,12 @@ Builds packages of the last commit: the same commit gives the same bits. Install
 Debian 12, whose glibc is the oldest that the packages then run with.
 
   KIND             tarball, deb or wheels; default: all
-  --arch ARCH      x86-64 (default) or arm64, which is cross-compiled. Wheels for arm64 need those for
-                   x86-64 first
+  --arch ARCH      x86-64 (default) or arm64, which is cross-compiled. Build the x86-64 wheels before
+                   the arm64 wheels
   --out FOLDER     folder for the packages and their checksums (default build/packages)
   --allow-changes  build with uncommitted changes, too
 
-Wheels need Python 3.11 and one from 3.12 on, each with headers. Debian 12 has only the first of them.
+Wheels need Python 3.11 and Python 3.12 or later, with headers. Debian 12 has only Python 3.11.
 
 Examples:
   ./upswing package
@@ -53,7 +53,7 @@ package() {
     *) bad_input "--arch: expected x86-64 or arm64, got \"$arch\"" ;;
   esac
   [ "$setup" = yes ] || bad_input "expected ./upswing package without --no-setup"
-  [ "$(uname -m)" = x86_64 ] || bad_input "expected a machine of x86-64, got $(uname -m)"
+  [ "$(uname -m)" = x86_64 ] || bad_input "expected an x86-64 machine, got $(uname -m)"
 
   packages="$packages $window_packages $deb_packages $bench_packages python3-dev"
   viewer=yes
@@ -69,7 +69,7 @@ package() {
     --arch "$arch" ${out:+--out "$out"} $changes) </dev/null
 }
 
-# Installs what writes the SBOM and builds wheels.
+# Installs the tools for the SBOM and the wheels.
 set_up_package() {
   (lock && make_venv "packages" "$root/build/package/venv" python3 tools/package/requirements.txt) \
     </dev/null || exit 1

@@ -54,7 +54,7 @@ def components():
 def notice():
     """The text of NOTICE."""
     parts = ["Upswing\nCopyright The Upswing developers. Apache License 2.0, see LICENSE.\n\n"
-             "The packages of Upswing contain these works of others:\n"]
+             "The packages of Upswing contain these third-party works:\n"]
     for component in components():
         version = version_of(component)
         head = " ".join(filter(None, [component["name"], version]))
@@ -81,5 +81,5 @@ def sbom(version, epoch):
                           licenses=[licences.make_from_string(component["licence"])])
         bom.components.add(entry)
         bom.register_dependency(program, [entry])
-    # Written again for the order of keys.
+    # Sorts the keys.
     return json.dumps(json.loads(JsonV1Dot6(bom).output_as_string()), indent=2, sort_keys=True) + "\n"

@@ -21,7 +21,7 @@ import notices
 from notices import ROOT
 
 KINDS = ["tarball", "deb", "wheels"]
-# Shared libraries that every glibc system has (those of manylinux), or that the wheel of MuJoCo has.
+# Shared libraries that packages need not bring: the system has them (as for manylinux), or MuJoCo's wheel.
 SYSTEM_LIBRARIES = re.compile(r"lib(c|m|dl|rt|pthread|z|stdc\+\+|gcc_s|mujoco)\.so.*|ld-linux.*")
 
 
@@ -288,7 +288,7 @@ def check_source(allow_changes):
 
 
 def write_checksums(out):
-    files = sorted(path for path in out.iterdir() if path.name != "SHA256SUMS")
+    files = sorted(out.glob(f"upswing[-_]{project_version()}[-_]*"))
     (out / "SHA256SUMS").write_text(
         "".join(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in files),
         encoding="utf-8")
@@ -315,9 +315,9 @@ def main():
                 print(f"{path}: {path.stat().st_size / 1e6:.1f} MB")
         write_checksums(arguments.out)
         target = packager.target
-        print(f"They need Linux on {target.machine} with glibc {packager.glibc()} and libstdc++ with "
+        print(f"The packages need Linux on {target.machine} with glibc {packager.glibc()} and libstdc++ with "
               f"GLIBCXX_{needed_version(target, packager.elves(), 'GLIBCXX')} or newer.")
-    except (Refused, FileNotFoundError) as error:
+    except (Refused, OSError) as error:
         say(error)
         sys.exit(2)
     except subprocess.CalledProcessError as error:
