@@ -10,7 +10,6 @@
 namespace upswing {
 namespace {
 
-constexpr size_t kMostValues = 32;
 constexpr double kRounding = 1e-6;  // of a correlation
 // Smallest centre of mass (m) and inertia (kg·m²) of a link that is no capsule.
 constexpr double kSmallestLink = 1e-5;
@@ -93,7 +92,7 @@ Posterior Posterior::Parse(std::string_view text, const std::string& where) {
     const std::vector<std::string_view> words = WordsOf(row);
     const size_t n = posterior.rows_.size() + 1;
     const std::string_view name = words.empty() ? "" : words.front();
-    if (!Knows(name) || std::ranges::find(names, name) != names.end() || n > kMostValues) {
+    if (!Knows(name) || std::ranges::find(names, name) != names.end()) {
       throw BadInput(Concat(where, ": expected rows with different values of a machine, got \"",
                             Printable(name), "\""));
     }
