@@ -67,7 +67,8 @@ void ChooseVectors() {
 void ReplaceByProgramOf(const std::string& command, char** argv) {
   const std::filesystem::path program = ProgramPath().parent_path() / Concat("upswing-", command);
   execv(program.c_str(), argv);
-  throw BadInput(Concat(command, ": only the source repository has this command: ./upswing ", command));
+  throw BadInput(
+      Concat(command, ": only the source repository has this command: ./upswing ", command));
 }
 
 int Main(int argc, char** argv, std::span<const CommandEntry> commands, const std::string& footer) {

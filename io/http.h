@@ -32,8 +32,8 @@ struct HttpReply {
   bool keeps_alive = false;
 };
 
-/// An answer with these lines of header fields, each ending with a carriage return and a line feed.
-/// `size` is the size of the body that a GET gets.
+/// An answer with these lines of header fields, each ending with a carriage return and a line feed,
+/// and with the body that a GET gets; null: none.
 HttpReply MakeHttpReply(const HttpRequest& request, int status, std::string_view fields,
                         std::shared_ptr<const std::string> body);
 
