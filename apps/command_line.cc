@@ -8,8 +8,10 @@
 #include <utility>
 
 #include "apps/progress.h"
+#include "apps/say.h"
 #include "core/error.h"
 #include "core/text.h"
+#include "io/command.h"
 
 namespace upswing {
 namespace {
@@ -70,6 +72,17 @@ std::string Reflowed(const std::string& text) {
   return result;
 }
 
+/// The text of examples, with the command that starts an installed program.
+std::string WithLaunchCommand(std::string text) {
+  constexpr std::string_view kInRepository = "./upswing ";
+  const std::string command = Concat(LaunchCommand(), " ");
+  for (size_t at = 0; (at = text.find(kInRepository, at)) != std::string::npos;
+       at += command.size()) {
+    text.replace(at, kInRepository.size(), command);
+  }
+  return text;
+}
+
 /// Formats --help within HelpColumns(), without the `{false}` that CLI11 adds to a flag's --no-
 /// form.
 class HelpFormatter : public CLI::Formatter {
@@ -89,7 +102,7 @@ class HelpFormatter : public CLI::Formatter {
   }
 
   std::string make_footer(const CLI::App* app) const override {
-    return Reflowed(CLI::Formatter::make_footer(app));
+    return Reflowed(WithLaunchCommand(CLI::Formatter::make_footer(app)));
   }
 
   std::string make_option_name(const CLI::Option* option, bool is_positional) const override {
@@ -314,6 +327,7 @@ int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> 
   std::vector<std::unique_ptr<CommandLine>> lines;
   const CommandLine* chosen = nullptr;
   for (const CommandEntry& command : commands) {
+    if (command.declare == nullptr && IsInstalled()) continue;  // only the repository has it
     CLI::App* app = program.add_subcommand(command.name, command.help);
     app->formatter(std::make_shared<HelpFormatter>());
     CommandLine& line = *lines.emplace_back(new CommandLine(*app));

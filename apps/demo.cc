@@ -33,8 +33,7 @@ struct DemoArguments {
 fs::path PageFolder() {
   const char* given = std::getenv("UPSWING_PAGE");
   const bool is_given = given != nullptr && *given != '\0';
-  fs::path page =
-      is_given ? fs::path(given) : ProgramPath().parent_path().parent_path() / "share/upswing/page";
+  fs::path page = is_given ? fs::path(given) : SharePath() / "page";
   if (IsFile(page / "index.html")) return page;
   throw Failure(
       is_given ? Concat("demo: UPSWING_PAGE: expected a folder with the built page (index.html), "

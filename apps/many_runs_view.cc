@@ -96,7 +96,7 @@ class ManyRunsView : public ManyRunsObserver {
     if (stopped) SayStopped(done);
     const bool can_be_typed = Printable(many_.plan.folder.string()) == many_.plan.folder.string();
     if (can_be_typed && (done < runs_->size() || !many_.compared)) {
-      Say("Next:\n  ./upswing compare {}{}\n", ShellQuoted(many_.plan.folder.string()),
+      Say("Next:\n  {} compare {}{}\n", LaunchCommand(), ShellQuoted(many_.plan.folder.string()),
           done < runs_->size() ? " --unfinished" : "");
     }
     std::fflush(stdout);

@@ -5,6 +5,8 @@
 
 #include <cstdio>
 
+#include "io/command.h"
+
 namespace upswing {
 
 void OpenStandardFiles() {
@@ -14,6 +16,8 @@ void OpenStandardFiles() {
     if (fcntl(fd, F_GETFD) < 0) (void)!open("/dev/null", fd == STDIN_FILENO ? O_WRONLY : O_RDONLY);
   }
 }
+
+std::string_view LaunchCommand() { return IsInstalled() ? "upswing" : "./upswing"; }
 
 void SayText(std::string_view text) { std::fwrite(text.data(), 1, text.size(), stdout); }
 

@@ -19,6 +19,10 @@ void Say(fmt::format_string<T...> format, T&&... arguments) {
   SayText(fmt::format(format, std::forward<T>(arguments)...));
 }
 
+/// The command that starts this program, for examples and hints: `upswing` if it is installed,
+/// `./upswing` in the source repository.
+std::string_view LaunchCommand();
+
 /// Prints `upswing: MESSAGE` on standard error; ignores failure.
 void SayError(std::string_view message) noexcept;
 

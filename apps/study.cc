@@ -124,8 +124,9 @@ int RunStudy(const StudyArguments& arguments) {
   const ManyRuns many = ReadStudy(arguments);
   if (arguments.prepare) {
     Prepare(many);
-    Say("Prepared {}. Next, on any host that shares the folder:\n  ./upswing study --work {}\n",
-        Printable(many.plan.folder.string()), ShellQuoted(Printable(many.plan.folder.string())));
+    Say("Prepared {}. Next, on any host that shares the folder:\n  {} study --work {}\n",
+        Printable(many.plan.folder.string()), LaunchCommand(),
+        ShellQuoted(Printable(many.plan.folder.string())));
     return 0;
   }
   if (arguments.print) return PrintSlurmScript(many.plan, arguments.slurm);

@@ -102,13 +102,13 @@ class TrainView : public TrainObserver {
     const std::string folder = ShellQuoted(run.string());
     Say("Next:\n");
     if (has_policy) {
-      if (HasPlant(training_.config().task)) Say("  ./upswing demo {}\n", folder);
-      Say("  ./upswing eval {0}\n  ./upswing info {0}\n", folder);
+      if (HasPlant(training_.config().task)) Say("  {} demo {}\n", LaunchCommand(), folder);
+      Say("  {0} eval {1}\n  {0} info {1}\n", LaunchCommand(), folder);
     }
     std::string how;
     if (finished && s.solved && config.stop_when_solved) how += " --no-stop-when-solved";
     if (finished && s.steps >= config.steps) how += fmt::format(" --steps {}", 2 * s.steps);
-    Say("  ./upswing train --resume {}{}\n", folder, how);
+    Say("  {} train --resume {}{}\n", LaunchCommand(), folder, how);
   }
 
  private:

@@ -102,4 +102,13 @@ std::optional<CommandResult> RunCommand(std::vector<std::string> words, const st
 
 std::filesystem::path ProgramPath() { return std::filesystem::read_symlink("/proc/self/exe"); }
 
+std::filesystem::path SharePath() {
+  return ProgramPath().parent_path().parent_path() / "share/upswing";
+}
+
+bool IsInstalled() {
+  std::error_code ignored;
+  return std::filesystem::is_directory(SharePath(), ignored);
+}
+
 }  // namespace upswing

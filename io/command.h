@@ -25,4 +25,11 @@ std::optional<CommandResult> RunCommand(std::vector<std::string> words,
 /// Path of the file of this program.
 std::filesystem::path ProgramPath();
 
+/// Folder of an installed program's page and examples: `share/upswing` next to the program's
+/// folder. A program in a build folder has none.
+std::filesystem::path SharePath();
+
+/// Whether this program is installed, not in a build folder of the source repository.
+bool IsInstalled();
+
 }  // namespace upswing

@@ -169,11 +169,8 @@ class Packager:
                         f"upswing ({self.version}) unstable; urgency=medium\n\n"
                         "  * See CHANGELOG.md in this folder.\n\n"
                         f" -- The Upswing developers <upswing@localhost>  {date}\n")
-        manual = output("help2man", "--no-info", "--name", "controllers for a double pendulum",
-                        "--version-string", f"upswing {self.version}",
-                        TARGETS["x86-64"].build / "apps/upswing", env=self.environment)
         (root / "usr/share/man/man1").mkdir(parents=True)
-        self.write_gzip(root / "usr/share/man/man1/upswing.1.gz", manual)
+        self.write_gzip(root / "usr/share/man/man1/upswing.1.gz", self.manual())
         overrides = root / "usr/share/lintian/overrides/upswing"
         overrides.parent.mkdir(parents=True)
         shutil.copyfile(Path(__file__).with_name("lintian-overrides"), overrides)
@@ -188,6 +185,15 @@ class Packager:
         run("dpkg-deb", "--root-owner-group", "--threads-max=1", "-Zxz", "--build", root, path,
             env=self.environment)
         return [path]
+
+    def manual(self):
+        """The manual page, from --help of an installed program that runs on this machine."""
+        installed = self.work / "manual"
+        (installed / "share/upswing").mkdir(parents=True)
+        (installed / "bin").mkdir()
+        program = shutil.copy2(TARGETS["x86-64"].build / "apps/upswing", installed / "bin")
+        return output("help2man", "--no-info", "--name", "controllers for a double pendulum",
+                      "--version-string", f"upswing {self.version}", program, env=self.environment)
 
     def control(self, root):
         size = sum(path.lstat().st_size for path in root.rglob("*")) // 1024
@@ -252,7 +258,7 @@ Description: controllers that swing up and balance a double pendulum
         (wheel,) = plain.glob("*.whl")
         # Gives the wheel the tag that its symbols allow. MuJoCo's library is in its own wheel.
         audited = self.work / f"audited-{version}"
-        run(sys.executable, "-m", "auditwheel", "repair", "--exclude", "libmujoco.so.4.0.0",
+        run(sys.executable, "-m", "auditwheel", "repair", "--exclude", "libmujoco.so.*",
             "--plat", "auto", "--only-plat", "--wheel-dir", audited, wheel,
             env=environment | {"PATH": f"{sys.prefix}/bin:{os.environ['PATH']}"})
         (wheel,) = audited.glob("*.whl")
@@ -264,13 +270,13 @@ def find_pythons():
     check = ("import pathlib, sysconfig, sys, ensurepip; "
              "sys.exit(not pathlib.Path(sysconfig.get_path('include'), 'Python.h').exists())")
     found = []
-    for minors, what in (((11,), "3.11"), (range(14, 11, -1), "3.12 or newer")):
+    for minors, what in (((11,), "3.11"), (range(20, 11, -1), "3.12 or newer")):
         for minor in minors:
-            paths = {shutil.which(f"python3.{minor}", path=folder)
-                     for folder in os.environ["PATH"].split(os.pathsep)} - {None}
-            works = [path for path in sorted(paths)
-                     if subprocess.run([path, "-c", check], check=False,
-                                       capture_output=True).returncode == 0]
+            paths = [shutil.which(f"python3.{minor}", path=folder)
+                     for folder in os.environ["PATH"].split(os.pathsep)]
+            works = [path for path in paths
+                     if path and subprocess.run([path, "-c", check], check=False,
+                                                capture_output=True).returncode == 0]
             if works:
                 found.append(works[0])
                 break

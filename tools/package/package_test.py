@@ -6,6 +6,7 @@ UPSWING names the program, of which the packages are made (see apps/testing.py).
 environment build/package/venv, which ./upswing package and ./upswing test make.
 """
 
+import gzip
 import json
 import os
 import re
@@ -80,6 +81,20 @@ class PackageTest(unittest.TestCase):
                 path.chmod(path.stat().st_mode & ~0o222)
         self.assertEqual(policy(self.tree / "bin/upswing", self.folder / "packaged"),
                          policy(UPSWING, self.folder / "built"))
+
+    def test_help_is_that_of_an_installed_program(self):
+        for words in ([], ["train"], ["demo"]):
+            text = call(self.tree / "bin/upswing", *words, "--help").stdout
+            self.assertIn(f"\n  upswing {(words or ['train'])[0]}", text)
+            self.assertNotIn("./upswing", text)
+        commands = call(self.tree / "bin/upswing", "--help").stdout
+        self.assertRegex(commands, r"\n  demo +")
+        self.assertNotRegex(commands, r"\n  (bench|docs|package|python|test) +")
+        (deb,) = (self.folder / "first").glob("*.deb")
+        call("dpkg-deb", "-x", deb, self.folder / "deb")
+        manual = gzip.decompress((self.folder / "deb/usr/share/man/man1/upswing.1.gz").read_bytes())
+        self.assertIn(b"upswing train", manual)
+        self.assertNotIn(b"./upswing", manual)
 
     def test_has_all_libraries_and_their_notices(self):
         listed = call("ldd", self.tree / "bin/upswing").stdout
