@@ -257,19 +257,19 @@ std::string DidYouMean(std::string_view word, const std::vector<std::string>& na
   const auto letters_of = [](std::string_view text) {
     return text.substr(std::min(text.size(), text.find_first_not_of('-')));
   };
-  const auto count_letters = [&](std::string_view text) { return letters_of(text).size(); };
-  const size_t letters = count_letters(word);
+  const size_t letters = letters_of(word).size();
   const size_t tolerance = letters <= 3 ? 1 : std::max<size_t>(2, letters / 3);
   const auto meant = [](std::string_view name) { return Concat(" (did you mean ", name, "?)"); };
   if (EditDistance(word, *nearest) <= tolerance) return meant(*nearest);
   const auto abbreviated = std::ranges::find(names, letters_of(word), Initials);
   if (letters > 1 && abbreviated != names.end()) return meant(*abbreviated);
   constexpr size_t kFewest = 3;  // number of letters that two words must share
-  const auto begins = std::ranges::find_if(names, [&](const std::string& name) {
-    return std::min(letters, count_letters(name)) >= kFewest &&
-           (word.starts_with(name) || name.starts_with(word));
+  const auto part = std::ranges::find_if(names, [&](const std::string& name) {
+    const std::string_view given = letters_of(word), other = letters_of(name);
+    return std::min(given.size(), other.size()) >= kFewest &&
+           (given.starts_with(other) || other.starts_with(given) || given.ends_with(other));
   });
-  return begins == names.end() ? "" : meant(*begins);
+  return part == names.end() ? "" : meant(*part);
 }
 
 std::span<const std::byte> BytesOf(std::string_view text) {

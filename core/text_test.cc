@@ -67,6 +67,8 @@ TEST(Text, SuggestsTheNearestNameOnlyIfItIsNear) {
   EXPECT_EQ(DidYouMean("--lr", {"--layers", "--learning-rate"}),
             " (did you mean --learning-rate?)");
   EXPECT_EQ(DidYouMean("evaluate", {"train", "eval"}), " (did you mean eval?)");
+  EXPECT_EQ(DidYouMean("max_steps", {"steps", "seed"}), " (did you mean steps?)");
+  EXPECT_EQ(DidYouMean("--max-steps", {"--steps"}), " (did you mean --steps?)");
   EXPECT_EQ(DidYouMean("simul", {"eval", "simulate"}), " (did you mean simulate?)");
   EXPECT_EQ(DidYouMean("qw", {"qwerty"}), "");
   EXPECT_EQ(DidYouMean("--yield", {"--y"}), "");

@@ -24,14 +24,15 @@ PyObject* MakeClass(nb::module_& m, const char* name, const char* doc, PyObject*
   return made;
 }
 
-/// The message with Python's names: a flag at its beginning becomes an argument.
-std::string PythonMessage(const std::string& message) {
-  static const std::regex kFlag("^--(set )?([a-z0-9-]+)");
-  std::smatch match;
-  if (!std::regex_search(message, match, kFlag)) return message;
-  std::string name = match[2];
-  std::ranges::replace(name, '-', '_');
-  return name + match.suffix().str();
+/// The message with Python's names: a flag at its beginning or in its advice becomes an argument.
+std::string PythonMessage(std::string message) {
+  static const std::regex kFlag("(^|with |another )--(set )?([a-z0-9-]+)");
+  for (std::smatch match; std::regex_search(message, match, kFlag);) {
+    std::string name = match[3];
+    std::ranges::replace(name, '-', '_');
+    message = match.prefix().str() + match[1].str() + name + match.suffix().str();
+  }
+  return message;
 }
 
 void Translate(const std::exception_ptr& exception, void* /*unused*/) {

@@ -211,7 +211,7 @@ class BadInput(InFolder, BadInputTest):
     def test_folders(self):
         (self.path / "full").mkdir()
         (self.path / "full/file").write_text("mine")
-        self.refuse_training(str(self.path / "full"), out=self.path / "full", **SMALL)
+        self.refuse_training("not empty (choose another out)", out=self.path / "full", **SMALL)
         self.assertEqual(os.listdir(self.path / "full"), ["file"])
         self.refuse_training("resume", resume=self.path / "nothing")
         self.refuse_training("resume: expected neither out nor config", resume="x", out="y")
