@@ -114,9 +114,7 @@ int Drive(const RunArguments& a, const Competitor& competitor, const std::option
 
   LoopConfig config{.hz = hz, .seconds = a.seconds, .actuated_joint = joint};
   if (a.compensation > 0) {
-    const Joints friction{twin->plant.coulomb1, twin->plant.coulomb2};
-    config.friction[static_cast<size_t>(2 - joint)] =
-        a.compensation * friction[static_cast<size_t>(2 - joint)];
+    config.compensation[static_cast<size_t>(2 - joint)] = a.compensation;
   }
   config.stop = [] { return StopSignal() != 0; };
 

@@ -30,7 +30,7 @@ LoopController::LoopController(const Competitor& competitor, int64_t hz)
   }
 }
 
-double LoopController::Act(int64_t cycle, const PendulumState& s) {
+double LoopController::Act(int64_t cycle, const PendulumState& s, bool estimated) {
   // After missed cycles only the last of the missed actions is made up.
   const int64_t step = cycle * kBoardHz / hz_ / held_ * held_;
   if (step == step_) return torque_[0];
@@ -39,6 +39,7 @@ double LoopController::Act(int64_t cycle, const PendulumState& s) {
   measured_.q2[0] = s.q2;
   measured_.w1[0] = s.w1;
   measured_.w2[0] = s.w2;
+  measured_.estimated = estimated;
   controller_->Act(static_cast<int>(step), measured_, 1, torque_);
   return torque_[0];
 }
@@ -96,10 +97,11 @@ CycleFacts ControlLoop::FactsOf(double now, const std::optional<LinkReading>& re
 
 Joints ControlLoop::ControllerTorque() {
   const PendulumState& s = estimator_.ahead();
-  Joints torque{config_.friction[0] * std::atan(kFrictionSlope * s.w1),
-                config_.friction[1] * std::atan(kFrictionSlope * s.w2)};
+  const Joints friction = estimator_.friction();
+  Joints torque{DryFriction(config_.compensation[0] * friction[0], s.w1),
+                DryFriction(config_.compensation[1] * friction[1], s.w2)};
   torque[static_cast<size_t>(config_.actuated_joint - 1)] +=
-      controller_.Act(cycle_ - running_cycle_, s);
+      controller_.Act(cycle_ - running_cycle_, s, estimator_.has_twin());
   return torque;
 }
 

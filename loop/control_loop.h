@@ -6,10 +6,10 @@
 #include <memory>
 #include <string>
 
-#include "loop/estimator.h"
 #include "loop/link.h"
 #include "loop/log_writer.h"
 #include "loop/supervisor.h"
+#include "machine/estimator.h"
 #include "realaigym/boards.h"
 
 /// The control loop on a machine.
@@ -21,8 +21,9 @@ class LoopController {
  public:
   /// Throws BadInput if the controller's steps do not fit the rate (Hz).
   LoopController(const Competitor& competitor, int64_t hz);
-  /// The motor's torque (N·m) in a cycle; number 0 is the first one.
-  double Act(int64_t cycle, const PendulumState& state);
+  /// The motor's torque (N·m) in a cycle; number 0 is the first one. `estimated`: whether the
+  /// state's velocities are better than differences of its angles.
+  double Act(int64_t cycle, const PendulumState& state, bool estimated);
 
  private:
   int64_t hz_;
@@ -37,7 +38,7 @@ struct LoopConfig {
   int64_t hz = 500;                 // cycles per second
   double seconds = 10;              // time in which the controller drives
   int actuated_joint = 1;           // the controller's motor, 1 or 2
-  Joints friction{};                // compensated dry friction f in f atan(100 w), N·m
+  Joints compensation{};            // share of each joint's dry friction that motors compensate
   std::function<bool()> stop = {};  // asks for a stop, such as by a signal
 };
 

@@ -39,10 +39,10 @@ class FakeLink : public MachineLink {
     machine_.Advance(now_);
     while (const auto frame = in_.Receive(now_)) {
       if (filter_.Judge(frame->sequence) != SequenceFilter::Verdict::kNew) continue;
-      newest = LinkReading{{frame->angle, frame->torque},
-                           now_ - 0.002 * (sequence_ - frame->answers),
-                           1e-6 * static_cast<double>(frame->microseconds),
-                           (frame->flags & Frame::kLocked) != 0};
+      newest =
+          LinkReading{{{frame->angle, frame->torque}, now_ - 0.002 * (sequence_ - frame->answers)},
+                      1e-6 * static_cast<double>(frame->microseconds),
+                      (frame->flags & Frame::kLocked) != 0};
     }
     return newest;
   }
@@ -194,7 +194,8 @@ TEST(ControlLoop, ATwinGivesEqualBitsForEqualSeeds) {
 
 TEST(ControlLoop, CompensatesTheFrictionOfTheOtherJoint) {
   LoopBench bench;
-  bench.config.friction = {0, 0.1};
+  bench.twin.plant.coulomb2 = 0.1;
+  bench.config.compensation = {0, 1};
   bench.link = std::make_unique<FakeLink>(bench.twin, FakeConfig{});
   bench.Make();
   double largest = 0;
@@ -219,7 +220,7 @@ TEST(LoopController, KeepsThePeriodOfAPolicy) {
     double last = 0;
     for (int64_t cycle = 0; cycle < 10 * held; ++cycle) {
       const double torque =
-          controller.Act(cycle, {3.1 + 1e-4 * static_cast<double>(cycle), 0, 0, 0});
+          controller.Act(cycle, {3.1 + 1e-4 * static_cast<double>(cycle), 0, 0, 0}, true);
       EXPECT_EQ(torque != last, cycle % held == 0) << hz << " Hz, cycle " << cycle;
       last = torque;
     }
@@ -228,10 +229,11 @@ TEST(LoopController, KeepsThePeriodOfAPolicy) {
   LoopController late(
       {"lqr", Robot::kPendubot, [&](size_t) { return ControllerOf(lqr, kBoardBlock); }, "plant"},
       500);
-  const double first = late.Act(0, {3.1, 0, 0, 0}), second = late.Act(47, {3.2, 0, 0, 0});
+  const double first = late.Act(0, {3.1, 0, 0, 0}, true),
+               second = late.Act(47, {3.2, 0, 0, 0}, true);
   EXPECT_NE(first, second);
-  EXPECT_EQ(late.Act(49, {3.1, 0, 0, 0}), second);
-  EXPECT_EQ(late.Act(50, {3.1, 0, 0, 0}), first);
+  EXPECT_EQ(late.Act(49, {3.1, 0, 0, 0}, true), second);
+  EXPECT_EQ(late.Act(50, {3.1, 0, 0, 0}, true), first);
   Competitor own = Sine(1);
   own.plant.clear();
   EXPECT_THROW(LoopController(own, 400), Error);

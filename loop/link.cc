@@ -40,7 +40,7 @@ void TwinLink::WaitUntil(double time) {
 
 std::optional<LinkReading> TwinLink::Exchange(const Joints& torque, bool enabled,
                                               double /*until*/) {
-  const LinkReading reading{machine_.Read(), machine_.time(), machine_.time(), false};
+  const LinkReading reading{{machine_.Read(), machine_.time()}, machine_.time(), false};
   Joints applied{};
   for (size_t j = 0; enabled && j < 2; ++j) applied[j] = std::clamp(torque[j], -limit_, limit_);
   machine_.Command(applied);
@@ -83,8 +83,7 @@ bool ChannelLink::Take(const Frame& frame) {
 LinkReading ChannelLink::ReadingOf(const Frame& frame) const {
   const uint32_t ago = sequence_ - frame.answers;
   const bool known = ago < sent_at_.size() && ago < sequence_;
-  return {{frame.angle, frame.torque},
-          known ? sent_at_[frame.answers % sent_at_.size()] : Now(),
+  return {{{frame.angle, frame.torque}, known ? sent_at_[frame.answers % sent_at_.size()] : Now()},
           1e-6 * static_cast<double>(frame.microseconds),
           (frame.flags & Frame::kLocked) != 0};
 }

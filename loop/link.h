@@ -23,9 +23,7 @@ struct LinkCounts {
   int64_t broken = 0;      // bytes that belong to no frame
 };
 
-/// A reading and the time at which the machine took it (s): when it got the answered command.
-struct LinkReading : MachineReading {
-  double time = 0;
+struct LinkReading : TimedReading {
   double clock = 0;     // of the machine, at the measurement, s
   bool locked = false;  // whether the machine's watchdog has locked its motors
 };

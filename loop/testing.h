@@ -5,29 +5,10 @@
 #include <string>
 
 #include "loop/control_loop.h"
-#include "machine/twin.h"
+#include "machine/testing.h"
 
 /// Helpers for tests of control loops.
 namespace upswing {
-
-/// A machine like RealAIGym's, with a delay and a lag of its motors and no jitter.
-inline Twin TestTwin() {
-  Twin twin;
-  twin.plant.mass1 = 0.5;
-  twin.plant.mass2 = 0.6;
-  twin.plant.length1 = 0.2;
-  twin.plant.length2 = 0.3;
-  twin.plant.damping1 = twin.plant.damping2 = 0.005;
-  twin.plant.coulomb1 = twin.plant.coulomb2 = 0.05;
-  twin.actuator.delay = 0.003;
-  twin.actuator.lag = 0.004;
-  twin.actuator.passive_limit = 0.5;
-  twin.sensors.quantum = 25.0 / 65535;
-  twin.sensors.angle_range = 12.5;
-  twin.sensors.zero1 = 0.02;
-  twin.sensors.zero2 = -0.01;
-  return twin;
-}
 
 /// Swings the motor's joint by a sine of the time.
 class SineController : public BoardController {

@@ -21,6 +21,11 @@ struct MachineReading {
   Joints torque;  // N·m
 };
 
+/// A reading and the time at which the machine took it (s): when it got the answered command.
+struct TimedReading : MachineReading {
+  double time = 0;
+};
+
 /// Motors, links and encoders. A negative delay of the twin's motors becomes the age of the
 /// readings: only the sum of both can be told from logs.
 class SimulatedMachine {

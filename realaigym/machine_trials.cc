@@ -6,28 +6,11 @@
 #include <memory>
 #include <mutex>
 
+#include "machine/estimator.h"
 #include "machine/motion.h"
 
 namespace upswing {
 namespace {
-
-/// Subtracts the compensation of a twin's dry friction from a machine's dry friction.
-void Compensate(const Twin& twin, Manipulator& body) {
-  body.f1 -= kCompensated * twin.plant.coulomb1;
-  body.f2 -= kCompensated * twin.plant.coulomb2;
-}
-
-/// Motors, encoders and loop of a machine in the terms of the boards' simulation.
-BoardEpisode EpisodeOf(const Twin& machine, const Twin& compensated) {
-  BoardEpisode episode;
-  episode.body = BodyOf(machine);
-  Compensate(compensated, *episode.body);
-  episode.quantum = machine.sensors.quantum;
-  episode.response = 1 - std::exp(-kBoardTimestep / std::max(machine.actuator.lag, 1e-5));
-  const double age = machine.loop.period + machine.actuator.delay;
-  episode.delay = std::clamp(static_cast<int>(std::lround(age / kBoardTimestep)), 0, 20);
-  return episode;
-}
 
 /// Two Gaussian pulses of torque at each joint, at least a second apart.
 std::function<Joints(double)> HardwarePushes(Rng& rng) {
@@ -54,31 +37,31 @@ std::function<Joints(double)> HardwarePushes(Rng& rng) {
 
 /// State of a controller made by OnMachine.
 struct BoardOnMachine {
+  Estimator estimator;
   std::unique_ptr<BoardController> controller;
-  BoardMeasurement measured{};
-  Lanes torque{};        // N·m
-  double last_time = 0;  // of the cycle before, s
-  Joints last_angle{};   // in the cycle before, rad
-  int steps = 0;         // steps of the controller so far
+  BoardMeasurement measured{{}, {}, {}, {}, true};
+  Lanes torque{};  // N·m
+  Joints sent{};   // in the last cycle, N·m
+  int steps = 0;   // of the controller so far
 };
 
 }  // namespace
 
-Joints CompensationAt(const Twin& twin, const Joints& velocity) {
-  const auto of = [&](double coulomb, double w) {
-    return kCompensated * coulomb * std::atan(kFrictionSlope * w);
-  };
-  return {of(twin.plant.coulomb1, velocity[0]), of(twin.plant.coulomb2, velocity[1])};
+BoardEpisode EpisodeOf(const Twin& machine) {
+  BoardEpisode episode;
+  episode.body = BodyOf(machine);
+  episode.body->f1 *= 1 - kCompensated;
+  episode.body->f2 *= 1 - kCompensated;
+  episode.response = 1 - std::exp(-kBoardTimestep / std::max(machine.actuator.lag, 1e-5));
+  return episode;
 }
-
-BoardEpisode NominalEpisode(const Twin& twin) { return EpisodeOf(twin, twin); }
 
 BoardEpisode DrawEpisode(const Twin& twin, Rng& rng) {
   const Twin machine = DrawTwin(twin, rng);
-  BoardEpisode episode = EpisodeOf(machine, twin);
-  episode.delay = std::clamp(episode.delay + static_cast<int>(rng.Below(2)), 0, 20);
-  episode.zero = {machine.sensors.zero1 - twin.sensors.zero1,
-                  machine.sensors.zero2 - twin.sensors.zero2};
+  BoardEpisode episode = EpisodeOf(machine);
+  episode.zero = {0.5 * (machine.sensors.zero1 - twin.sensors.zero1),
+                  0.5 * (machine.sensors.zero2 - twin.sensors.zero2)};
+  episode.delay = static_cast<int>(rng.Below(2));
   double time = 0;
   bool passive = rng.Uniform() < 0.5;
   for (BoardPush& push : episode.pushes) {
@@ -92,30 +75,26 @@ BoardEpisode DrawEpisode(const Twin& twin, Rng& rng) {
 
 TrialController OnMachine(const BoardControllerMaker& make, const Twin& twin, Robot robot) {
   return [make, twin, robot]() -> CycleController {
-    auto own = std::make_shared<BoardOnMachine>();
-    own->controller = make(0);
-    return [own, twin, robot](const CycleInput& in) -> Joints {
-      const Joints angle{in.angle[0] - twin.sensors.zero1, in.angle[1] - twin.sensors.zero2};
-      // The controller acts at the points of its even grid since the last cycle.
-      const double since = std::max(in.time - own->last_time, 1e-9);
+    auto own = std::make_shared<BoardOnMachine>(
+        BoardOnMachine{Estimator(twin, twin.loop.period), make(0)});
+    const Joints limit = TorqueLimits(twin, static_cast<int>(robot));
+    return [own, limit, robot](const CycleInput& in) -> Joints {
+      const TimedReading reading{{in.angle, {}}, in.time};
+      own->estimator.Update(in.time, own->sent, &reading);
+      const PendulumState& s = own->estimator.ahead();
+      own->measured.q1[0] = s.q1;
+      own->measured.q2[0] = s.q2;
+      own->measured.w1[0] = s.w1;
+      own->measured.w2[0] = s.w2;
       for (; own->steps * kBoardTimestep <= in.time; ++own->steps) {
-        const double share =
-            std::clamp((own->steps * kBoardTimestep - own->last_time) / since, 0.0, 1.0);
-        const auto at = [&](int j) {
-          return own->steps == 0 ? angle[j]
-                                 : own->last_angle[j] + share * (angle[j] - own->last_angle[j]);
-        };
-        own->measured.q1[0] = at(0);
-        own->measured.q2[0] = at(1);
-        own->measured.w1[0] = in.velocity[0];
-        own->measured.w2[0] = in.velocity[1];
         own->controller->Act(own->steps, own->measured, 1, own->torque);
       }
-      own->last_time = in.time;
-      own->last_angle = angle;
-      Joints torque = CompensationAt(twin, in.velocity);
-      torque[robot == Robot::kPendubot ? 0 : 1] += own->torque[0];
-      return torque;
+      const Joints friction = own->estimator.friction();
+      Joints torque{DryFriction(kCompensated * friction[0], s.w1),
+                    DryFriction(kCompensated * friction[1], s.w2)};
+      torque[static_cast<size_t>(robot) - 1] += own->torque[0];
+      for (size_t j = 0; j < 2; ++j) torque[j] = std::clamp(torque[j], -limit[j], limit[j]);
+      return own->sent = torque;
     };
   };
 }

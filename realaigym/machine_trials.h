@@ -15,25 +15,22 @@
 /// Controllers on machines of a twin's posterior, by the rules of RealAIGym's hardware boards.
 namespace upswing {
 
-/// Share of the twin's dry friction that the motors compensate, of both joints. The rules allow
-/// it. Less than all keeps the sum from driving a joint whose friction is below the twin's.
+/// Share of the estimated dry friction that the motors compensate, of both joints. The rules allow
+/// it. Less than all keeps the sum from driving a joint whose friction is overestimated.
 inline constexpr double kCompensated = 0.8;
 
-/// The torque (N·m) that compensates a twin's friction at these velocities (rad/s).
-Joints CompensationAt(const Twin& twin, const Joints& velocity);
-
-/// The twin's machine as an episode of a search: friction less its compensation, delay, lag and
-/// encoders. The zeros are 0.
-BoardEpisode NominalEpisode(const Twin& twin);
-/// An episode of a machine drawn from the posterior, with two pushes at each joint.
+/// A twin's machine with an Estimator, as an episode of a search: friction less its compensation,
+/// and the motors' lag. The estimator predicts beyond the delay.
+BoardEpisode EpisodeOf(const Twin& machine);
+/// An episode of a machine drawn from the posterior, with two pushes at each joint. The estimator
+/// misses half of the encoders' zeros, and up to 2 ms of delay.
 BoardEpisode DrawEpisode(const Twin& twin, Rng& rng);
 
 /// Makes the controller of a trial.
 using TrialController = std::function<CycleController()>;
 
-/// A controller of the boards as a machine's controller, with friction compensation. Angles count
-/// from the twin's mean zeros. The controller acts on an even grid of kBoardTimestep with
-/// interpolated angles, so that its own differences of angles are velocities in spite of jitter.
+/// A controller of the boards as a machine's controller: an Estimator of the twin gives it the
+/// state, and compensates friction. It acts at the steps of kBoardTimestep.
 TrialController OnMachine(const BoardControllerMaker& make, const Twin& twin, Robot robot);
 
 struct TrialRules {

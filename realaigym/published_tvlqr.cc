@@ -25,8 +25,8 @@ constexpr MachineSensors kFilter{.velocity_share = 0.2, .velocity_dead_zone = 0.
 constexpr double kCatchAngle = 0.35, kCatchVelocity = 3.5;  // rad, rad/s
 
 Joints Compensation(const Joints& w) {
-  return {kComp1 * std::atan(kFrictionSlope * w[0]) + kCompDamping * w[0],
-          kComp2 * std::atan(kFrictionSlope * w[1]) + kCompDamping * w[1]};
+  return {DryFriction(kComp1, w[0]) + kCompDamping * w[0],
+          DryFriction(kComp2, w[1]) + kCompDamping * w[1]};
 }
 
 /// The value matrix of the pendubot's regulator, as published.

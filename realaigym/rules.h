@@ -36,7 +36,6 @@ struct BoardPush {
 struct BoardEpisode {
   BoardPlant plant;
   std::optional<Manipulator> body = {};  // equations of motion in place of the plant's
-  double quantum = 0;                    // step of the measured angles, rad
   std::array<double, 2> zero{};          // measured angles of a pendulum that hangs, rad
   double velocity_noise = 0;             // of the measured velocities, rad/s
   double torque_noise = 0;               // N·m

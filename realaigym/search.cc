@@ -165,7 +165,7 @@ int BoardSearch::generations() const {
 
 std::vector<double> BoardSearch::NominalFitnesses(
     const std::vector<std::vector<double>>& candidates, ThreadPool* pool) const {
-  BoardEpisode nominal = twin_ ? NominalEpisode(*twin_) : BoardEpisode{};
+  BoardEpisode nominal = twin_ ? EpisodeOf(*twin_) : BoardEpisode{};
   nominal.steps = kShortSteps;
   const std::vector<BoardEpisode> episodes(candidates.size(), nominal);
   const auto make = [&](size_t first) {
@@ -207,7 +207,7 @@ std::vector<double> BoardSearch::Fitnesses(const std::vector<std::vector<double>
 
 std::vector<DrawnEpisode> BoardSearch::DrawEpisodes() {
   if (!twin_) return BoardEpisodes(rng_);
-  std::vector<DrawnEpisode> drawn{{0, NominalEpisode(*twin_)}};
+  std::vector<DrawnEpisode> drawn{{0, EpisodeOf(*twin_)}};
   while (drawn.size() < kSwingGroup) {
     drawn.push_back({1.0 / (kSwingGroup - 1), DrawEpisode(*twin_, rng_)});
   }
@@ -256,7 +256,7 @@ bool BoardSearch::Step(ThreadPool* pool, Report& report) {
 }
 
 BoardOutcome BoardSearch::Nominal() const {
-  const std::array nominal{twin_ ? NominalEpisode(*twin_) : BoardEpisode{}};
+  const std::array nominal{twin_ ? EpisodeOf(*twin_) : BoardEpisode{}};
   return SimulateOnBoard(
              net_.robot(), nominal, [&](size_t) { return net_.Control(average_); }, nullptr)
       .front();

@@ -61,7 +61,7 @@ class Run {
       const BoardEpisode& episode = episodes[lane];
       const Manipulator body = episode.body ? *episode.body : ManipulatorOf(episode.plant);
       block_.SetManipulator(lane, body);
-      if (episode.quantum > 0 || episode.zero != std::array<double, 2>{}) encoders_.push_back(lane);
+      if (episode.zero != std::array<double, 2>{}) shifted_.push_back(lane);
       rngs_.emplace_back(episode.seed, "realaigym: noise");
       if (episode.velocity_noise > 0) velocity_noise_.push_back(lane);
       if (episode.torque_noise > 0) torque_noise_.push_back(lane);
@@ -102,10 +102,9 @@ class Run {
     std::ranges::copy(block_.q2, seen_.q2.begin());
     std::ranges::copy(block_.w1, seen_.w1.begin());
     std::ranges::copy(block_.w2, seen_.w2.begin());
-    for (const size_t lane : encoders_) {
-      const BoardEpisode& episode = episodes_[lane];
-      seen_.q1[lane] = Rounded(seen_.q1[lane] + episode.zero[0], episode.quantum);
-      seen_.q2[lane] = Rounded(seen_.q2[lane] + episode.zero[1], episode.quantum);
+    for (const size_t lane : shifted_) {
+      seen_.q1[lane] += episodes_[lane].zero[0];
+      seen_.q2[lane] += episodes_[lane].zero[1];
     }
     if (!delayed_.empty()) past_[static_cast<size_t>(step % kMostDelay)] = seen_;
     for (const size_t lane : delayed_) {
@@ -229,7 +228,7 @@ class Run {
   ClosedFormBatch block_;
   std::vector<Rng> rngs_;
   // Simulations with inexact encoders, velocity noise, torque noise, delay and slow response:
-  std::vector<size_t> encoders_, velocity_noise_, torque_noise_, delayed_, responding_;
+  std::vector<size_t> shifted_, velocity_noise_, torque_noise_, delayed_, responding_;
   std::vector<LanePush> pushes_;
   std::vector<BoardMeasurement> past_;  // ring of the last kMostDelay states
   BoardMeasurement seen_{};

@@ -13,7 +13,8 @@ namespace upswing {
 
 /// Measurements of a block of simulations: the states with noise and delay.
 struct BoardMeasurement {
-  Lanes q1, q2, w1, w2;  // rad, rad/s
+  Lanes q1, q2, w1, w2;    // rad, rad/s
+  bool estimated = false;  // whether w1 and w2 are better than differences of the angles
 };
 
 /// Controls a block of simulations from their beginnings. Act is called at every step of

@@ -21,7 +21,16 @@ class SwingController : public BoardController {
   explicit SwingController(SwingBlock block) : block_(std::move(block)) {}
 
   void Act(int step, const BoardMeasurement& measured, size_t /*count*/, Lanes& torque) override {
-    if (step == 0) {  // the episode begins at rest
+    if (measured.estimated) {
+      // Earlier angles on a line give the estimated velocity.
+      for (size_t i = 0; i < kBoardBlock; ++i) {
+        for (size_t k = 0; k < 2; ++k) {
+          const double before = static_cast<double>(k + 1) * kBoardTimestep;
+          block_.q1[k][i] = measured.q1[i] - before * measured.w1[i];
+          block_.q2[k][i] = measured.q2[i] - before * measured.w2[i];
+        }
+      }
+    } else if (step == 0) {  // the episode begins at rest
       block_.q1.fill(measured.q1);
       block_.q2.fill(measured.q2);
     }

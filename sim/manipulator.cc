@@ -12,13 +12,15 @@ void Manipulator::AddRotors(double inertia, double gear) {
   a += (gear * gear + gear) * inertia;
 }
 
+double DryFriction(double f, double w) { return f * std::atan(kFrictionSlope * w); }
+
 ManipulatorTerms Manipulator::At(const PendulumState& s) const {
   const auto& [q1, q2, w1, w2] = s;
   const double bs = b * std::sin(q2);
   ManipulatorTerms t{Mass(std::cos(q2)), 0, 0, 0};
   t.h1 = -bs * (2 * w1 + w2) * w2 + G1 * std::sin(q1) + G2 * std::sin(q1 + q2) + d1 * w1 +
-         f1 * std::atan(kFrictionSlope * w1);
-  t.h2 = bs * w1 * w1 + G2 * std::sin(q1 + q2) + d2 * w2 + f2 * std::atan(kFrictionSlope * w2);
+         DryFriction(f1, w1);
+  t.h2 = bs * w1 * w1 + G2 * std::sin(q1 + q2) + d2 * w2 + DryFriction(f2, w2);
   t.energy = (t.M11 * w1 * w1 + 2 * t.M12 * w1 * w2 + t.M22 * w2 * w2) / 2 -
              G1 * (1 + std::cos(q1)) - G2 * (1 + std::cos(q1 + q2));
   return t;

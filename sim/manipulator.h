@@ -47,6 +47,9 @@ struct Manipulator {
                                      const std::array<double, 2>& torque) const;
 };
 
+/// Torque (N·m) of the dry friction f (N·m) against a velocity w (rad/s): f atan(100 w).
+double DryFriction(double f, double w);
+
 Manipulator ManipulatorOf(const Plant& plant);
 
 }  // namespace upswing

@@ -1,12 +1,13 @@
-#include "loop/estimator.h"
+#include "machine/estimator.h"
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <vector>
 
 #include "core/rng.h"
-#include "loop/testing.h"
+#include "machine/testing.h"
 
 namespace upswing {
 namespace {
@@ -36,7 +37,7 @@ Errors ErrorsOf(const Twin& machine_twin, Estimator estimator, double loss = 0) 
     const double time = k * kPeriod;
     machine.Advance(time);
     truth.push_back(machine.state());
-    const LinkReading reading{machine.Read(), time, time, false};
+    const TimedReading reading{machine.Read(), time};
     const Joints sent{1.5 * std::sin(5 * time) + std::sin(17 * time), 0.3 * std::cos(11 * time)};
     machine.Command(sent);
     estimator.Update(time, sent, rng.Uniform() < loss ? nullptr : &reading);
@@ -70,8 +71,7 @@ TEST(Estimator, WithoutATwinIsVelocityEstimate) {
   Estimator estimator(sensors, 0.002);
   VelocityEstimate reference(sensors);
   for (int k = 0; k < 100; ++k) {
-    const LinkReading reading{
-        {{0.1 * std::sin(0.1 * k), 0.001 * k}, {}}, 0.002 * k, 0.002 * k, false};
+    const TimedReading reading{{{0.1 * std::sin(0.1 * k), 0.001 * k}, {}}, 0.002 * k};
     const Joints w = reference.Update(reading.time, reading.angle);
     estimator.Update(reading.time, {}, k == 50 ? nullptr : &reading);
     if (k == 50) estimator.Update(reading.time, {}, &reading);
@@ -114,10 +114,58 @@ TEST(Estimator, AWrongTwinStillFollowsTheAngles) {
   EXPECT_LT(errors.velocity, 0.2);
 }
 
+/// The largest error of zeros and friction after ten seconds, as a share of that at the beginning.
+double LargestShare(Estimator& estimator, const Twin& session) {
+  const auto errors = [&] {
+    const Joints zero = estimator.zero(), friction = estimator.friction();
+    return std::array{zero[0] - session.sensors.zero1, zero[1] - session.sensors.zero2,
+                      friction[0] - session.plant.coulomb1, friction[1] - session.plant.coulomb2};
+  };
+  const auto first = errors();
+  SimulatedMachine machine(session, {});
+  Joints sent{};
+  for (int k = 0; k < 5000; ++k) {
+    const double time = k * 0.002;
+    machine.Advance(time);
+    const TimedReading reading{machine.Read(), time};
+    machine.Command(sent);
+    estimator.Update(time, sent, &reading);
+    sent = {0.4 * std::sin(5 * time), 0};
+  }
+  EXPECT_NEAR(estimator.now().q1 + estimator.zero()[0], machine.Read().angle[0], 0.001);
+  double largest = 0;
+  for (size_t i = 0; i < 4; ++i) largest = std::max(largest, std::abs(errors()[i] / first[i]));
+  return largest;
+}
+
+TEST(Estimator, FindsTheZerosAndTheFrictionOfASession) {
+  Twin twin = TestTwin(), session = twin;
+  session.sensors.zero1 += 0.04;
+  session.sensors.zero2 -= 0.03;
+  session.plant.coulomb1 += 0.02;
+  session.plant.coulomb2 -= 0.015;
+  Estimator certain(twin, 0.002);
+  EXPECT_EQ(LargestShare(certain, session), 1);
+
+  twin.uncertain = {"zero1", "zero2", "coulomb1", "coulomb2"};
+  twin.covariance.assign(16, 0);
+  const std::array deviations{0.03, 0.03, 0.015, 0.015};
+  for (size_t i = 0; i < 4; ++i) twin.covariance[5 * i] = deviations[i] * deviations[i];
+  Estimator learns(twin, 0.002);
+  EXPECT_LT(LargestShare(learns, session), 0.5);
+
+  // After a gap the state begins again, and the session stays known.
+  const TimedReading later{{{0.5, 0.1}, {}}, 20};
+  const Joints zero = learns.zero();
+  learns.Update(20, {}, &later);
+  EXPECT_EQ(learns.zero(), zero);
+  EXPECT_NEAR(learns.now().q1, 0.5 - zero[0], 1e-9);
+}
+
 TEST(Estimator, KnowsTheEnergy) {
   const Twin twin = TestTwin();
   Estimator estimator(twin, 0.002);
-  LinkReading reading{{{0.02, -0.01}, {}}, 0, 0, false};  // the zeros: hanging
+  TimedReading reading{{{0.02, -0.01}, {}}, 0};  // the zeros: hanging
   estimator.Update(0, {}, &reading);
   EXPECT_NEAR(estimator.energy(), 0, 1e-9);
   Estimator upright(twin, 0.002);

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+
+#include "machine/motion.h"
+#include "machine/simulated_machine.h"
+#include "machine/twin.h"
+#include "sim/double_pendulum.h"
+
+/// Estimates of a machine's state from the angles that its encoders report.
+namespace upswing {
+
+/// Estimates the state in each cycle. A cycle sends the torques of the cycle before and reads the
+/// angles at the same time.
+///
+/// Without a twin, velocities are low-passed differences of the angles (VelocityEstimate).
+///
+/// With a twin, an extended Kalman filter follows the twin's motion under the sent torques:
+///   x = (q1, q2, w1, w2, z1, z2, f1, f2),   measured angles = (q1 + z1, q2 + z2)
+/// z are the encoders' zeros and f the dry friction, which differ from session to session. They
+/// begin at the twin's values and are estimated, slowly, as far as the twin's covariance leaves
+/// them open: gravity and friction show in the motion. Its prediction bridges lost readings. The
+/// controller gets the state at the time when its torque will act: a cycle, the motors' delay and
+/// their lag later.
+///
+/// No function allocates memory after the constructor.
+class Estimator {
+ public:
+  /// `sensors`: low-pass and dead zone; used without a twin. `period`: of the cycles, s.
+  Estimator(const MachineSensors& sensors, double period);
+  Estimator(const Twin& twin, double period);
+
+  /// Takes the torques (N·m) sent at a time (s), and a new reading if there is one.
+  void Update(double time, const Joints& sent, const TimedReading* reading);
+
+  /// Whether it follows a twin, so that its velocities are better than differences of angles.
+  bool has_twin() const { return model_.has_value(); }
+  /// The estimated state now: true angles, without the encoders' zeros.
+  const PendulumState& now() const { return now_; }
+  /// The estimated state when a torque that is computed now will act.
+  const PendulumState& ahead() const { return ahead_; }
+  /// The estimated zeros of the encoders, rad.
+  Joints zero() const { return {x_[kZero], x_[kZero + 1]}; }
+  /// The estimated dry friction f in f atan(100 w), N·m; 0 without a twin.
+  Joints friction() const { return {x_[kFriction], x_[kFriction + 1]}; }
+  /// Mechanical energy now, 0 hanging at rest and 1 upright at rest; 0 without a twin.
+  double energy() const;
+
+ private:
+  static constexpr int kAngle = 0, kVelocity = 2, kZero = 4, kFriction = 6, kStates = 8;
+  using Vector = Eigen::Matrix<double, kStates, 1>;
+  using Matrix = Eigen::Matrix<double, kStates, kStates>;
+
+  struct Model {
+    Manipulator body;
+    Drive drive;
+    double age;      // of the readings, s
+    double horizon;  // from sending a torque to its effect, s
+    double hanging;  // energy below upright of the links that hang, J
+  };
+  /// x after `seconds` of the twin's motion from x at `begin` (s).
+  Vector Follow(Vector x, double begin, double seconds) const;
+  /// Begins with measured angles of a moment (s). Zeros and friction stay.
+  void Begin(const Joints& angle, double moment);
+  /// Lets the filter follow the motion for `seconds`.
+  void Predict(double seconds);
+  /// Corrects x with measured angles.
+  void Correct(const Joints& angle);
+
+  MachineSensors sensors_;
+  double period_;
+  VelocityEstimate velocity_;
+  std::optional<Model> model_;
+  bool begun_ = false;
+  double time_ = 0;  // of x_, s
+  Vector x_ = Vector::Zero();
+  Matrix P_ = Matrix::Zero();  // covariance of x_
+  PendulumState now_, ahead_;
+};
+
+}  // namespace upswing
