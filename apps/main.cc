@@ -18,7 +18,7 @@ constexpr CommandEntry kCommands[] = {
     {"study", "Train variants of the settings, each with many seeds", AddStudy},
     {"export", "Export policies as ONNX or C, or into the page", AddExport},
     {"realaigym", "Score a policy by the rules of RealAIGym, or search for one", AddRealAiGym},
-    {"machine", "Check the logs of a real machine", AddMachine},
+    {"machine", "Check logs of a real machine, identify its twin, validate it", AddMachine},
     {"run", "Drive a real machine or its twin with a policy", AddRun},
     {"fake", "Play a machine for `run`: a twin behind UDP or a terminal", AddFake},
     {"bench", "Measure the speed of the program on this machine", nullptr},

@@ -186,7 +186,7 @@ void AddRun(CommandLine& line) {
   own.Add(&a.passive_torque, "passive_torque", {0, 1000}, "N·m",
           "largest torque of the joint without the controller's motor");
   own.Add(&a.compensation, "compensation", kUnit, "",
-          "share of that joint's dry friction that its motor compensates; needs a twin");
+          "share of that joint's estimated dry friction that its motor compensates; needs a twin");
   own.Add(&a.sensors.velocity_share, "velocity_share", {0.001, 1}, "",
           "without a twin: share of the newest difference in the low-passed velocities");
   own.Add(&a.sensors.velocity_dead_zone, "velocity_dead_zone", {0, 100}, "rad/s",

@@ -107,8 +107,9 @@ std::filesystem::path SharePath() {
 }
 
 bool IsInstalled() {
-  std::error_code ignored;
-  return std::filesystem::is_directory(SharePath(), ignored);
+  std::error_code error;
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
+  return !error && std::filesystem::is_directory(SharePath(), error);
 }
 
 }  // namespace upswing

@@ -22,7 +22,7 @@ class LoopController {
   /// Throws BadInput if the controller's steps do not fit the rate (Hz).
   LoopController(const Competitor& competitor, int64_t hz);
   /// The motor's torque (N·m) in a cycle; number 0 is the first one. `estimated`: whether the
-  /// state's velocities are better than differences of its angles.
+  /// state's velocities come from a model.
   double Act(int64_t cycle, const PendulumState& state, bool estimated);
 
  private:

@@ -23,6 +23,7 @@ struct LinkCounts {
   int64_t broken = 0;      // bytes that belong to no frame
 };
 
+/// A reading with the machine's clock and the state of its watchdog.
 struct LinkReading : TimedReading {
   double clock = 0;     // of the machine, at the measurement, s
   bool locked = false;  // whether the machine's watchdog has locked its motors

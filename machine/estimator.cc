@@ -2,17 +2,20 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <string_view>
 
 namespace upswing {
 namespace {
 
-// Torques that the model lacks change the velocities by a random walk of this deviation, rad/s in
-// 1 s. Zeros and friction get only a share of the Kalman gain, because a real machine's errors are
-// no white noise. Both are chosen on RealAIGym's logs: with less noise or the whole gain, the
-// estimated zeros wander further off than the twin's own zeros are.
+// Unmodelled torques: random walk of the velocities, rad/s after 1 s. Zeros and friction get only a
+// share of the Kalman gain, because a real machine's errors are no white noise. On RealAIGym's
+// logs, less noise and the whole gain have larger errors than the twin's zeros.
 constexpr double kVelocityNoise = 0.7;
 constexpr double kSessionShare = 0.2;
+// Links without torque rest below this velocity, rad/s: more than a quantum in a cycle.
+constexpr double kMoving = 0.3;
 constexpr double kFirstVelocity = 3;  // deviation of the velocities at the beginning, rad/s
 constexpr double kLeastNoise = 1e-6;  // of the measured angles, rad
 constexpr double kKept = 0.1;         // time for which sent torques are kept, s
@@ -27,6 +30,8 @@ double CovarianceOf(const Twin& twin, std::string_view a, std::string_view b) {
   const auto n = std::ssize(names);
   return i < n && j < n ? twin.covariance[static_cast<size_t>(i * n + j)] : 0;
 }
+
+double Square(double x) { return x * x; }
 
 PendulumState StateOf(const Eigen::Matrix<double, 8, 1>& x) { return {x[0], x[1], x[2], x[3]}; }
 
@@ -71,18 +76,23 @@ Estimator::Vector Estimator::Follow(Vector x, double begin, double seconds) cons
   return x;
 }
 
+double Estimator::AngleNoise() const {
+  // Rounding errors of a slow joint repeat, so the noise is a whole quantum.
+  return std::max(sensors_.quantum, kLeastNoise);
+}
+
 void Estimator::Begin(const Joints& angle, double moment) {
   begun_ = true;
   time_ = moment;
-  // The angles are off by as much as the zeros, in the other direction.
+  // Angle = measured angle - zero, so their errors are opposite.
   for (int j = 0; j < 2; ++j) x_[kAngle + j] = angle[j] - x_[kZero + j];
   x_.segment<2>(kVelocity).setZero();
   P_.topRows<4>().setZero();
   P_.leftCols<4>().setZero();
   P_.topRows<2>() = -P_.middleRows<2>(kZero);
   P_.leftCols<2>() = -P_.middleCols<2>(kZero);
-  P_.topLeftCorner<2, 2>() = P_.block<2, 2>(kZero, kZero);
-  P_.diagonal().segment<2>(kVelocity).setConstant(kFirstVelocity * kFirstVelocity);
+  P_.diagonal().head<2>().array() += Square(AngleNoise());
+  P_.diagonal().segment<2>(kVelocity).setConstant(Square(kFirstVelocity));
 }
 
 void Estimator::Predict(double seconds) {
@@ -96,7 +106,7 @@ void Estimator::Predict(double seconds) {
     F.col(i) = (Follow(other, time_, seconds) - next) / kStep;
   }
   P_ = F * P_ * F.transpose();
-  P_.diagonal().segment<2>(kVelocity).array() += kVelocityNoise * kVelocityNoise * seconds;
+  P_.diagonal().segment<2>(kVelocity).array() += Square(kVelocityNoise) * seconds;
   x_ = next;
   time_ += seconds;
 }
@@ -106,9 +116,7 @@ void Estimator::Correct(const Joints& angle) {
   H(0, kAngle) = H(1, kAngle + 1) = H(0, kZero) = H(1, kZero + 1) = 1;
   const Eigen::Vector2d error = Eigen::Vector2d(angle[0], angle[1]) - H * x_;
   Eigen::Matrix2d S = H * P_ * H.transpose();
-  // Rounding errors of a slow joint repeat, so the noise is a whole quantum.
-  const double noise = std::max(sensors_.quantum, kLeastNoise);
-  S.diagonal().array() += noise * noise;
+  S.diagonal().array() += Square(AngleNoise());
   const Eigen::Matrix<double, kStates, 2> K = P_ * H.transpose() * S.inverse();
   // Partial update: Brink, "Partial-Update Schmidt-Kalman Filter", Journal of Guidance, Control,
   // and Dynamics 40 (2017).
@@ -117,6 +125,7 @@ void Estimator::Correct(const Joints& angle) {
   x_ += (Vector::Ones() - rest).cwiseProduct(K * error);
   P_ -= (Matrix::Ones() - rest * rest.transpose()).cwiseProduct(K * H * P_).eval();
   P_ = (0.5 * (P_ + P_.transpose())).eval();
+  x_.tail<2>() = x_.tail<2>().cwiseMax(0);  // friction never drives
 }
 
 void Estimator::Update(double time, const Joints& sent, const TimedReading* reading) {
@@ -129,13 +138,23 @@ void Estimator::Update(double time, const Joints& sent, const TimedReading* read
   }
   model_->drive.Forget(time - kKept);
   model_->drive.Add(time, sent);
-  if (reading != nullptr) {
+  if (reading != nullptr && std::isfinite(reading->angle[0] + reading->angle[1])) {
     const double moment = reading->time - model_->age;
-    if (!begun_ || moment - time_ > kLongestGap) {
+    if (!begun_ || std::abs(moment - time_) > kLongestGap) {
       Begin(reading->angle, moment);
     } else if (moment > time_) {
+      const Vector x = x_;
+      const Matrix P = P_;
       Predict(moment - time_);
       Correct(reading->angle);
+      // Stiction may hold links off their equilibrium, which the model lacks: nothing is learned.
+      const bool rests =
+          sent == Joints{} && x_.segment<2>(kVelocity).cwiseAbs().maxCoeff() < kMoving;
+      if (rests) {
+        x_ = x;
+        P_ = P;
+        Begin(reading->angle, moment);
+      }
     }
   }
   if (!begun_) return;

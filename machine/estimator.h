@@ -19,8 +19,8 @@ namespace upswing {
 /// With a twin, an extended Kalman filter follows the twin's motion under the sent torques:
 ///   x = (q1, q2, w1, w2, z1, z2, f1, f2),   measured angles = (q1 + z1, q2 + z2)
 /// z are the encoders' zeros and f the dry friction, which differ from session to session. They
-/// begin at the twin's values and are estimated, slowly, as far as the twin's covariance leaves
-/// them open: gravity and friction show in the motion. Its prediction bridges lost readings. The
+/// begin at the twin's values. Those with a covariance are estimated, slowly, while the machine
+/// is driven: gravity and friction show in the motion. The prediction bridges lost readings. The
 /// controller gets the state at the time when its torque will act: a cycle, the motors' delay and
 /// their lag later.
 ///
@@ -34,7 +34,7 @@ class Estimator {
   /// Takes the torques (N·m) sent at a time (s), and a new reading if there is one.
   void Update(double time, const Joints& sent, const TimedReading* reading);
 
-  /// Whether it follows a twin, so that its velocities are better than differences of angles.
+  /// Whether it follows a twin, so that its velocities come from a model.
   bool has_twin() const { return model_.has_value(); }
   /// The estimated state now: true angles, without the encoders' zeros.
   const PendulumState& now() const { return now_; }
@@ -61,6 +61,8 @@ class Estimator {
   };
   /// x after `seconds` of the twin's motion from x at `begin` (s).
   Vector Follow(Vector x, double begin, double seconds) const;
+  /// Standard deviation of measured angles, rad.
+  double AngleNoise() const;
   /// Begins with measured angles of a moment (s). Zeros and friction stay.
   void Begin(const Joints& angle, double moment);
   /// Lets the filter follow the motion for `seconds`.

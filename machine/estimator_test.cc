@@ -2,11 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <vector>
 
 #include "core/rng.h"
+#include "core/text.h"
+#include "machine/log.h"
 #include "machine/testing.h"
 
 namespace upswing {
@@ -160,6 +165,83 @@ TEST(Estimator, FindsTheZerosAndTheFrictionOfASession) {
   learns.Update(20, {}, &later);
   EXPECT_EQ(learns.zero(), zero);
   EXPECT_NEAR(learns.now().q1, 0.5 - zero[0], 1e-9);
+}
+
+TEST(Estimator, LearnsNothingAtRestNorFromReadingsThatAreNotNumbers) {
+  Twin twin = TestTwin();
+  twin.uncertain = {"zero1", "coulomb2"};
+  twin.covariance = {9e-4, 0, 0, 2e-4};
+  Estimator estimator(twin, 0.002);
+  for (int k = 0; k < 1000; ++k) {  // dry friction holds the links away from where they hang
+    const TimedReading held{{{0.07, -0.05}, {}}, 0.002 * k};
+    estimator.Update(held.time, {}, &held);
+  }
+  EXPECT_EQ(estimator.zero()[0], twin.sensors.zero1);
+  EXPECT_EQ(estimator.friction()[1], twin.plant.coulomb2);
+  const TimedReading nothing{{{std::nan(""), 0}, {}}, 2};
+  estimator.Update(2, {}, &nothing);
+  EXPECT_NEAR(estimator.now().q1, 0.07 - twin.sensors.zero1, 0.002);
+  // A clock that jumps back begins again.
+  const TimedReading again{{{0.5, 0}, {}}, 0.1};
+  estimator.Update(0.1, {}, &again);
+  EXPECT_NEAR(estimator.now().q1, 0.5 - estimator.zero()[0], 1e-9);
+}
+
+/// Mean squares of the zeros' errors over a log, against those of the whole session: of the
+/// estimates, and of the twin's own zeros. rad²
+struct ZeroErrors {
+  double estimated = 0, given = 0;
+};
+
+ZeroErrors ZeroErrorsOn(const MachineLog& log, const Twin& twin) {
+  const MachineSensors session = InSession(twin, log).sensors;
+  const auto square = [&](const Joints& zero) {
+    const double e1 = zero[0] - session.zero1, e2 = zero[1] - session.zero2;
+    return (e1 * e1 + e2 * e2) / 2;
+  };
+  const Joints limit = TorqueLimits(twin, ActuatedJoint(log, twin));
+  Estimator estimator(twin, twin.loop.period);
+  Joints sent{};
+  ZeroErrors errors{0, square({twin.sensors.zero1, twin.sensors.zero2})};
+  for (int row = 0; row < log.rows(); ++row) {
+    const TimedReading reading{{log.angle[row], {}}, log.time[row]};
+    estimator.Update(log.time[row], sent, &reading);
+    errors.estimated += square(estimator.zero()) / log.rows();
+    for (int j = 0; j < 2; ++j) sent[j] = std::clamp(log.commanded[row][j], -limit[j], limit[j]);
+  }
+  return errors;
+}
+
+/// The twin is identified from these runs, too. UPSWING_RUNS: number of runs of each session, 1
+/// to 5.
+TEST(Estimator, FindsTheZerosOfRealSessions) {
+  if (RealData().empty()) GTEST_SKIP() << "no measured data";
+  const char* given = std::getenv("UPSWING_RUNS");
+  const int runs = given != nullptr ? std::clamp(std::atoi(given), 1, 5) : 1;
+  const Twin twin = ReadTwin("realaigym-twin", "test");
+  ZeroErrors all;
+  for (const char* name :
+       {"swingup/acrobot-tvlqr-0", "swingup/pendubot-tvlqr-0", "swingup/acrobot-mcpilco-0",
+        "swingup/pendubot-mcpilco-0", "pushed/acrobot-tvlqr-0", "pushed/pendubot-tvlqr-0"}) {
+    ZeroErrors session;
+    for (int run = 1; run <= runs; ++run) {
+      const auto file = RealData() / "C.1" / Concat(name, run, ".csv.gz");
+      const ZeroErrors errors = ZeroErrorsOn(ReadLog(file).front(), twin);
+      session.estimated += errors.estimated / runs;
+      session.given += errors.given / runs;
+    }
+    if (given != nullptr) {
+      std::printf("%-28s estimated %.4f rad, twin %.4f rad\n", name, std::sqrt(session.estimated),
+                  std::sqrt(session.given));
+    }
+    all.estimated += session.estimated / 6;
+    all.given += session.given / 6;
+  }
+  if (given != nullptr) {
+    std::printf("all: estimated %.4f rad, twin %.4f rad\n", std::sqrt(all.estimated),
+                std::sqrt(all.given));
+  }
+  EXPECT_LT(all.estimated, 0.8 * all.given);
 }
 
 TEST(Estimator, KnowsTheEnergy) {

@@ -86,6 +86,7 @@ TrialController OnMachine(const BoardControllerMaker& make, const Twin& twin, Ro
       own->measured.q2[0] = s.q2;
       own->measured.w1[0] = s.w1;
       own->measured.w2[0] = s.w2;
+      // A controller that holds its torque counts the steps.
       for (; own->steps * kBoardTimestep <= in.time; ++own->steps) {
         own->controller->Act(own->steps, own->measured, 1, own->torque);
       }

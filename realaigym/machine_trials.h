@@ -20,10 +20,10 @@ namespace upswing {
 inline constexpr double kCompensated = 0.8;
 
 /// A twin's machine with an Estimator, as an episode of a search: friction less its compensation,
-/// and the motors' lag. The estimator predicts beyond the delay.
+/// and the motors' lag. The prediction removes the delay.
 BoardEpisode EpisodeOf(const Twin& machine);
-/// An episode of a machine drawn from the posterior, with two pushes at each joint. The estimator
-/// misses half of the encoders' zeros, and up to 2 ms of delay.
+/// An episode of a machine drawn from the posterior, with two pushes at each joint. Half of each
+/// zero's deviation is left, and up to 2 ms of delay.
 BoardEpisode DrawEpisode(const Twin& twin, Rng& rng);
 
 /// Makes the controller of a trial.

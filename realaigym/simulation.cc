@@ -7,7 +7,6 @@
 #include <numbers>
 
 #include "core/rng.h"
-#include "machine/simulated_machine.h"
 #include "sim/closed_form.h"
 
 namespace upswing {

@@ -11,10 +11,10 @@
 
 namespace upswing {
 
-/// Measurements of a block of simulations: the states with noise and delay.
+/// Measurements of a block of simulations: the states with noise and delay, or estimates.
 struct BoardMeasurement {
   Lanes q1, q2, w1, w2;    // rad, rad/s
-  bool estimated = false;  // whether w1 and w2 are better than differences of the angles
+  bool estimated = false;  // whether w1 and w2 come from a model
 };
 
 /// Controls a block of simulations from their beginnings. Act is called at every step of
