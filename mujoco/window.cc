@@ -43,13 +43,12 @@ struct Window::Impl {
   /// Keeps GLFW initialised as long as there is a window.
   struct Library {
     Library() {
-      const auto& glfw = Glfw();  // its error names libglfw3, whose package brings libgl1
       // MuJoCo looks up OpenGL's functions among the global names.
       if (dlopen("libGL.so.1", RTLD_NOW | RTLD_GLOBAL) == nullptr &&
           dlopen("libEGL.so.1", RTLD_NOW | RTLD_GLOBAL) == nullptr) {
         throw NoWindow("expected the library libGL.so.1, found none (Debian's package libgl1)");
       }
-      if (glfw.Init() == GLFW_FALSE) throw GlfwError();
+      if (Glfw().Init() == GLFW_FALSE) throw GlfwError();
     }
     ~Library() { Glfw().Terminate(); }
   };
