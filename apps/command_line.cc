@@ -326,8 +326,9 @@ int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> 
   program.footer(footer);
   std::vector<std::unique_ptr<CommandLine>> lines;
   const CommandLine* chosen = nullptr;
+  const bool installed = IsInstalled();
   for (const CommandEntry& command : commands) {
-    if (command.declare == nullptr && IsInstalled()) continue;  // only the repository has it
+    if (command.declare == nullptr && installed) continue;  // only the repository has it
     CLI::App* app = program.add_subcommand(command.name, command.help);
     app->formatter(std::make_shared<HelpFormatter>());
     CommandLine& line = *lines.emplace_back(new CommandLine(*app));

@@ -16,6 +16,11 @@
 namespace upswing {
 namespace {
 
+/// Folder of the page and the examples, if this program is installed.
+std::filesystem::path ShareOf(const std::filesystem::path& program) {
+  return program.parent_path().parent_path() / "share/upswing";
+}
+
 Error SystemFailure(std::string_view what) {
   return Failure(Concat("cannot ", what, ": ", std::strerror(errno)));
 }
@@ -102,14 +107,12 @@ std::optional<CommandResult> RunCommand(std::vector<std::string> words, const st
 
 std::filesystem::path ProgramPath() { return std::filesystem::read_symlink("/proc/self/exe"); }
 
-std::filesystem::path SharePath() {
-  return ProgramPath().parent_path().parent_path() / "share/upswing";
-}
+std::filesystem::path SharePath() { return ShareOf(ProgramPath()); }
 
 bool IsInstalled() {
   std::error_code error;
   const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
-  return !error && std::filesystem::is_directory(SharePath(), error);
+  return !error && std::filesystem::is_directory(ShareOf(program), error);
 }
 
 }  // namespace upswing

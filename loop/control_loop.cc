@@ -35,11 +35,7 @@ double LoopController::Act(int64_t cycle, const PendulumState& s, bool estimated
   const int64_t step = cycle * kBoardHz / hz_ / held_ * held_;
   if (step == step_) return torque_[0];
   step_ = step;
-  measured_.q1[0] = s.q1;
-  measured_.q2[0] = s.q2;
-  measured_.w1[0] = s.w1;
-  measured_.w2[0] = s.w2;
-  measured_.estimated = estimated;
+  measured_.SetFirst(s, estimated);
   controller_->Act(static_cast<int>(step), measured_, 1, torque_);
   return torque_[0];
 }
@@ -96,12 +92,9 @@ CycleFacts ControlLoop::FactsOf(double now, const std::optional<LinkReading>& re
 }
 
 Joints ControlLoop::ControllerTorque() {
-  const PendulumState& s = estimator_.ahead();
-  const Joints friction = estimator_.friction();
-  Joints torque{DryFriction(config_.compensation[0] * friction[0], s.w1),
-                DryFriction(config_.compensation[1] * friction[1], s.w2)};
+  Joints torque = estimator_.CompensationTorque(config_.compensation);
   torque[static_cast<size_t>(config_.actuated_joint - 1)] +=
-      controller_.Act(cycle_ - running_cycle_, s, estimator_.has_twin());
+      controller_.Act(cycle_ - running_cycle_, estimator_.ahead(), estimator_.has_twin());
   return torque;
 }
 

@@ -128,6 +128,24 @@ void Estimator::Correct(const Joints& angle) {
   x_.tail<2>() = x_.tail<2>().cwiseMax(0);  // friction never drives
 }
 
+void Estimator::Take(const TimedReading& reading, bool driven) {
+  const double moment = reading.time - model_->age;
+  if (!begun_ || std::abs(moment - time_) > kLongestGap) {
+    Begin(reading.angle, moment);
+    return;
+  }
+  if (moment <= time_) return;
+  const Vector x = x_;
+  const Matrix P = P_;
+  Predict(moment - time_);
+  Correct(reading.angle);
+  if (driven || x_.segment<2>(kVelocity).cwiseAbs().maxCoeff() >= kMoving) return;
+  // Stiction may hold links off their equilibrium, which the model lacks: nothing is learned.
+  x_ = x;
+  P_ = P;
+  Begin(reading.angle, moment);
+}
+
 void Estimator::Update(double time, const Joints& sent, const TimedReading* reading) {
   if (!model_) {
     if (reading == nullptr) return;
@@ -139,28 +157,17 @@ void Estimator::Update(double time, const Joints& sent, const TimedReading* read
   model_->drive.Forget(time - kKept);
   model_->drive.Add(time, sent);
   if (reading != nullptr && std::isfinite(reading->angle[0] + reading->angle[1])) {
-    const double moment = reading->time - model_->age;
-    if (!begun_ || std::abs(moment - time_) > kLongestGap) {
-      Begin(reading->angle, moment);
-    } else if (moment > time_) {
-      const Vector x = x_;
-      const Matrix P = P_;
-      Predict(moment - time_);
-      Correct(reading->angle);
-      // Stiction may hold links off their equilibrium, which the model lacks: nothing is learned.
-      const bool rests =
-          sent == Joints{} && x_.segment<2>(kVelocity).cwiseAbs().maxCoeff() < kMoving;
-      if (rests) {
-        x_ = x;
-        P_ = P;
-        Begin(reading->angle, moment);
-      }
-    }
+    Take(*reading, sent != Joints{});
   }
   if (!begun_) return;
   const Vector now = Follow(x_, time_, std::clamp(time - time_, 0.0, kKept));
   now_ = StateOf(now);
   ahead_ = StateOf(Follow(now, time, period_ + model_->horizon));
+}
+
+Joints Estimator::CompensationTorque(const Joints& share) const {
+  return {DryFriction(share[0] * x_[kFriction], ahead_.w1),
+          DryFriction(share[1] * x_[kFriction + 1], ahead_.w2)};
 }
 
 double Estimator::energy() const {

@@ -44,6 +44,9 @@ class Estimator {
   Joints zero() const { return {x_[kZero], x_[kZero + 1]}; }
   /// The estimated dry friction f in f atan(100 w), N·m; 0 without a twin.
   Joints friction() const { return {x_[kFriction], x_[kFriction + 1]}; }
+  /// The torques (N·m) that compensate a share of each joint's estimated dry friction, when they
+  /// act.
+  Joints CompensationTorque(const Joints& share) const;
   /// Mechanical energy now, 0 hanging at rest and 1 upright at rest; 0 without a twin.
   double energy() const;
 
@@ -61,6 +64,8 @@ class Estimator {
   };
   /// x after `seconds` of the twin's motion from x at `begin` (s).
   Vector Follow(Vector x, double begin, double seconds) const;
+  /// Takes a reading of finite angles. `driven`: whether torques were sent.
+  void Take(const TimedReading& reading, bool driven);
   /// Standard deviation of measured angles, rad.
   double AngleNoise() const;
   /// Begins with measured angles of a moment (s). Zeros and friction stay.

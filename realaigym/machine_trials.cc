@@ -39,7 +39,7 @@ std::function<Joints(double)> HardwarePushes(Rng& rng) {
 struct BoardOnMachine {
   Estimator estimator;
   std::unique_ptr<BoardController> controller;
-  BoardMeasurement measured{{}, {}, {}, {}, true};
+  BoardMeasurement measured{};
   Lanes torque{};  // N·m
   Joints sent{};   // in the last cycle, N·m
   int steps = 0;   // of the controller so far
@@ -81,18 +81,12 @@ TrialController OnMachine(const BoardControllerMaker& make, const Twin& twin, Ro
     return [own, limit, robot](const CycleInput& in) -> Joints {
       const TimedReading reading{{in.angle, {}}, in.time};
       own->estimator.Update(in.time, own->sent, &reading);
-      const PendulumState& s = own->estimator.ahead();
-      own->measured.q1[0] = s.q1;
-      own->measured.q2[0] = s.q2;
-      own->measured.w1[0] = s.w1;
-      own->measured.w2[0] = s.w2;
+      own->measured.SetFirst(own->estimator.ahead(), own->estimator.has_twin());
       // A controller that holds its torque counts the steps.
       for (; own->steps * kBoardTimestep <= in.time; ++own->steps) {
         own->controller->Act(own->steps, own->measured, 1, own->torque);
       }
-      const Joints friction = own->estimator.friction();
-      Joints torque{DryFriction(kCompensated * friction[0], s.w1),
-                    DryFriction(kCompensated * friction[1], s.w2)};
+      Joints torque = own->estimator.CompensationTorque({kCompensated, kCompensated});
       torque[static_cast<size_t>(robot) - 1] += own->torque[0];
       for (size_t j = 0; j < 2; ++j) torque[j] = std::clamp(torque[j], -limit[j], limit[j]);
       return own->sent = torque;

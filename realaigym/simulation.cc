@@ -226,7 +226,7 @@ class Run {
   int steps_;
   ClosedFormBatch block_;
   std::vector<Rng> rngs_;
-  // Simulations with inexact encoders, velocity noise, torque noise, delay and slow response:
+  // Simulations with shifted zeros, velocity noise, torque noise, delay and slow response:
   std::vector<size_t> shifted_, velocity_noise_, torque_noise_, delayed_, responding_;
   std::vector<LanePush> pushes_;
   std::vector<BoardMeasurement> past_;  // ring of the last kMostDelay states

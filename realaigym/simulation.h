@@ -15,6 +15,15 @@ namespace upswing {
 struct BoardMeasurement {
   Lanes q1, q2, w1, w2;    // rad, rad/s
   bool estimated = false;  // whether w1 and w2 come from a model
+
+  /// Sets the first simulation's measurement to an estimated state.
+  void SetFirst(const PendulumState& state, bool from_model) {
+    q1[0] = state.q1;
+    q2[0] = state.q2;
+    w1[0] = state.w1;
+    w2[0] = state.w2;
+    estimated = from_model;
+  }
 };
 
 /// Controls a block of simulations from their beginnings. Act is called at every step of
