@@ -227,6 +227,16 @@ test('the default agent: from an untrained policy to the one of the page, fetche
   await expect(where).toHaveText('on the stage: after 240,000 steps');
   expect(await successes()).toBe(5);
   expect(checkpoints().length).toBe(2);
+  // A step of the keys is a policy.
+  for (const [key, step] of [
+    ['ArrowLeft', '210,016'],
+    ['ArrowLeft', '180,000'],
+    ['ArrowRight', '210,016'],
+    ['ArrowRight', '240,000'],
+  ] as const) {
+    await scrub.press(key);
+    await expect(where).toHaveText(`on the stage: after ${step} steps`);
+  }
 
   await page.getByLabel('show the untrained agent too').check();
   await expect(page.locator('#twin-name')).toHaveText('untrained');
@@ -330,8 +340,11 @@ test('pause, go on, another seed, start over', async ({ stage: page }) => {
   let before = -1;
   const rests = async () => before === (before = await steps());
   await expect.poll(rests, { intervals: [1000] }).toBe(true);
-  await page.getByRole('button', { name: 'Resume training' }).click();
+  // It waits in the tour, too.
+  await page.evaluate(() => (location.hash = '#tour=3'));
+  await page.getByRole('button', { name: 'Resume', exact: true }).click();
   await expect.poll(steps).toBeGreaterThan(before);
+  await page.evaluate(() => (location.hash = '#learn'));
   // Watched from the click on: a moment later it may have more steps again.
   await page.evaluate(
     (before) =>
@@ -473,12 +486,21 @@ test('settings are those of the program, which says what is wrong with them', as
   await page.getByText('Training settings', { exact: true }).click();
   const rate = page.getByLabel('learning rate');
   await expect(rate).toHaveValue('0.002');
-  await rate.fill('-1');
   await page.getByRole('button', { name: 'Learn', exact: true }).click();
-  await expect(status(page)).toHaveText(
-    'Training failed: learning_rate: expected a number in [0, 10], got "-1".',
-  );
-  await page.getByRole('button', { name: 'Reset settings' }).click();
+  await expect(page.locator('#learn-updates')).not.toHaveText('0');
+  // A wrong one is said at its field, and what learns goes on.
+  for (const [name, wrong] of [
+    ['learning rate', '-1'],
+    ['n step', '2.5'],
+    ['gamma', ''],
+  ] as const) {
+    const field = page.getByLabel(name);
+    await field.fill(wrong);
+    await page.getByRole('button', { name: 'Start over' }).click();
+    await expect(field).toBeFocused();
+    await expect(page.locator('#learn-start')).toHaveText('Pause training');
+    await page.getByRole('button', { name: 'Reset settings' }).click();
+  }
   await expect(rate).toHaveValue('0.002');
   await page.getByLabel('layer norm').uncheck();
   await page.getByRole('button', { name: 'Start over' }).click();

@@ -62,6 +62,11 @@ test('a link for others has no agent of your own', async ({ stage: page }) => {
   await expect(page.locator('#message')).toContainText('without your policy');
   const link = new URL(await page.evaluate(() => navigator.clipboard.readText()));
   expect(link.hash).toBe('#mass2=1.2');
+  await slide(page, 'mass2', 1);
+  await page.getByRole('button', { name: 'Copy link' }).click();
+  await expect
+    .poll(() => page.evaluate(() => navigator.clipboard.readText()))
+    .toMatch(/#everything$/);
 });
 
 test('what is kept in the browser and cannot be a policy is left alone', async ({ page }) => {

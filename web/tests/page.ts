@@ -80,6 +80,7 @@ async function setBack(page: Page): Promise<void> {
     }
     delete (upswing.clock as Partial<Clock>).advance; // where a test had stopped it
     upswing.learn.stop();
+    upswing.laboratory = '';
     await upswing.agents.forgetOwn();
     scrollTo({ top: 0, behavior: 'instant' });
   });

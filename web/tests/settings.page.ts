@@ -112,6 +112,39 @@ test('the address holds what was set, and brings it back', async ({ stage: page 
   expect(set).toEqual({ mass2: 1.25, noise: 0.02, speed: 0.5 });
 });
 
+test('what was set is there again after a look at the tour', async ({ stage: page }) => {
+  await open(page, '#agent=fast&gravity=14');
+  await page.getByRole('link', { name: 'Tour' }).click();
+  await expect(page.locator('#step-watch h2')).toBeVisible();
+  await page.getByRole('link', { name: 'Everything' }).first().click();
+  await expect(page.locator('#agent')).toHaveValue('fast');
+  await expect(page.locator('#gravity')).toHaveValue('14');
+});
+
+test('a swipe over a slider scrolls and changes nothing', async ({ browser }) => {
+  const context = await browser.newContext({
+    ...{ hasTouch: true, isMobile: true, viewport: { width: 390, height: 700 } },
+  });
+  const page = await context.newPage();
+  await open(page);
+  const slider = page.locator('#gravity');
+  await slider.scrollIntoViewIfNeeded();
+  const { x, y, width } = (await slider.boundingBox())!;
+  const session = await context.newCDPSession(page);
+  const before = await page.evaluate(() => scrollY);
+  const touch = (type: 'touchStart' | 'touchMove', moved: number) =>
+    session.send('Input.dispatchTouchEvent', {
+      type,
+      touchPoints: [{ x: x + 0.9 * width, y: y + 5 - moved }],
+    });
+  await touch('touchStart', 0);
+  for (let moved = 12; moved < 150; moved += 12) await touch('touchMove', moved);
+  await session.send('Input.dispatchTouchEvent', { type: 'touchEnd', touchPoints: [] });
+  await expect.poll(() => page.evaluate(() => scrollY)).toBeGreaterThan(before + 50);
+  await expect(slider).toHaveValue('9.81');
+  await context.close();
+});
+
 test('an address that is not understood is told, and the rest of it holds', async ({
   stage: page,
 }) => {

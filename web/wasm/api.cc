@@ -376,7 +376,8 @@ UPSWING_EXPORT(learner_poses) int LearnerPoses(Learner* learner) {
   });
 }
 
-/// Leaves the settings of a named agent as JSON: name, value, range, unit and help of each.
+/// Leaves the settings of a named agent as JSON: name, value, range, whether it is a whole number,
+/// unit and help of each.
 UPSWING_EXPORT(agent_settings) int AgentSettings(const char* agent, size_t size) {
   return Guarded([&] {
     const Config config = ConfigOf({{"agent", {agent, size}, "agent"}});
@@ -387,6 +388,7 @@ UPSWING_EXPORT(agent_settings) int AgentSettings(const char* agent, size_t size)
                           {"value", option.plain_text()},
                           {"low", option.range.low},
                           {"high", option.range.high},
+                          {"whole", std::holds_alternative<int64_t*>(option.target)},
                           {"unit", option.unit},
                           {"help", option.help}});
     }

@@ -74,6 +74,15 @@ export class Knobs {
     }
   }
 
+  /// Whether all values can be used; shows the first one that cannot, with the reason.
+  check(): boolean {
+    const wrong = this.inputs.find(({ input }) => !input.checkValidity())?.input;
+    if (!wrong) return true;
+    wrong.closest('details')!.open = true;
+    wrong.reportValidity();
+    return false;
+  }
+
   /// Those that differ from the agent's own.
   get changed(): LearnSettings {
     const values = this.inputs.map(({ input, setting }) => {
@@ -86,7 +95,7 @@ export class Knobs {
   }
 }
 
-function inputOf({ name, value, low, high }: Setting): HTMLInputElement {
+function inputOf({ name, value, low, high, whole }: Setting): HTMLInputElement {
   const input = document.createElement('input');
   input.name = name;
   if (isSwitch(value)) {
@@ -95,7 +104,8 @@ function inputOf({ name, value, low, high }: Setting): HTMLInputElement {
     return input;
   }
   input.type = 'number';
-  input.step = 'any';
+  input.required = true;
+  input.step = whole ? '1' : 'any';
   if (low !== null) input.min = String(low);
   if (high !== null) input.max = String(high);
   input.defaultValue = value;

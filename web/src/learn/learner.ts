@@ -76,6 +76,7 @@ export interface Setting {
   value: string;
   low: number | null; // null: any number, or none
   high: number | null;
+  whole: boolean; // numbers without a fraction only
   unit: string;
   help: string;
 }

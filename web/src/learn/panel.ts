@@ -93,6 +93,14 @@ export class LearnPanel {
       this.scrubber.to(Number(this.scrub.value));
       this.draw();
     });
+    // A step of the keys is a policy.
+    this.scrub.addEventListener('keydown', (event) => {
+      const by = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key];
+      if (by === undefined) return;
+      event.preventDefault();
+      this.scrubber.move(by);
+      this.draw();
+    });
     element('learn-courses').addEventListener('change', (event) => {
       this.choose(this.courses[Number((event.target as HTMLInputElement).value)]!);
     });
@@ -104,8 +112,10 @@ export class LearnPanel {
     new ResizeObserver(() => this.draw()).observe(this.chart.canvas.element);
   }
 
-  /// Starts a training with the chosen seed and settings.
+  /// Starts a training with the chosen seed and settings; if one of these is wrong, says which, and what
+  /// learns goes on.
   start(): void {
+    if (!this.knobs.check()) return;
     for (const session of this.sessions) session.stop();
     const count = this.four.checked ? SEEDS_AT_ONCE : 1;
     const largest = LARGEST_SEED - (count - 1);
@@ -147,12 +157,6 @@ export class LearnPanel {
     this.draw();
   }
 
-  /// Pauses all trainings.
-  pause(): void {
-    for (const session of this.sessions) session.pause();
-    this.draw();
-  }
-
   /// How it goes: a count that runs, and the last milestone.
   get story(): Story {
     const { session } = this;
@@ -165,10 +169,10 @@ export class LearnPanel {
     return { count, milestone: milestone(session) };
   }
 
-  /// Resumes paused trainings.
-  resume(): void {
-    for (const session of this.sessions) session.resume();
-    this.draw();
+  /// Whether all trainings that have not ended are paused.
+  get paused(): boolean {
+    const active = this.sessions.filter((session) => session.active);
+    return active.length > 0 && active.every(({ state }) => state === 'paused');
   }
 
   /// Whether what was learned since the page was opened is the visitor's own policy now.
@@ -218,10 +222,10 @@ export class LearnPanel {
   }
 
   /// Learns, pauses, resumes.
-  private toggle(): void {
+  toggle(): void {
     const active = this.sessions.filter((session) => session.active);
     if (active.length === 0) return this.start();
-    const resume = active.every(({ state }) => state === 'paused');
+    const resume = this.paused;
     for (const session of active) {
       if (resume) session.resume();
       else session.pause();
@@ -356,9 +360,8 @@ export class LearnPanel {
     );
     element('learn-return-of').textContent = course && !session ? 'in a test' : 'of a trial';
     this.strip.show(session?.state === 'finished' ? session : null);
-    const active = this.sessions.filter((one) => one.active);
-    const paused = active.length > 0 && active.every(({ state }) => state === 'paused');
-    const label = active.length === 0 ? 'Learn' : paused ? 'Resume training' : 'Pause training';
+    const active = this.sessions.some((one) => one.active);
+    const label = this.paused ? 'Resume training' : active ? 'Pause training' : 'Learn';
     element('learn-start').textContent = label;
     element<HTMLButtonElement>('learn-again').disabled = this.sessions.length === 0;
     const has = session !== null && session.policy !== null;
@@ -411,9 +414,10 @@ export class LearnPanel {
   }
 }
 
-function fileOf({ agent, seed, newest }: Session, { file, step }: Checkpoint): File | null {
+function fileOf({ agent, seed, newest, state }: Session, { file, step }: Checkpoint): File | null {
   if (!(file instanceof ArrayBuffer)) return null;
-  const earlier = step === newest?.step ? '' : `, ${step.toLocaleString('en')} steps`;
+  const isLast = state === 'finished' && step === newest?.step;
+  const earlier = isLast ? '' : `, ${step.toLocaleString('en')} steps`;
   return new File([file], `learned here, ${agent}, seed ${seed}${earlier}`);
 }
 

@@ -9,7 +9,7 @@ const setting = (
   high: number | null,
 ): Setting => ({
   ...{ name, value, low, high },
-  ...{ unit: '', help: '' },
+  ...{ whole: false, unit: '', help: '' },
 });
 const SETTINGS = [setting('gamma', '0.99', 0, 1), setting('double', 'true', null, null)];
 const decode = (hash: string) => decodeRecipe(hash, ['fast', 'sac-fast'], () => SETTINGS);

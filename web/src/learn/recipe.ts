@@ -49,7 +49,7 @@ const SEED = { name: 'seed', value: '1', low: 0, high: LARGEST_SEED, whole: true
 
 /// Why a value does not fit a setting; empty if it does.
 function problemOf(
-  setting: Pick<Setting, 'name' | 'value' | 'low' | 'high'> & { whole?: boolean },
+  setting: Pick<Setting, 'name' | 'value' | 'low' | 'high' | 'whole'>,
   text: string,
 ): string {
   const { name, value, low, high, whole } = setting;

@@ -96,6 +96,16 @@ export class Scrubber {
     this.restart();
   }
 
+  /// Puts the checkpoint on the stage that is so many further on than the one that is there.
+  move(by: number): void {
+    const checkpoints = this.course?.checkpoints ?? [];
+    const now = this.follows
+      ? checkpoints.length - 1
+      : checkpoints.findIndex(({ file }) => file === this.given);
+    const next = checkpoints[Math.max(now + by, 0)];
+    if (next) this.to(next.step);
+  }
+
   /// At each frame: the next attempt begins when one has ended.
   attempt(): void {
     const { world } = this.stage;

@@ -27,6 +27,7 @@ export class Game {
   private key = ''; // under which that is remembered
   private said = ''; // of the last try
   private bestStates: readonly State[] = [];
+  private highest = -1; // relative height of the tip, in all tries
 
   /// `again` hangs the pendulum.
   constructor(world: World, setSpeed: (speed: number) => void, again: () => void) {
@@ -62,7 +63,10 @@ export class Game {
   /// What to say.
   get answer(): string {
     if (this.up > BALANCED) return 'You balanced it by hand! Few do.';
-    return this.said || (this.states.length > 0 ? 'Push in time with the swing.' : '');
+    if (this.said || this.states.length === 0) return this.said;
+    const percent = Math.round(50 * (1 + this.highest));
+    const so = percent > 1 ? `Highest so far: ${percent}% of the way up. ` : '';
+    return `${so}Push the way it swings, and change when it turns.`;
   }
 
   /// At each control step.
@@ -77,7 +81,9 @@ export class Game {
       this.best = this.longest;
       this.bestStates = this.states;
     }
-    const fallen = relativeHeight(world.plant, state) < FALLEN;
+    const height = relativeHeight(world.plant, state);
+    this.highest = Math.max(this.highest, height);
+    const fallen = height < FALLEN;
     if (this.states.length >= LONGEST || (this.longest > 0 && fallen)) this.next();
   }
 

@@ -16,10 +16,14 @@ export class MotorKeys {
       const held = button(id, () => {});
       held.addEventListener('pointerdown', (event) => {
         held.setPointerCapture(event.pointerId);
+        held.dataset.held = '';
         this.turn(sign);
       });
       for (const end of ['pointerup', 'pointercancel', 'lostpointercapture'] as const) {
-        held.addEventListener(end, () => this.turn(0));
+        held.addEventListener(end, () => {
+          delete held.dataset.held;
+          this.turn(0);
+        });
       }
       held.addEventListener('contextmenu', (event) => event.preventDefault()); // of a long touch
       const isHeld = ({ key: pressed, target }: KeyboardEvent) =>

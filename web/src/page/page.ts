@@ -25,6 +25,7 @@ import { save } from './save';
 import { RANGES, Settings } from './settings';
 import { BEGINNING, decode, disturbanceOf, encode, OWN, problemText } from './share';
 import type { Shared } from './share';
+import { keepOnScroll } from './sliders';
 import { changeTheme, onThemeChange } from './theme';
 import { Tour } from './tour';
 import { Twin } from './twin';
@@ -54,6 +55,7 @@ export class Page {
     (seconds) => this.frame(seconds),
     () => !this.paused,
   );
+  laboratory = ''; // the address of Everything when it was left
   private takes = 0; // of agents and settings; the last one counts
   private paused = false;
   private learning = false; // whether view or step is that of a training
@@ -111,6 +113,11 @@ export class Page {
   /// Starts again with the view and the settings of the address.
   async open(hash = location.hash): Promise<void> {
     const view = viewOf(hash);
+    const { dataset } = document.documentElement;
+    const isOther = dataset.view !== view.name;
+    if (isOther && dataset.view === 'everything' && this.agent) this.laboratory = this.hash();
+    if (isOther) scrollTo(0, 0);
+    const returns = isOther && hash === '#everything';
     showView(view);
     placeCharts();
     this.setPaused(false);
@@ -120,9 +127,10 @@ export class Page {
     const learns = view.name === 'learn';
     const { shared, problems }: { shared: Partial<Shared>; problems: string[] } = learns
       ? { shared: {}, problems: [] }
-      : decode(hash, RANGES, (id) => this.agents.has(id));
+      : decode(returns ? this.laboratory : hash, RANGES, (id) => this.agents.has(id));
     // What was learned stays on the stage.
-    if ((learns || this.tour.number > 0) && this.learn.keeps && !shared.agent) {
+    const isAsked = shared.agent && !returns;
+    if ((learns || this.tour.number > 0) && this.learn.keeps && !isAsked) {
       Object.assign(shared, { agent: OWN, on: !prefersStill() });
     }
     this.tour.leave();
@@ -246,9 +254,10 @@ export class Page {
     button('shove-left', shoveLeft);
     button('shove-right', shoveRight);
     button('plant-reset', () => this.resetSettings());
+    keepOnScroll();
     button('share', () => {
       const own = this.agent?.id === OWN ? ' (without your policy, which stays with you)' : '';
-      void this.address.share(this.hash(true), own);
+      void this.address.share(this.hash(true) || 'everything', own);
     });
     button('save', () => save(this.history));
     button('own-remove', () => void this.forgetOwn());

@@ -19,6 +19,29 @@ export interface SliderSpec {
 
 const clamp = (value: number, [low, high]: Range) => Math.min(Math.max(value, low), high);
 
+/// A swipe that scrolls the page begins as one that moves the slider under it: what it changed until the
+/// browser knew comes back.
+export function keepOnScroll(): void {
+  let before = '';
+  const ofSlider = (use: (input: HTMLInputElement) => void) => (event: PointerEvent) => {
+    const { target } = event;
+    if (target instanceof HTMLInputElement && target.type === 'range') use(target);
+  };
+  addEventListener(
+    'pointerdown',
+    ofSlider(({ value }) => (before = value)),
+    { capture: true },
+  );
+  addEventListener(
+    'pointercancel',
+    ofSlider((input) => {
+      if (input.value === before) return;
+      input.value = before;
+      input.dispatchEvent(new Event('input', { bubbles: true }));
+    }),
+  );
+}
+
 export class Slider {
   readonly element: HTMLElement;
   private readonly input: HTMLInputElement;

@@ -34,8 +34,10 @@ export interface Stage {
   resetMap(): void;
   readonly learn: {
     start(): void;
-    resume(): void;
+    /// Learns, pauses, resumes.
+    toggle(): void;
     show(): void;
+    readonly paused: boolean;
     readonly story: { readonly count: string; readonly milestone: string };
     readonly keeps: boolean;
   };
@@ -127,7 +129,10 @@ function motor(stage: Stage): Step {
 }
 
 function learn(stage: Stage): Step {
-  const start = button('tour-learn', () => stage.learn.start());
+  const start = button('tour-learn', () => {
+    if (stage.learn.paused) stage.learn.toggle();
+    else stage.learn.start();
+  });
   return {
     id: 'learn',
     agents: [NOMINAL_AGENT],
@@ -135,12 +140,11 @@ function learn(stage: Stage): Step {
       const learned = stage.learn.keeps;
       const on = learned && !prefersStill();
       if (!(await stage.begin({ agent: learned ? OWN : NOMINAL_AGENT, on }))) return;
-      stage.learn.resume();
       stage.learn.show();
     },
     answer() {
       const { count, milestone } = stage.learn.story;
-      start.textContent = milestone === '' ? 'Learn' : 'Start over';
+      start.textContent = stage.learn.paused ? 'Resume' : milestone === '' ? 'Learn' : 'Start over';
       write(element('tour-count'), count);
       return milestone;
     },
@@ -273,7 +277,7 @@ function values(stage: Stage): Step {
     },
     answer: (world) =>
       heldFor(world) > HELD
-        ? 'Upright, small torques are best. Drag the pendulum, or shove it with ← and →, and watch the bars.'
+        ? 'Upright, small torques are best. Drag the pendulum and watch the bars.'
         : '',
   };
 }
