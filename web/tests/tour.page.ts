@@ -365,6 +365,40 @@ test('the bars are what it expects, and the highest is taken', async ({ stage: p
   expect(await held(page, 4)).toBeLessThan(4);
 });
 
+test('the answer to the bars moves nothing', async ({ stage: page }) => {
+  await stopAt(page, VALUES);
+  const places = () =>
+    page.evaluate(() =>
+      ['#scene-box', '#q', '#step-values h2', '#tour-next'].map((one) => {
+        const { y, height } = document.querySelector(one)!.getBoundingClientRect();
+        return [y, height];
+      }),
+    );
+  for (const [width, height] of [
+    [320, 640],
+    [390, 844],
+    [844, 390],
+    [1440, 900],
+  ] as const) {
+    await page.setViewportSize({ width, height });
+    await page.evaluate(() => upswing.reset());
+    await expect(answer(page)).toHaveText('');
+    const before = await places();
+    expect(await held(page, 15)).toBeGreaterThan(3);
+    await expect(answer(page)).toContainText('Upright');
+    expect(await places(), `${width} × ${height}`).toEqual(before);
+  }
+});
+
+test('only the step of learning makes room for its chart', async ({ stage: page }) => {
+  await page.setViewportSize({ width: 1440, height: 900 });
+  for (const step of [MOTOR, LEARN, AGENT, VALUES]) {
+    await visit(page, `#tour=${step}`);
+    const height = await page.locator('#learn-figure').evaluate((figure) => figure.clientHeight);
+    expect(height > 0, `step ${step}`).toBe(step === LEARN);
+  }
+});
+
 test('every pose at once: the brightest is upright, and a click starts there', async ({
   stage: page,
 }) => {
@@ -430,6 +464,30 @@ test('the end has three doors, and an invitation', async ({ stage: page }) => {
   );
   await page.getByRole('link', { name: 'Everything at once' }).click();
   await expect(page.locator('#charts')).toBeVisible();
+});
+
+test('a text to copy by hand covers no button, and stays until it is closed', async ({
+  stage: page,
+}) => {
+  await page.setViewportSize({ width: 390, height: 844 });
+  await visit(page, '#tour=99');
+  await page.evaluate(() => {
+    const refuse = () => Promise.reject(new Error('refused'));
+    Object.defineProperty(navigator.clipboard, 'writeText', { value: refuse, configurable: true });
+  });
+  await page.getByRole('button', { name: 'Copy an invitation' }).click();
+  const message = page.locator('#message');
+  await expect(message).toContainText('#tour');
+  const [text, tour] = await Promise.all([
+    message.boundingBox(),
+    page.locator('#tour').boundingBox(),
+  ]);
+  expect(text!.y + text!.height).toBeLessThanOrEqual(tour!.y);
+  await page.waitForTimeout(7000); // a note is gone by then
+  await expect(message).toBeVisible();
+  await page.locator('#message-close').click();
+  await expect(message).toBeHidden();
+  await page.evaluate(() => delete (navigator.clipboard as Partial<Clipboard>).writeText);
 });
 
 test('where motion is not wanted, every step waits for a button', async ({ stage: page }) => {

@@ -1,4 +1,4 @@
-import { note } from './message';
+import { note, showText } from './message';
 
 /// Copies a text and says what is `copied`; shows the text where the browser refuses.
 export async function copy(text: string, copied: string): Promise<void> {
@@ -6,6 +6,6 @@ export async function copy(text: string, copied: string): Promise<void> {
     await navigator.clipboard.writeText(text);
     note(`${copied} is in the clipboard.`);
   } catch {
-    note(`${copied}: ${text}`);
+    showText(`${copied}: ${text}`);
   }
 }

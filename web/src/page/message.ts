@@ -23,6 +23,11 @@ export function note(text: string): void {
   timer = window.setTimeout(hideMessage, 1000 * NOTE_SECONDS);
 }
 
+/// Shows a text that the visitor copies by hand; stays until it is closed.
+export function showText(text: string): void {
+  show(text, 'note');
+}
+
 export function hideMessage(): void {
   clearTimeout(timer);
   element('message').hidden = true;

@@ -13,12 +13,18 @@ export class Tour {
   private readonly dots: HTMLButtonElement[];
   private readonly onStep: () => void;
   private readonly start: HTMLButtonElement; // where motion is not wanted
+  private readonly twin: Scene;
   private now: Step | null = null;
   private frame = 0;
 
   /// `has` says which agents there are; `onStep` hears when another step is shown.
-  constructor(stage: Stage, has: (agent: string) => boolean, onStep: () => void) {
+  constructor(
+    stage: Stage & { readonly twin: { readonly scene: Scene } },
+    has: (agent: string) => boolean,
+    onStep: () => void,
+  ) {
     this.onStep = onStep;
+    this.twin = stage.twin.scene;
     this.steps = makeSteps(stage).filter(({ agents }) => agents.every(has));
     this.dots = this.steps.map((step, i) => {
       const dot = document.createElement('button');
@@ -91,7 +97,7 @@ export class Tour {
 
   /// At each frame.
   follow(world: World, scene: Scene): void {
-    scene.labels = this.now?.labels?.(world) ?? [];
+    scene.labels = this.twin.labels = this.now?.labels?.(world) ?? [];
     const ghost = prefersStill() ? null : this.now?.ghost?.();
     scene.ghosts = ghost ? [ghost.q1, ghost.q2] : [];
     if (this.now && this.frame++ % FRAMES === 0) this.say(this.now.answer?.(world) ?? '');

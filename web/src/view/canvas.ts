@@ -1,11 +1,13 @@
 const NEAR = '100px'; // from the edge of the screen
 
-/// A canvas that is as sharp as the screen, in CSS pixels, with colours from the style sheet.
+/// A canvas that is as sharp as the screen, in CSS pixels, with colours from the style sheet. Where that
+/// sets --zoom, a pixel of the canvas is as many CSS pixels, so that letters and lines grow with it.
 export class Canvas {
   readonly element: HTMLCanvasElement;
   readonly context: CanvasRenderingContext2D;
   width = 0; // CSS pixels
   height = 0;
+  letters = 0; // size of the text around it, in CSS pixels
   private seen = true; // on the screen, or near it
   private colors = new Map<string, string>();
   private family: string | null = null;
@@ -92,9 +94,12 @@ export class Canvas {
   }
 
   private resize(): void {
-    const ratio = Math.min(window.devicePixelRatio || 1, 2);
-    this.width = this.element.clientWidth;
-    this.height = this.element.clientHeight;
+    const style = getComputedStyle(this.element);
+    const zoom = Number(style.getPropertyValue('--zoom')) || 1;
+    this.letters = parseFloat(style.fontSize);
+    const ratio = zoom * Math.min(window.devicePixelRatio || 1, 2);
+    this.width = this.element.clientWidth / zoom;
+    this.height = this.element.clientHeight / zoom;
     const [width, height] = [this.width, this.height].map((side) => Math.round(side * ratio));
     // Setting a size empties a canvas, even if the size is the same.
     if (this.element.width !== width!) this.element.width = width!;

@@ -6,18 +6,41 @@ export interface Label {
   text: string;
 }
 
-/// Writes a label at a place on the canvas, an edge of the background around its letters.
-export function drawLabel(canvas: Canvas, text: string, x: number, y: number): void {
+/// Where a label stands: `gap` pixels from (x, y) in the direction (nx, ny).
+export interface Anchor {
+  x: number;
+  y: number;
+  nx: number;
+  ny: number;
+  gap: number;
+}
+
+/// Writes a label on a ground of its own, so that a link behind it does not cross its letters. It stays
+/// in the box; where it does not fit there, it goes to the other side of its anchor.
+export function drawLabel(
+  canvas: Canvas,
+  text: string,
+  size: number,
+  { x, y, nx, ny, gap }: Anchor,
+  box: { left: number; right: number; top: number },
+): void {
   const { context } = canvas;
-  context.font = canvas.font('600 15px');
-  const width = context.measureText(text).width;
-  const left = Math.min(Math.max(x, 4), canvas.width - width - 12);
-  context.textAlign = 'left';
+  context.font = canvas.font(`600 ${size}px`);
+  const [width, height] = [context.measureText(text).width + size, 1.5 * size];
+  const far = gap + (Math.abs(nx) * width + Math.abs(ny) * height) / 2;
+  const [low, high] = [box.left + width / 2 + 4, box.right - width / 2 - 4];
+  const fits = (at: number) => at >= low && at <= high;
+  const side = fits(x + far * nx) || !fits(x - far * nx) ? far : -far;
+  const middle = Math.max(low, Math.min(x + side * nx, high));
+  const top = Math.max(box.top, y + side * ny - height / 2);
+  context.beginPath();
+  context.roundRect(middle - width / 2, top, width, height, height / 2);
+  context.globalAlpha = 0.88;
+  context.fillStyle = canvas.color('panel');
+  context.fill();
+  context.globalAlpha = 1;
+  context.textAlign = 'center';
   context.textBaseline = 'middle';
-  context.lineJoin = 'round';
-  context.lineWidth = 5;
-  context.strokeStyle = canvas.color('stage');
-  context.strokeText(text, left, y);
   context.fillStyle = canvas.color('ink');
-  context.fillText(text, left, y);
+  context.fillText(text, middle, top + height / 2);
 }

@@ -174,6 +174,7 @@ export function drawRod(
     const below: Place = [0.18 * thickness, 0.3 * thickness];
     for (const more of [0.4, 0.2, 0]) stroke('rgb(0 0 0 / 0.09)', thickness * (1 + more), below);
   }
+  if (forcedColors.matches) stroke(canvas.color('stage'), thickness + 6); // an edge, over the map
   stroke(base, thickness);
   if (!forcedColors.matches) {
     // Lit from above: the side that looks up is bright, whichever way the link turns.

@@ -42,11 +42,13 @@ export class MapChart {
     this.shown = null;
   }
 
-  /// A place on the canvas as shares of both axes, in [0, 1]²; null on the names of the axes.
+  /// A place on the canvas (CSS pixels) as shares of both axes, in [0, 1]²; null on the names of the axes.
   toShares(px: number, py: number): [number, number] | null {
-    const { width, height } = this.canvas;
-    if (px < LEFT || py > height - BOTTOM) return null;
-    return [Math.min((px - LEFT) / (width - LEFT), 1), Math.min(1 - py / (height - BOTTOM), 1)];
+    const { width, height, element } = this.canvas;
+    const zoom = element.clientWidth / width;
+    const [x, y] = [px / zoom, py / zoom];
+    if (x < LEFT || y > height - BOTTOM) return null;
+    return [Math.min((x - LEFT) / (width - LEFT), 1), Math.min(1 - y / (height - BOTTOM), 1)];
   }
 
   /// `low` and `high` are the ends of the colours; `way` is where the pendulum was, oldest first; `mark` is

@@ -49,7 +49,7 @@ export class NeuronChart {
       const share = Math.abs(row.shown[k]!);
       if (share < 0.02) return;
       context.globalAlpha = Math.min(1, share);
-      const color = row.shown[k]! > 0 ? 'torque' : 'link2';
+      const color = row.shown[k]! > 0 ? 'torque' : 'below';
       canvas.rectangle(LEFT + k * width + space / 2, y, width - space, height, color);
     });
     context.globalAlpha = 1;

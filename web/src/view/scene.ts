@@ -4,7 +4,7 @@ import { pointOn } from '../world';
 import type { Moment, World } from '../world';
 import { Canvas } from './canvas';
 import { drawLabel } from './labels';
-import type { Label } from './labels';
+import type { Anchor, Label } from './labels';
 import { drawHousing, drawHub, drawJoint, drawLight, drawRod, drawTrace } from './machine';
 import { Sparks } from './sparks';
 
@@ -33,6 +33,7 @@ export class Scene {
   /// Pixels per metre, and the place of the pivot on the canvas [px].
   private scale = 1;
   private pivot = { x: 0, y: 0 };
+  private box = { left: 0, right: 0, top: 0 }; // that the pendulum stands in, on the canvas [px]
 
   constructor(id: string) {
     this.canvas = new Canvas(id);
@@ -61,6 +62,11 @@ export class Scene {
     this.pivot = {
       x: box.left - canvas.left + box.width / 2,
       y: box.top - canvas.top + box.height / 2,
+    };
+    this.box = {
+      left: box.left - canvas.left,
+      right: box.right - canvas.left,
+      top: box.top - canvas.top,
     };
   }
 
@@ -91,9 +97,9 @@ export class Scene {
     this.drawTorque(world.torque / plant.torque_limit);
     this.drawPush(world, state);
     this.sparks.draw(canvas, ...this.at(elbow), 0.75 * this.scale);
+    const letters = Math.max(canvas.letters, 0.036 * this.scale);
     for (const { at, text } of this.labels) {
-      const [x, y] = this.place(at, elbow, tip);
-      drawLabel(canvas, text, x, y);
+      drawLabel(canvas, text, letters, this.place(at, elbow, tip), this.box);
     }
   }
 
@@ -129,18 +135,20 @@ export class Scene {
   }
 
   /// Where the label of something is written.
-  private place(what: Label['at'], elbow: Vec, tip: Vec): [number, number] {
-    const aside = 0.12 * this.scale;
+  private place(what: Label['at'], elbow: Vec, tip: Vec): Anchor {
     if (what === 'motor') {
       const [x, y] = this.at(PIVOT);
-      return [x + 1.6 * aside, y + 0.2 * aside];
+      return { x, y, nx: 1, ny: 0, gap: Math.max(0.2 * this.scale, 30) };
     }
     if (what === 'goal') {
-      const [x, y] = this.at({ x: 0.3, z: 1 });
-      return [x, Math.max(12, y - 14)];
+      const [x, y] = this.at({ x: 0.6, z: 1 });
+      return { x, y, nx: 0, ny: -1, gap: 2 };
     }
+    // At one side of the link, which it keeps while the link turns.
     const [x, y] = this.at({ x: (elbow.x + tip.x) / 2, z: (elbow.z + tip.z) / 2 });
-    return [x + aside, y];
+    const length = Math.hypot(tip.x - elbow.x, tip.z - elbow.z);
+    const [nx, ny] = [(elbow.z - tip.z) / length, (elbow.x - tip.x) / length];
+    return { x, y, nx, ny, gap: this.thick(10, 0.06) };
   }
 
   /// A link of 1 kg is as thick as its capsule, or more so that a finger finds it; a heavier one thicker.
