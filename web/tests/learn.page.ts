@@ -434,7 +434,7 @@ test('a finger on the line under the chart holds it, and numbers are those of th
   const scrub = page.locator('#learn-scrub');
   await expect(scrub).toBeEnabled();
   const { x, y, width, height } = (await scrub.boundingBox())!;
-  await page.mouse.move(x + 0.9 * width, y + height / 2);
+  await page.mouse.move(x + width - 2, y + height / 2); // at the newest policy
   await page.mouse.down();
   const steps = async () =>
     Number((await page.locator('#learn-steps').innerText()).replaceAll(',', ''));

@@ -446,6 +446,7 @@ function milestone(session: Session): string {
   const { state, episodes, evaluations, settings } = session;
   if (state !== 'starting' && state !== 'learning') return sentence(session);
   const most = evaluations.find(({ success }) => success > 0.5);
+  if (most?.success === 1) return 'It passes all of its tests.';
   if (most) return `It passes most of its tests: ${Math.round(100 * most.success)} of 100.`;
   const first = evaluations.find(({ success }) => success > 0);
   if (first) return `It passes its first tests: ${Math.round(100 * first.success)} of 100.`;

@@ -6,6 +6,6 @@ export async function copy(text: string, copied: string): Promise<void> {
     await navigator.clipboard.writeText(text);
     note(`${copied} is in the clipboard.`);
   } catch {
-    showText(`${copied}: ${text}`);
+    showText(`${copied}, to copy by hand: ${text}`);
   }
 }

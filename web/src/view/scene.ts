@@ -73,10 +73,10 @@ export class Scene {
   /// Draws the pendulum in this state, and the path of its tip over `trail`, oldest first.
   draw(world: Shown, state: State, trail: readonly Moment[]): void {
     const { canvas } = this;
-    if (canvas.width === 0) return; // hidden
     const { plant } = world;
     const reach = plant.length1 + plant.length2;
     this.fit(Math.max(1, reach));
+    if (!(this.scale > 0)) return; // hidden
     canvas.clear();
     drawLight(canvas, this.at(PIVOT), this.scale * reach, this.glow('goal', world));
     this.drawGhosts(plant);
