@@ -215,6 +215,7 @@ class Problem {
     std::vector<double> errors, torque_errors;
     // Windows overlap, so neighbours share rows: the scores of several in a row count as one.
     constexpr size_t kBlock = 6;
+    int blocks = 0;
     VectorXd block = VectorXd::Zero(size());
     for (size_t w = 0; w < shares.size(); ++w) {
       const Share& s = shares[w];
@@ -225,10 +226,14 @@ class Problem {
           (w + 1) % kBlock == 0) {
         meat += block * block.transpose();
         block.setZero();
+        ++blocks;
       }
       errors.push_back(std::sqrt(s.squares));
       if (s.torque_squares > 0) torque_errors.push_back(std::sqrt(s.torque_squares));
     }
+    // The fit makes the scores smaller than those of the true values: MacKinnon and White (1985),
+    // HC1, with blocks as observations.
+    meat *= static_cast<double>(blocks) / std::max(1, blocks - size());
     // A value at the limit of its range is taken as known.
     for (int i = 0; i < size(); ++i) {
       const Value& v = values_[i];

@@ -92,10 +92,11 @@ double ValueOf(const Twin& twin, const std::string& name) {
   return options.Get(name)->number();
 }
 
-/// UPSWING_DRAWS sets the number of machines; the tests of the release take a few.
+/// UPSWING_DRAWS sets the number of machines, and takes four times as many logs. With few logs the
+/// intervals are wide.
 TEST(Fit, FindsTheMachineBehindItsLogs) {
   const char* given = std::getenv("UPSWING_DRAWS");
-  const int draws = given != nullptr ? std::atoi(given) : 2;
+  const int draws = given != nullptr ? std::atoi(given) : 1;
   ThreadPool pool(2);
   std::map<std::string, std::vector<double>> errors;
   std::map<std::string, int> covered;
@@ -103,7 +104,7 @@ TEST(Fit, FindsTheMachineBehindItsLogs) {
     Rng rng(7, "machine", static_cast<uint64_t>(draw));
     const Twin machine = SomeMachine(rng);
     const auto logs =
-        LogsOf(machine, given != nullptr ? 6 : 3, 100 + 10 * static_cast<uint64_t>(draw));
+        LogsOf(machine, given != nullptr ? 12 : 3, 100 + 10 * static_cast<uint64_t>(draw));
     const FitResult fit = Fit(logs, FirstGuess(), kValues, {}, &pool);
     const Manipulator truth = BodyOf(machine), found = BodyOf(fit.twin);
     const auto note = [&](const char* name, double got, double true_value) {
@@ -131,6 +132,7 @@ TEST(Fit, FindsTheMachineBehindItsLogs) {
       const double deviation = std::sqrt(fit.twin.covariance[i * n + i]);
       const double error = ValueOf(fit.twin, name) - ValueOf(machine, name);
       covered[name] += std::abs(error) <= 1.96 * deviation ? 1 : 0;
+      if (name == "center1") EXPECT_LT(deviation, 0.1 * machine.plant.center1);
     }
   }
   double all = 0;
@@ -147,8 +149,7 @@ TEST(Fit, FindsTheMachineBehindItsLogs) {
   }
   const double share = all / (draws * static_cast<double>(covered.size()));
   if (given != nullptr) std::printf("covered %.3f\n", share);
-  // Two machines have only 30 intervals, which depend on each other.
-  EXPECT_GE(share, given != nullptr ? 0.85 : 0.75);
+  EXPECT_GE(share, 0.9);
 }
 
 }  // namespace

@@ -55,8 +55,9 @@ struct Motion {
   std::vector<Joints> acceleration;  // rad/s², current_delay before each row
 };
 
-/// Longest step of the integration (Runge-Kutta of order 4), s.
-inline constexpr double kMotionStep = 0.002;
+/// Longest step of the integration (Runge-Kutta of order 4), s. Dry friction needs short steps: a
+/// fit takes the errors of longer ones for delay.
+inline constexpr double kMotionStep = 0.0005;
 /// Number of equal steps for a time of `seconds`, at least 1.
 int MotionSteps(double seconds);
 
