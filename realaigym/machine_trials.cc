@@ -12,24 +12,28 @@
 namespace upswing {
 namespace {
 
-/// Two Gaussian pulses of torque at each joint, at least a second apart.
-std::function<Joints(double)> HardwarePushes(Rng& rng) {
-  struct Pulse {
-    int joint;
-    double amplitude, time, width;
-  };
-  std::array<Pulse, 4> pulses{};
+/// Two Gaussian pulses of torque at each joint, at least a second apart, the first at joint 1.
+std::array<BoardPush, 4> HardwarePushes(Robot robot, Rng& rng) {
+  std::array<BoardPush, 4> pushes;
+  bool passive = robot == Robot::kAcrobot;
   double time = 0;
-  for (int k = 0; k < 4; ++k) {
+  for (BoardPush& push : pushes) {
     time += 1 + rng.Uniform(0, 1.4);
     const double sign = rng.Uniform() < 0.5 ? -1 : 1;
-    pulses[k] = {k % 2, sign * rng.Uniform(0.2, 0.5), time, rng.Uniform(0.05, 0.1)};
+    push = {sign * rng.Uniform(0.2, 0.5), time, rng.Uniform(0.05, 0.1), passive};
+    passive = !passive;
   }
-  return [pulses](double now) {
+  return pushes;
+}
+
+/// The torques (N·m) of pushes at both joints over time (s).
+std::function<Joints(double)> PushTorques(const std::array<BoardPush, 4>& pushes, Robot robot) {
+  return [pushes, robot](double now) {
+    const size_t motor = static_cast<size_t>(robot) - 1;
     Joints torque{};
-    for (const Pulse& p : pulses) {
+    for (const BoardPush& p : pushes) {
       const double z = (now - p.time) / p.width;
-      torque[p.joint] += p.amplitude * std::exp(-z * z / 2);
+      torque[p.passive ? 1 - motor : motor] += p.amplitude * std::exp(-z * z / 2);
     }
     return torque;
   };
@@ -56,19 +60,14 @@ BoardEpisode EpisodeOf(const Twin& machine) {
   return episode;
 }
 
-BoardEpisode DrawEpisode(const Twin& twin, Rng& rng) {
+BoardEpisode DrawEpisode(const Twin& twin, Robot robot, Rng& rng) {
   const Twin machine = DrawTwin(twin, rng);
   BoardEpisode episode = EpisodeOf(machine);
-  episode.zero = {0.5 * (machine.sensors.zero1 - twin.sensors.zero1),
-                  0.5 * (machine.sensors.zero2 - twin.sensors.zero2)};
+  const double left = rng.Uniform(0, 1.5);
+  episode.zero = {left * (machine.sensors.zero1 - twin.sensors.zero1),
+                  left * (machine.sensors.zero2 - twin.sensors.zero2)};
   episode.delay = static_cast<int>(rng.Below(2));
-  double time = 0;
-  bool passive = rng.Uniform() < 0.5;
-  for (BoardPush& push : episode.pushes) {
-    time += rng.Uniform(0.5, 2.5);
-    push = {rng.Uniform(-0.6, 0.6), time, rng.Uniform(0.05, 0.1), passive};
-    passive = !passive;
-  }
+  episode.pushes = HardwarePushes(robot, rng);
   episode.seed = rng.Next();
   return episode;
 }
@@ -106,7 +105,8 @@ HardwareReport RunTrials(const Twin& twin, Robot robot, const TrialController& m
     run.seconds = kBoardSteps * kBoardTimestep;
     run.actuated_joint = static_cast<int>(robot);
     run.largest_velocity = rules.largest_velocity;
-    if (rules.pushes) run.push = rules.push_of ? rules.push_of(i) : HardwarePushes(rng);
+    if (rules.pushes)
+      run.push = rules.push_of ? rules.push_of(i) : PushTorques(HardwarePushes(robot, rng), robot);
     run.seed = rng.Next();
     const MachineLog log = RunLoop(machine, run, make());
     runs[static_cast<size_t>(i)] = ScoreHardware(std::span(&log, 1), robot).runs.front();

@@ -37,15 +37,25 @@ TEST(MachineEpisodes, HaveTheTwinsLagAndLeftoverFriction) {
   int delays = 0;
   constexpr int kDraws = 2000;
   for (int i = 0; i < kDraws; ++i) {
-    const BoardEpisode drawn = DrawEpisode(twin, rng);
+    const BoardEpisode drawn = DrawEpisode(twin, Robot::kPendubot, rng);
     const double error = drawn.body->f1 - nominal.body->f1;
     squares += error * error / kDraws;
     zeros += drawn.zero[1] * drawn.zero[1] / kDraws;
     delays += drawn.delay;
     EXPECT_LE(drawn.delay, 1);
+    double before = 0;
+    for (size_t k = 0; k < drawn.pushes.size(); ++k) {
+      const BoardPush& push = drawn.pushes[k];
+      EXPECT_EQ(push.passive, k % 2 == 1);
+      EXPECT_NEAR(std::abs(push.amplitude), 0.35, 0.15);
+      EXPECT_NEAR(push.width, 0.075, 0.025);
+      EXPECT_GE(push.time, before + 1);
+      EXPECT_LT(push.time, before + 2.4);
+      before = push.time;
+    }
   }
   EXPECT_NEAR(delays, kDraws / 2, 100);
-  EXPECT_NEAR(std::sqrt(zeros), 0.5 * 0.03, 0.001);
+  EXPECT_NEAR(std::sqrt(zeros), std::sqrt(1.5 * 1.5 / 3) * 0.03, 0.001);
   EXPECT_NEAR(std::sqrt(squares), (1 - kCompensated) * 0.02, 0.0002);
 }
 

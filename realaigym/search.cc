@@ -209,7 +209,7 @@ std::vector<DrawnEpisode> BoardSearch::DrawEpisodes() {
   if (!twin_) return BoardEpisodes(rng_);
   std::vector<DrawnEpisode> drawn{{0, EpisodeOf(*twin_)}};
   while (drawn.size() < kSwingGroup) {
-    drawn.push_back({1.0 / (kSwingGroup - 1), DrawEpisode(*twin_, rng_)});
+    drawn.push_back({1.0 / (kSwingGroup - 1), DrawEpisode(*twin_, net_.robot(), rng_)});
   }
   return drawn;
 }
