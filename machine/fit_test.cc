@@ -92,7 +92,7 @@ double ValueOf(const Twin& twin, const std::string& name) {
   return options.Get(name)->number();
 }
 
-/// UPSWING_DRAWS sets the number of machines, and takes four times as many logs. With few logs the
+/// UPSWING_DRAWS sets the number of machines. With it, each has 12 logs instead of 3, whose
 /// intervals are wide.
 TEST(Fit, FindsTheMachineBehindItsLogs) {
   const char* given = std::getenv("UPSWING_DRAWS");

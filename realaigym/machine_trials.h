@@ -22,8 +22,8 @@ inline constexpr double kCompensated = 0.8;
 /// A twin's machine with an Estimator, as an episode of a search: friction less its compensation,
 /// and the motors' lag. The prediction removes the delay.
 BoardEpisode EpisodeOf(const Twin& machine);
-/// An episode of a machine drawn from the posterior, with the pushes of a trial. A random share of
-/// the zeros' deviations is left, up to 1.5 of them, and up to 2 ms of delay.
+/// An episode of a machine drawn from the posterior, with the pushes of a trial. Leaves 0 to 1.5
+/// times the zeros' deviations (one factor for both), and a delay of 0 or 2 ms.
 BoardEpisode DrawEpisode(const Twin& twin, Robot robot, Rng& rng);
 
 /// Makes the controller of a trial.

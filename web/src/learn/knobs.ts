@@ -1,5 +1,6 @@
 import { core } from '../core';
 import { agentSettings } from './learner';
+import { warn } from '../page/message';
 import type { LearnSettings, Setting } from './learner';
 import { isSwitch } from './recipe';
 
@@ -79,7 +80,8 @@ export class Knobs {
     const wrong = this.inputs.find(({ input }) => !input.checkValidity())?.input;
     if (!wrong) return true;
     wrong.closest('details')!.open = true;
-    wrong.reportValidity();
+    if (wrong.offsetParent) wrong.reportValidity();
+    else warn(`Training settings, ${wrong.name}: ${wrong.validationMessage}`); // in the tour
     return false;
   }
 

@@ -93,10 +93,10 @@ export class LearnPanel {
       this.scrubber.to(Number(this.scrub.value));
       this.draw();
     });
-    // A step of the keys is a policy.
+    // Arrow keys move by one policy.
     this.scrub.addEventListener('keydown', (event) => {
       const by = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key];
-      if (by === undefined) return;
+      if (by === undefined || event.altKey || event.ctrlKey || event.metaKey) return;
       event.preventDefault();
       this.scrubber.move(by);
       this.draw();
@@ -445,8 +445,8 @@ function swinging(steps: number): string {
 function milestone(session: Session): string {
   const { state, episodes, evaluations, settings } = session;
   if (state !== 'starting' && state !== 'learning') return sentence(session);
+  if (evaluations.some(({ success }) => success === 1)) return 'It passes all of its tests.';
   const most = evaluations.find(({ success }) => success > 0.5);
-  if (most?.success === 1) return 'It passes all of its tests.';
   if (most) return `It passes most of its tests: ${Math.round(100 * most.success)} of 100.`;
   const first = evaluations.find(({ success }) => success > 0);
   if (first) return `It passes its first tests: ${Math.round(100 * first.success)} of 100.`;

@@ -23,6 +23,7 @@ export class Scrubber {
   course: Course | null = null;
   follows = true; // the newest
   step = 0; // of the policy on the stage
+  private wanted = 0; // step of the policy that was last to be shown
   checkpoint: Checkpoint | null = null; // that policy, and what is known of it
   private readonly stage: LearnStage;
   private readonly onShown: () => void;
@@ -96,12 +97,12 @@ export class Scrubber {
     this.restart();
   }
 
-  /// Puts the checkpoint on the stage that is so many further on than the one that is there.
+  /// Shows the checkpoint `by` places later; negative: earlier.
   move(by: number): void {
     const checkpoints = this.course?.checkpoints ?? [];
     const now = this.follows
       ? checkpoints.length - 1
-      : checkpoints.findIndex(({ file }) => file === this.given);
+      : checkpoints.findLastIndex(({ step }) => step <= this.wanted);
     const next = checkpoints[Math.max(now + by, 0)];
     if (next) this.to(next.step);
   }
@@ -136,6 +137,7 @@ export class Scrubber {
     const { world } = this.stage;
     const { step, file } = checkpoint;
     this.given = file;
+    this.wanted = step;
     if (file instanceof ArrayBuffer) return this.put(new Policy(file), checkpoint);
     const { policy: before } = world;
     const policy = await policyOf({ step, file });

@@ -43,6 +43,7 @@ export class Game {
   /// When the step begins.
   open(): void {
     this.counts = true;
+    this.highest = -1;
     this.states = [];
     this.up = this.longest = 0;
     this.half.checked = false;
@@ -64,7 +65,7 @@ export class Game {
   get answer(): string {
     if (this.up > BALANCED) return 'You balanced it by hand! Few do.';
     if (this.said || this.states.length === 0) return this.said;
-    const percent = Math.round(50 * (1 + this.highest));
+    const percent = 10 * Math.round(5 * (1 + this.highest));
     const so = percent > 1 ? `Highest so far: ${percent}% of the way up. ` : '';
     return `${so}Push the way it swings, and change when it turns.`;
   }
@@ -82,7 +83,7 @@ export class Game {
       this.bestStates = this.states;
     }
     const height = relativeHeight(world.plant, state);
-    this.highest = Math.max(this.highest, height);
+    if (world.time > this.held) this.highest = Math.max(this.highest, height);
     const fallen = height < FALLEN;
     if (this.states.length >= LONGEST || (this.longest > 0 && fallen)) this.next();
   }

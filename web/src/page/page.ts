@@ -25,7 +25,7 @@ import { save } from './save';
 import { RANGES, Settings } from './settings';
 import { BEGINNING, decode, disturbanceOf, encode, OWN, problemText } from './share';
 import type { Shared } from './share';
-import { keepOnScroll } from './sliders';
+import { restoreOnScroll } from './sliders';
 import { changeTheme, onThemeChange } from './theme';
 import { Tour } from './tour';
 import { Twin } from './twin';
@@ -254,7 +254,7 @@ export class Page {
     button('shove-left', shoveLeft);
     button('shove-right', shoveRight);
     button('plant-reset', () => this.resetSettings());
-    keepOnScroll();
+    restoreOnScroll();
     button('share', () => {
       const own = this.agent?.id === OWN ? ' (without your policy, which stays with you)' : '';
       void this.address.share(this.hash(true) || 'everything', own);

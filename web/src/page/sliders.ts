@@ -19,9 +19,8 @@ export interface SliderSpec {
 
 const clamp = (value: number, [low, high]: Range) => Math.min(Math.max(value, low), high);
 
-/// A swipe that scrolls the page begins as one that moves the slider under it: what it changed until the
-/// browser knew comes back.
-export function keepOnScroll(): void {
+/// Restores a slider when its touch turns into a scroll.
+export function restoreOnScroll(): void {
   let before = '';
   const ofSlider = (use: (input: HTMLInputElement) => void) => (event: PointerEvent) => {
     const { target } = event;

@@ -166,7 +166,7 @@ export class LearningCurve {
     const { canvas } = this;
     canvas.clear();
     if (!curve) {
-      canvas.text('not known of a file of your own', canvas.width / 2, canvas.height / 2, 'center');
+      canvas.text('no learning curve in this file', canvas.width / 2, canvas.height / 2, 'center');
       return;
     }
     const left = 38;
