@@ -31,9 +31,8 @@ std::function<Joints(double)> PushTorques(const std::array<BoardPush, 4>& pushes
   return [pushes, robot](double now) {
     const size_t motor = static_cast<size_t>(robot) - 1;
     Joints torque{};
-    for (const BoardPush& p : pushes) {
-      const double z = (now - p.time) / p.width;
-      torque[p.passive ? 1 - motor : motor] += p.amplitude * std::exp(-z * z / 2);
+    for (const BoardPush& push : pushes) {
+      torque[push.passive ? 1 - motor : motor] += push.Torque(now);
     }
     return torque;
   };
@@ -105,8 +104,9 @@ HardwareReport RunTrials(const Twin& twin, Robot robot, const TrialController& m
     run.seconds = kBoardSteps * kBoardTimestep;
     run.actuated_joint = static_cast<int>(robot);
     run.largest_velocity = rules.largest_velocity;
-    if (rules.pushes)
+    if (rules.pushes) {
       run.push = rules.push_of ? rules.push_of(i) : PushTorques(HardwarePushes(robot, rng), robot);
+    }
     run.seed = rng.Next();
     const MachineLog log = RunLoop(machine, run, make());
     runs[static_cast<size_t>(i)] = ScoreHardware(std::span(&log, 1), robot).runs.front();

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -24,12 +25,17 @@ std::optional<Robot> RobotNamed(std::string_view name);
 /// baselines: minimises ∫ x' Q x + R u² dt, Q diagonal.
 Lqr SolveBoardLqr(Robot robot, const Eigen::Vector4d& Q, double R);
 
-/// A short disturbing torque (N·m), also beyond the motor's limit: amplitude · exp(-(t - time)²/(2
-/// width²)).
+/// A short disturbing torque, also beyond the motor's limit.
 struct BoardPush {
   double amplitude = 0;        // N·m
   double time = 0, width = 0;  // s
   bool passive = false;        // about the joint without the motor
+
+  /// amplitude · exp(-(t - time)²/(2 width²)), N·m.
+  double Torque(double t) const {
+    const double z = (t - time) / width;
+    return amplitude * std::exp(-z * z / 2);
+  }
 };
 
 /// The conditions of a simulation: 10 s from hanging at rest.

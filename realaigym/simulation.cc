@@ -140,12 +140,10 @@ class Run {
     }
     for (const auto& [first, last, lane, push, body] : pushes_) {
       if (step <= first || step > last) continue;
-      const double z = (time - push.time) / push.width;
-      const double torque = push.amplitude * std::exp(-z * z / 2);
       if (push.passive) {
-        Kick(lane, body, torque);
+        Kick(lane, body, push.Torque(time));
       } else {
-        block_.tau[lane] += torque;
+        block_.tau[lane] += push.Torque(time);
       }
     }
   }
