@@ -227,7 +227,7 @@ test('the default agent: from an untrained policy to the one of the page, fetche
   await expect(where).toHaveText('on the stage: after 240,000 steps');
   expect(await successes()).toBe(5);
   expect(checkpoints().length).toBe(2);
-  // A step of the keys is a policy.
+  // Arrow keys move by one policy.
   for (const [key, step] of [
     ['ArrowLeft', '210,016'],
     ['ArrowLeft', '180,000'],

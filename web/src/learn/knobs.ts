@@ -1,6 +1,6 @@
 import { core } from '../core';
-import { agentSettings } from './learner';
 import { warn } from '../page/message';
+import { agentSettings } from './learner';
 import type { LearnSettings, Setting } from './learner';
 import { isSwitch } from './recipe';
 

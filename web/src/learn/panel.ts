@@ -171,8 +171,19 @@ export class LearnPanel {
 
   /// Whether all trainings that have not ended are paused.
   get paused(): boolean {
-    const active = this.sessions.filter((session) => session.active);
+    const { active } = this;
     return active.length > 0 && active.every(({ state }) => state === 'paused');
+  }
+
+  /// Learns, pauses, resumes.
+  toggle(): void {
+    const { active, paused } = this;
+    if (active.length === 0) return this.start();
+    for (const session of active) {
+      if (paused) session.resume();
+      else session.pause();
+    }
+    this.draw();
   }
 
   /// Whether what was learned since the page was opened is the visitor's own policy now.
@@ -221,16 +232,9 @@ export class LearnPanel {
     return course instanceof Session ? course : null;
   }
 
-  /// Learns, pauses, resumes.
-  toggle(): void {
-    const active = this.sessions.filter((session) => session.active);
-    if (active.length === 0) return this.start();
-    const resume = this.paused;
-    for (const session of active) {
-      if (resume) session.resume();
-      else session.pause();
-    }
-    this.draw();
+  /// The trainings that have not ended.
+  private get active(): readonly Session[] {
+    return this.sessions.filter((session) => session.active);
   }
 
   private showRecording(agent: string): void {
@@ -360,8 +364,8 @@ export class LearnPanel {
     );
     element('learn-return-of').textContent = course && !session ? 'in a test' : 'of a trial';
     this.strip.show(session?.state === 'finished' ? session : null);
-    const active = this.sessions.some((one) => one.active);
-    const label = this.paused ? 'Resume training' : active ? 'Pause training' : 'Learn';
+    const running = this.active.length > 0;
+    const label = this.paused ? 'Resume training' : running ? 'Pause training' : 'Learn';
     element('learn-start').textContent = label;
     element<HTMLButtonElement>('learn-again').disabled = this.sessions.length === 0;
     const has = session !== null && session.policy !== null;

@@ -23,12 +23,11 @@ export class Scrubber {
   course: Course | null = null;
   follows = true; // the newest
   step = 0; // of the policy on the stage
-  private wanted = 0; // step of the policy that was last to be shown
   checkpoint: Checkpoint | null = null; // that policy, and what is known of it
   private readonly stage: LearnStage;
   private readonly onShown: () => void;
   private shown: Policy | null = null;
-  private given: Checkpoint['file'] | null = null; // what was last to be shown
+  private given: Checkpoint | null = null; // what was last to be shown
   private replaceable: Policy | null = null; // if that is on the stage, a newer one takes its place
   private untrained: Policy | null = null;
   private withUntrained = false;
@@ -80,7 +79,7 @@ export class Scrubber {
   update(): void {
     const newest = this.course?.newest;
     if (this.untrained === null && this.withUntrained) void this.showUntrained(true);
-    if (!newest || !this.follows || newest.file === this.given) return;
+    if (!newest || !this.follows || newest.file === this.given?.file) return;
     if (this.stage.world.policy === this.replaceable) void this.show(newest);
   }
 
@@ -102,7 +101,7 @@ export class Scrubber {
     const checkpoints = this.course?.checkpoints ?? [];
     const now = this.follows
       ? checkpoints.length - 1
-      : checkpoints.findLastIndex(({ step }) => step <= this.wanted);
+      : checkpoints.findLastIndex(({ step }) => step <= (this.given?.step ?? 0));
     const next = checkpoints[Math.max(now + by, 0)];
     if (next) this.to(next.step);
   }
@@ -136,8 +135,7 @@ export class Scrubber {
     const request = ++this.requests;
     const { world } = this.stage;
     const { step, file } = checkpoint;
-    this.given = file;
-    this.wanted = step;
+    this.given = checkpoint;
     if (file instanceof ArrayBuffer) return this.put(new Policy(file), checkpoint);
     const { policy: before } = world;
     const policy = await policyOf({ step, file });

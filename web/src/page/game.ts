@@ -66,7 +66,7 @@ export class Game {
     if (this.up > BALANCED) return 'You balanced it by hand! Few do.';
     if (this.said || this.states.length === 0) return this.said;
     const percent = 10 * Math.round(5 * (1 + this.highest));
-    const so = percent > 1 ? `Highest so far: ${percent}% of the way up. ` : '';
+    const so = percent > 0 ? `Highest so far: ${percent}% of the way up. ` : '';
     return `${so}Push the way it swings, and change when it turns.`;
   }
 

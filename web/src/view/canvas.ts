@@ -5,7 +5,8 @@ const NEAR = '100px'; // from the edge of the screen
 export class Canvas {
   readonly element: HTMLCanvasElement;
   readonly context: CanvasRenderingContext2D;
-  width = 0; // CSS pixels
+  zoom = 1; // CSS pixels of a pixel
+  width = 0; // pixels
   height = 0;
   letters = 0; // size of the text around it, in CSS pixels
   private seen = true; // on the screen, or near it
@@ -95,11 +96,11 @@ export class Canvas {
 
   private resize(): void {
     const style = getComputedStyle(this.element);
-    const zoom = Number(style.getPropertyValue('--zoom')) || 1;
+    this.zoom = Number(style.getPropertyValue('--zoom')) || 1;
     this.letters = parseFloat(style.fontSize);
-    const ratio = zoom * Math.min(window.devicePixelRatio || 1, 2);
-    this.width = this.element.clientWidth / zoom;
-    this.height = this.element.clientHeight / zoom;
+    const ratio = this.zoom * Math.min(window.devicePixelRatio || 1, 2);
+    this.width = this.element.clientWidth / this.zoom;
+    this.height = this.element.clientHeight / this.zoom;
     const [width, height] = [this.width, this.height].map((side) => Math.round(side * ratio));
     // Setting a size empties a canvas, even if the size is the same.
     if (this.element.width !== width!) this.element.width = width!;

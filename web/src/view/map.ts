@@ -44,8 +44,7 @@ export class MapChart {
 
   /// A place on the canvas (CSS pixels) as shares of both axes, in [0, 1]²; null on the names of the axes.
   toShares(px: number, py: number): [number, number] | null {
-    const { width, height, element } = this.canvas;
-    const zoom = element.clientWidth / width;
+    const { width, height, zoom } = this.canvas;
     const [x, y] = [px / zoom, py / zoom];
     if (x < LEFT || y > height - BOTTOM) return null;
     return [Math.min((x - LEFT) / (width - LEFT), 1), Math.min(1 - y / (height - BOTTOM), 1)];

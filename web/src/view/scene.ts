@@ -144,7 +144,7 @@ export class Scene {
       const [x, y] = this.at({ x: 0.6, z: 1 });
       return { x, y, nx: 0, ny: -1, gap: 2 };
     }
-    // At one side of the link, which it keeps while the link turns.
+    // At a side of the link that turns with it.
     const [x, y] = this.at({ x: (elbow.x + tip.x) / 2, z: (elbow.z + tip.z) / 2 });
     const length = Math.hypot(tip.x - elbow.x, tip.z - elbow.z);
     const [nx, ny] = [(elbow.z - tip.z) / length, (elbow.x - tip.x) / length];
