@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <functional>
+#include <optional>
 #include <span>
 #include <tuple>
 #include <utility>
@@ -84,12 +85,12 @@ void PrintReport(const BoardReport& report) {
   }
 }
 
-Competitor Search(const RealAiGymArguments& a, ThreadPool& pool) {
+Competitor Search(const RealAiGymArguments& a, const std::optional<Twin>& twin, ThreadPool& pool) {
   BoardSearchConfig config;
   SetFlags(OptionsOf(config), a.search);
   BoardSearch search =
       a.from.empty() ? BoardSearch(config) : BoardSearch(config, LoadSwingPolicy(a.from));
-  if (!a.twin.empty()) search.SearchOn(ReadTwin(a.twin, "--twin"));
+  if (twin) search.SearchOn(*twin);
   InstallSignalHandlers("\nwriting the best policy so far\n");
   const auto begin = std::chrono::steady_clock::now();
   BoardSearch::Report report;
@@ -220,8 +221,8 @@ int ScoreLogs(const RealAiGymArguments& a) {
 }
 
 /// Scores a competitor on machines drawn from a twin's posterior.
-int ScoreOnTwin(const RealAiGymArguments& a, const Competitor& competitor, ThreadPool& pool) {
-  const Twin twin = ReadTwin(a.twin, "--twin");
+int ScoreOnTwin(const RealAiGymArguments& a, const Twin& twin, const Competitor& competitor,
+                ThreadPool& pool) {
   const TrialRules rules{.count = static_cast<int>(a.draws),
                          .pushes = !a.no_pushes,
                          .seed = static_cast<uint64_t>(a.case_seed)};
@@ -298,9 +299,13 @@ int RunRealAiGym(const RealAiGymArguments& a) {
   }
   if (!a.figure.empty()) CheckCanDraw();
   ThreadPool pool(ResolveThreads(a.threads));
-  const Competitor competitor = searches ? Search(a, pool) : GetCompetitor(a.policy, robot);
+  std::optional<Twin> twin;
+  if (!a.twin.empty()) twin = ReadTwin(a.twin, "--twin");
+  const Competitor competitor = searches ? Search(a, twin, pool)
+                                : twin   ? GetCompetitor(a.policy, robot, *twin, kCompensated)
+                                         : GetCompetitor(a.policy, robot);
   if (StopSignal() != 0) return 128 + StopSignal();
-  if (!a.twin.empty()) return ScoreOnTwin(a, competitor, pool);
+  if (twin) return ScoreOnTwin(a, *twin, competitor, pool);
   BoardReport report;
   {
     EpisodeProgress progress(a.as_json);
@@ -363,7 +368,9 @@ void AddRealAiGym(CommandLine& line) {
       "pushes; each score is the share of simulations that end upright. A policy with a\n"
       "longer control period keeps its period. These results are simulated.\n\n"
       "--hardware scores logs of the real robot. The joint with more torque has the motor,\n"
-      "unless --robot names the robot. A log with tau_pert belongs to the board with pushes.\n\n"
+      "unless --robot names the robot. A log with tau_pert belongs to the board with pushes.\n"
+      "With --twin a controller is designed for the twin, less the friction that the motors\n"
+      "compensate, unless --made-for gives another plant.\n\n"
       "Examples:\n"
       "  ./upswing realaigym --search pendubot.safetensors         takes some minutes\n"
       "  ./upswing realaigym pendubot.safetensors --figure rows.svg\n"
@@ -372,7 +379,8 @@ void AddRealAiGym(CommandLine& line) {
       "  ./upswing realaigym pendubot.safetensors --csv sim_swingup.csv --json\n"
       "  ./upswing realaigym baseline-lqr              the regulator of the baselines\n"
       "  ./upswing realaigym --hardware run01.csv run02.csv.gz --json\n"
-      "  ./upswing realaigym pendubot.safetensors --twin realaigym-twin\n");
+      "  ./upswing realaigym pendubot.safetensors --twin realaigym-twin\n"
+      "  ./upswing realaigym mpc --mpc-seconds 0.3 --twin realaigym-twin\n");
 }
 
 }  // namespace upswing

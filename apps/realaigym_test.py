@@ -120,6 +120,18 @@ class RealAIGym(ProgramTest):
         self.assertEqual({row["tau_con1"] for row in rows}, {"0"})
         self.refuse(["realaigym", "p.safetensors", "--robot", "pendubot"], "--robot", "acrobot")
 
+    def test_controllers_are_designed_for_the_twin(self):
+        def trials(*arguments):
+            return json.loads(self.succeed(
+                "realaigym", "mpc", "--mpc-seconds", 0.3, "--lqr-q1", 100, "--lqr-q2", 100,
+                "--lqr-torque", 0.3, "--twin", "realaigym-twin", "--json", *arguments))
+
+        self.assertGreaterEqual(trials("--draws", 20)["successes"], 18)
+        # Another plant is another design.
+        few = ("--draws", 2)
+        own, other = trials(*few), trials(*few, "--made-for", "realaigym")
+        self.assertNotEqual(own["mean_score"], other["mean_score"])
+
     def test_runs_on_hardware(self):
         # A simulated motion in the format of a log, once without and once with pushes.
         text = self.succeed("realaigym", SWING_UP, "--csv", "-")

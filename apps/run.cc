@@ -13,7 +13,6 @@
 #include "core/text.h"
 #include "io/streams.h"
 #include "loop/control_loop.h"
-#include "setup/controllers.h"
 
 namespace upswing {
 namespace {
@@ -30,29 +29,6 @@ struct RunArguments {
 
 constexpr std::string_view kBraking =
     "\nbraking; once more ends at once, and the machine's watchdog switches the motors off\n";
-
-/// The policy as named. A controller without --made-for is designed for the twin.
-Competitor CompetitorFor(const RunArguments& a, const std::optional<Twin>& twin) {
-  if (!twin || !IsController(a.policy.name) || !a.policy.made_for.empty()) {
-    return GetCompetitor(a.policy, a.robot);
-  }
-  const auto loaded = std::make_shared<LoadedPolicy>(GetPolicy(a.policy));
-  if (!loaded->design_for || loaded->task != kDoublePendulum)
-    return GetCompetitor(a.policy, a.robot);
-  loaded->plant = twin->plant;
-  if (!a.robot.empty()) loaded->plant.actuated_joint = static_cast<int>(*RobotNamed(a.robot));
-  try {
-    loaded->policy = loaded->design_for(loaded->plant);
-  } catch (const Error&) {
-    // With much dry friction some designs find no solution.
-    loaded->plant.coulomb1 = loaded->plant.coulomb2 = 0;
-    loaded->policy = loaded->design_for(loaded->plant);
-    fmt::print("  design   without the twin's dry friction\n");
-  }
-  const auto robot = static_cast<Robot>(static_cast<int>(loaded->plant.actuated_joint));
-  return {loaded->name, robot, [loaded](size_t) { return ControllerOf(*loaded, kBoardBlock); },
-          PlantText(loaded->plant)};
-}
 
 /// Throws BadInput if a serial line is too slow for a frame per cycle in each direction.
 void CheckBaud(const LinkAddress& link, int64_t hz) {
@@ -113,9 +89,7 @@ int Drive(const RunArguments& a, const Competitor& competitor, const std::option
   Supervisor supervisor(a.limits, start, motor, sensors.angle_range, sensors.quantum);
 
   LoopConfig config{.hz = hz, .seconds = a.seconds, .actuated_joint = joint};
-  if (a.compensation > 0) {
-    config.compensation[static_cast<size_t>(2 - joint)] = a.compensation;
-  }
+  config.compensation = {a.compensation, a.compensation};
   config.stop = [] { return StopSignal() != 0; };
 
   LogWriter log(a.log);
@@ -158,7 +132,9 @@ int RunRun(const RunArguments& a) {
   }
   if (!twin && a.compensation > 0)
     throw BadInput("--compensation: expected --twin with it, got none");
-  return Drive(a, CompetitorFor(a, twin), twin, address);
+  const Competitor competitor = twin ? GetCompetitor(a.policy, a.robot, *twin, a.compensation)
+                                     : GetCompetitor(a.policy, a.robot);
+  return Drive(a, competitor, twin, address);
 }
 
 }  // namespace
@@ -186,7 +162,7 @@ void AddRun(CommandLine& line) {
   own.Add(&a.passive_torque, "passive_torque", {0, 1000}, "N·m",
           "largest torque of the joint without the controller's motor");
   own.Add(&a.compensation, "compensation", kUnit, "",
-          "share of that joint's estimated dry friction that its motor compensates; needs a twin");
+          "share of both joints' estimated dry friction that the motors compensate; needs a twin");
   own.Add(&a.sensors.velocity_share, "velocity_share", {0.001, 1}, "",
           "without a twin: share of the newest difference in the low-passed velocities");
   own.Add(&a.sensors.velocity_dead_zone, "velocity_dead_zone", {0, 100}, "rad/s",
@@ -204,10 +180,11 @@ void AddRun(CommandLine& line) {
       "the links hang. A fault switches the motors off at once: no reading for --max-age,\n"
       "a reading that is no number, an encoder that sticks or saturates.\n"
       "Exit code: 0, or 1 with the reason in a line after a fault or beyond a limit.\n\n"
-      "A controller is designed for the twin unless --made-for gives another plant.\n"
+      "A controller is designed for the twin, less the friction that the motors compensate,\n"
+      "unless --made-for gives another plant.\n"
       "Read docs/howto/real-machine.md before you switch on motors.\n\n"
       "Examples:\n"
-      "  ./upswing run mpc --link twin.toml --log rehearsal.csv\n"
+      "  ./upswing run mpc --link twin.toml --compensation 0.8 --log rehearsal.csv\n"
       "  ./upswing fake twin.toml --link udp:4000        in another terminal\n"
       "  ./upswing run runs/d3qn-seed1 --link udp:127.0.0.1:4000 --twin twin.toml\n"
       "  ./upswing run runs/d3qn-seed1 --link serial:/dev/ttyACM0:921600 --twin twin.toml \\\n"

@@ -60,6 +60,16 @@ class Run(ProgramTest):
         self.assertEqual({row["tau_con1"] for row in rows if row["state"] < 2}, {0})
         self.assertLessEqual(max(abs(row["tau_con1"]) for row in rows), 5)
 
+    def test_compensation_of_dry_friction(self):
+        # The policy was searched for a machine that compensates most of its dry friction.
+        def upright(compensation):
+            policy = ROOT / "docs/figures/realaigym-pendubot-twin.safetensors"
+            return "s upright\n" in self.succeed("run", policy, "--link", "realaigym-twin",
+                                                 "--compensation", compensation)
+
+        self.assertTrue(upright(0.8))
+        self.assertFalse(upright(0))
+
     def test_limits(self):
         done = self.run_here("run", "mpc", "--link", TWIN, "--max-velocity", 2)
         self.assert_one_line(done, 1, "velocity", "beyond the limit 2 rad/s")

@@ -123,6 +123,20 @@ Competitor OfSearch(const std::string& name, SwingPolicy policy) {
   return {name, kept->net.robot(), [kept](size_t) { return kept->net.Control(kept->numbers); }};
 }
 
+/// A policy of the double pendulum, as a competitor. Throws BadInput for the other robot.
+Competitor OfPolicy(const std::shared_ptr<const LoadedPolicy>& loaded, const std::string& robot) {
+  if (!HasPlant(loaded->task)) {
+    throw BadInput(Concat(Printable(loaded->name),
+                          ": expected a policy of the double pendulum, got "
+                          "one of ",
+                          loaded->task));
+  }
+  const auto own = static_cast<Robot>(static_cast<int>(loaded->plant.actuated_joint));
+  ExpectRobot(loaded->name, own, ParseRobot(robot, own));
+  return {loaded->name, own, [loaded](size_t) { return ControllerOf(*loaded, kBoardBlock); },
+          DesignText(loaded->plant)};
+}
+
 }  // namespace
 
 SwingPolicy LoadSwingPolicy(const fs::path& path) {
@@ -155,17 +169,29 @@ Competitor GetCompetitor(const PolicyArguments& a, const std::string& robot) {
       return found;
     }
   }
-  const auto loaded = std::make_shared<const LoadedPolicy>(GetPolicy(a));
-  if (!HasPlant(loaded->task)) {
-    throw BadInput(Concat(Printable(loaded->name),
-                          ": expected a policy of the double pendulum, got "
-                          "one of ",
-                          loaded->task));
+  return OfPolicy(std::make_shared<const LoadedPolicy>(GetPolicy(a)), robot);
+}
+
+Competitor GetCompetitor(const PolicyArguments& a, const std::string& robot, const Twin& twin,
+                         double compensation) {
+  if (!IsController(a.name) || !a.made_for.empty()) return GetCompetitor(a, robot);
+  const auto loaded = std::make_shared<LoadedPolicy>(GetPolicy(a));
+  if (!loaded->design_for || !HasPlant(loaded->task)) return OfPolicy(loaded, robot);
+  Plant& plant = loaded->plant = twin.plant;
+  const auto usual = static_cast<Robot>(static_cast<int>(plant.actuated_joint));
+  plant.actuated_joint = static_cast<int>(ParseRobot(robot, usual));
+  plant.coulomb1 *= 1 - compensation;
+  plant.coulomb2 *= 1 - compensation;
+  try {
+    loaded->policy = loaded->design_for(plant);
+  } catch (const Error&) {
+    // With much dry friction some designs find no solution.
+    plant.coulomb1 = plant.coulomb2 = 0;
+    loaded->policy = loaded->design_for(plant);
   }
-  const auto own = static_cast<Robot>(static_cast<int>(loaded->plant.actuated_joint));
-  ExpectRobot(loaded->name, own, ParseRobot(robot, own));
-  return {loaded->name, own, [loaded](size_t) { return ControllerOf(*loaded, kBoardBlock); },
-          DesignText(loaded->plant)};
+  Competitor found = OfPolicy(loaded, robot);
+  found.plant = PlantText(plant);
+  return found;
 }
 
 std::vector<BoardEntry> PublishedEntries(Robot robot) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/progress.h"
+#include "machine/twin.h"
 #include "realaigym/search.h"
 #include "run/find_policy.h"
 #include "setup/loaded_policy.h"
@@ -32,6 +33,11 @@ inline constexpr const char* kBoardRegulator = "baseline-lqr";
 /// The competitor that the arguments name, for this robot ("": the policy's own robot). Throws
 /// BadInput.
 Competitor GetCompetitor(const PolicyArguments& a, const std::string& robot);
+/// The same for a twin's machine whose motors compensate a share of the dry friction. A controller
+/// without --made-for is designed for the twin with the friction that is left or, if there is no
+/// such design, without dry friction.
+Competitor GetCompetitor(const PolicyArguments& a, const std::string& robot, const Twin& twin,
+                         double compensation);
 
 /// Loads a policy that a search wrote. Throws BadInput.
 SwingPolicy LoadSwingPolicy(const std::filesystem::path& path);
