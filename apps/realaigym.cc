@@ -301,9 +301,9 @@ int RunRealAiGym(const RealAiGymArguments& a) {
   ThreadPool pool(ResolveThreads(a.threads));
   std::optional<Twin> twin;
   if (!a.twin.empty()) twin = ReadTwin(a.twin, "--twin");
-  const Competitor competitor = searches ? Search(a, twin, pool)
-                                : twin   ? GetCompetitor(a.policy, robot, *twin, kCompensated)
-                                         : GetCompetitor(a.policy, robot);
+  PolicyArguments policy = a.policy;
+  if (twin) policy.plant = DesignPlant(*twin, robot);
+  const Competitor competitor = searches ? Search(a, twin, pool) : GetCompetitor(policy, robot);
   if (StopSignal() != 0) return 128 + StopSignal();
   if (twin) return ScoreOnTwin(a, *twin, competitor, pool);
   BoardReport report;
@@ -369,8 +369,8 @@ void AddRealAiGym(CommandLine& line) {
       "longer control period keeps its period. These results are simulated.\n\n"
       "--hardware scores logs of the real robot. The joint with more torque has the motor,\n"
       "unless --robot names the robot. A log with tau_pert belongs to the board with pushes.\n"
-      "With --twin a controller is designed for the twin, less the friction that the motors\n"
-      "compensate, unless --made-for gives another plant.\n\n"
+      "\n--twin designs a controller for the twin without dry friction; --made-for changes this\n"
+      "plant. The motors compensate 80% of the estimated dry friction.\n\n"
       "Examples:\n"
       "  ./upswing realaigym --search pendubot.safetensors         takes some minutes\n"
       "  ./upswing realaigym pendubot.safetensors --figure rows.svg\n"
@@ -380,7 +380,7 @@ void AddRealAiGym(CommandLine& line) {
       "  ./upswing realaigym baseline-lqr              the regulator of the baselines\n"
       "  ./upswing realaigym --hardware run01.csv run02.csv.gz --json\n"
       "  ./upswing realaigym pendubot.safetensors --twin realaigym-twin\n"
-      "  ./upswing realaigym mpc --mpc-seconds 0.3 --twin realaigym-twin\n");
+      "  ./upswing realaigym tvlqr --lqr-q1 100 --lqr-q2 100 --twin realaigym-twin\n");
 }
 
 }  // namespace upswing

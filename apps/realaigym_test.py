@@ -127,10 +127,12 @@ class RealAIGym(ProgramTest):
                 "--lqr-torque", 0.3, "--twin", "realaigym-twin", "--json", *arguments))
 
         self.assertGreaterEqual(trials("--draws", 20)["successes"], 18)
-        # Another plant is another design.
+        # --made-for changes the twin's plant: with its own values nothing changes.
         few = ("--draws", 2)
-        own, other = trials(*few), trials(*few, "--made-for", "realaigym")
-        self.assertNotEqual(own["mean_score"], other["mean_score"])
+        own = trials(*few)["mean_score"]
+        self.assertEqual(own, trials(*few, "--made-for", "coulomb1=0")["mean_score"])
+        self.assertNotEqual(own, trials(*few, "--made-for", "mass2=0.7")["mean_score"])
+        self.assertNotEqual(own, trials(*few, "--robot", "acrobot")["mean_score"])
 
     def test_runs_on_hardware(self):
         # A simulated motion in the format of a log, once without and once with pushes.

@@ -132,9 +132,11 @@ int RunRun(const RunArguments& a) {
   }
   if (!twin && a.compensation > 0)
     throw BadInput("--compensation: expected --twin with it, got none");
-  const Competitor competitor = twin ? GetCompetitor(a.policy, a.robot, *twin, a.compensation)
-                                     : GetCompetitor(a.policy, a.robot);
-  return Drive(a, competitor, twin, address);
+  if (a.differences && a.compensation > 0)
+    throw BadInput("--compensation: expected no --differences with it, which estimate no friction");
+  PolicyArguments policy = a.policy;
+  if (twin) policy.plant = DesignPlant(*twin, a.robot);
+  return Drive(a, GetCompetitor(policy, a.robot), twin, address);
 }
 
 }  // namespace
@@ -180,11 +182,11 @@ void AddRun(CommandLine& line) {
       "the links hang. A fault switches the motors off at once: no reading for --max-age,\n"
       "a reading that is no number, an encoder that sticks or saturates.\n"
       "Exit code: 0, or 1 with the reason in a line after a fault or beyond a limit.\n\n"
-      "A controller is designed for the twin, less the friction that the motors compensate,\n"
-      "unless --made-for gives another plant.\n"
+      "A controller is designed for the twin without dry friction. --made-for changes this\n"
+      "plant. Policies of `realaigym --search --twin` need --compensation 0.8.\n"
       "Read docs/howto/real-machine.md before you switch on motors.\n\n"
       "Examples:\n"
-      "  ./upswing run mpc --link twin.toml --compensation 0.8 --log rehearsal.csv\n"
+      "  ./upswing run tvlqr --link twin.toml --compensation 0.8 --log rehearsal.csv\n"
       "  ./upswing fake twin.toml --link udp:4000        in another terminal\n"
       "  ./upswing run runs/d3qn-seed1 --link udp:127.0.0.1:4000 --twin twin.toml\n"
       "  ./upswing run runs/d3qn-seed1 --link serial:/dev/ttyACM0:921600 --twin twin.toml \\\n"

@@ -43,7 +43,7 @@ class Fake:
 
 class Run(ProgramTest):
     def test_a_rehearsal_on_the_twin(self):
-        arguments = ["run", "mpc", "--link", TWIN, "--seconds", 5]
+        arguments = ["run", "mpc", "--link", TWIN, "--compensation", 0.8, "--seconds", 5]
         out = self.succeed(*arguments, "--log", "a.csv")
         self.assertRegex(out, r"^mpc on \S+twin.toml, 500 Hz, pendubot\n  ran      5.00 s, "
                               r"the last [1-4]\.\d\d s upright\n")
@@ -175,6 +175,8 @@ class Run(ProgramTest):
                 (["run", "lqr", "--link", "twin.toml", "--robot", "arm"], ["pendubot", "arm"]),
                 (["run", "baseline-lqr", "--link", "twin.toml", "--hz", "400"], ["500 or 1000"]),
                 (["run", "lqr", "--link", "udp:127.0.0.1:9", "--compensation", "1"], ["--twin"]),
+                (["run", "lqr", "--link", TWIN, "--compensation", "1", "--differences"],
+                 ["--compensation", "--differences"]),
                 (["fake"], ["a twin"]),
                 (["fake", "twin.toml"], ["--link"]),
                 (["fake", "twin.toml", "--link", "serial:x"], ["udp:PORT"]),

@@ -70,8 +70,11 @@ TEST(ControlLoop, ACycleAllocatesNoMemory) {
   const TempFolder folder;
   const LoadedPolicy lqr = GetPolicy({"lqr", {}, {}}), network = TinyNetwork();
   const auto made_of = [](const LoadedPolicy& policy) {
-    return Competitor{policy.name, Robot::kPendubot,
-                      [&](size_t) { return ControllerOf(policy, kBoardBlock); }, "plant"};
+    return Competitor{policy.name,
+                      Robot::kPendubot,
+                      [&](size_t) { return ControllerOf(policy, kBoardBlock); },
+                      {},
+                      kPolicyPeriod};
   };
   const std::filesystem::path figures =
       std::filesystem::path(__FILE__).parent_path().parent_path() / "docs/figures";

@@ -17,10 +17,7 @@ static_assert(kBoardTimestep * kBoardHz == 1);
 }  // namespace
 
 LoopController::LoopController(const Competitor& competitor, int64_t hz)
-    : hz_(hz),
-      // A board's own controller acts at every step, a policy every 20 ms.
-      held_(competitor.plant.empty() ? 1 : std::lround(kControlPeriod * kBoardHz)),
-      controller_(competitor.make(0)) {
+    : hz_(hz), held_(competitor.period), controller_(competitor.make(0)) {
   // The first call touches memory that is not there yet; a second controller takes it.
   competitor.make(0)->Act(0, measured_, 1, torque_);
   torque_ = {};

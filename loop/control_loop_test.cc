@@ -213,8 +213,11 @@ TEST(ControlLoop, CompensatesTheFrictionOfTheOtherJoint) {
 TEST(LoopController, KeepsThePeriodOfAPolicy) {
   LoadedPolicy lqr = GetPolicy({"lqr", {}, {}});
   for (const int64_t hz : {100, 250, 400, 500, 1000}) {
-    const Competitor competitor{"lqr", Robot::kPendubot,
-                                [&](size_t) { return ControllerOf(lqr, kBoardBlock); }, "plant"};
+    const Competitor competitor{"lqr",
+                                Robot::kPendubot,
+                                [&](size_t) { return ControllerOf(lqr, kBoardBlock); },
+                                {},
+                                kPolicyPeriod};
     LoopController controller(competitor, hz);
     const int64_t held = hz / 50;  // cycles in 20 ms
     double last = 0;
@@ -226,16 +229,19 @@ TEST(LoopController, KeepsThePeriodOfAPolicy) {
     }
   }
   // After missed cycles it acts once, and then at its own times again.
-  LoopController late(
-      {"lqr", Robot::kPendubot, [&](size_t) { return ControllerOf(lqr, kBoardBlock); }, "plant"},
-      500);
+  LoopController late({"lqr",
+                       Robot::kPendubot,
+                       [&](size_t) { return ControllerOf(lqr, kBoardBlock); },
+                       {},
+                       kPolicyPeriod},
+                      500);
   const double first = late.Act(0, {3.1, 0, 0, 0}, true),
                second = late.Act(47, {3.2, 0, 0, 0}, true);
   EXPECT_NE(first, second);
   EXPECT_EQ(late.Act(49, {3.1, 0, 0, 0}, true), second);
   EXPECT_EQ(late.Act(50, {3.1, 0, 0, 0}, true), first);
   Competitor own = Sine(1);
-  own.plant.clear();
+  own.period = 1;
   EXPECT_THROW(LoopController(own, 400), Error);
 }
 

@@ -24,8 +24,11 @@ class SineController : public BoardController {
 };
 
 inline Competitor Sine(double amplitude) {
-  return {"sine", Robot::kPendubot,
-          [amplitude](size_t) { return std::make_unique<SineController>(amplitude); }, "any"};
+  return {"sine",
+          Robot::kPendubot,
+          [amplitude](size_t) { return std::make_unique<SineController>(amplitude); },
+          {},
+          kPolicyPeriod};
 }
 
 /// A loop on a link, cycle by cycle.

@@ -32,7 +32,6 @@ class PolicyController : public BoardController {
  public:
   PolicyController(const LoadedPolicy& loaded, size_t count)
       : loaded_(loaded),
-        period_(static_cast<int>(std::lround(kControlPeriod / kBoardTimestep))),
         size_(static_cast<size_t>(loaded.policy->obs_size())),
         obs_(count * size_),
         before_(size_),
@@ -42,7 +41,7 @@ class PolicyController : public BoardController {
   }
 
   void Act(int step, const BoardMeasurement& measured, size_t count, Lanes& torque) override {
-    if (step % period_ != 0) return;
+    if (step % kPolicyPeriod != 0) return;
     for (size_t lane = 0; lane < count; ++lane) Observe(step, measured, lane);
     const int rows = static_cast<int>(count);
     loaded_.policy->Act({obs_.data(), rows, loaded_.policy->obs_size()}, {action_.data(), rows, 1},
@@ -71,7 +70,6 @@ class PolicyController : public BoardController {
   }
 
   const LoadedPolicy& loaded_;
-  int period_;  // in steps
   size_t size_;
   std::vector<float> obs_, before_;
   std::vector<double> action_;
@@ -123,20 +121,6 @@ Competitor OfSearch(const std::string& name, SwingPolicy policy) {
   return {name, kept->net.robot(), [kept](size_t) { return kept->net.Control(kept->numbers); }};
 }
 
-/// A policy of the double pendulum, as a competitor. Throws BadInput for the other robot.
-Competitor OfPolicy(const std::shared_ptr<const LoadedPolicy>& loaded, const std::string& robot) {
-  if (!HasPlant(loaded->task)) {
-    throw BadInput(Concat(Printable(loaded->name),
-                          ": expected a policy of the double pendulum, got "
-                          "one of ",
-                          loaded->task));
-  }
-  const auto own = static_cast<Robot>(static_cast<int>(loaded->plant.actuated_joint));
-  ExpectRobot(loaded->name, own, ParseRobot(robot, own));
-  return {loaded->name, own, [loaded](size_t) { return ControllerOf(*loaded, kBoardBlock); },
-          DesignText(loaded->plant)};
-}
-
 }  // namespace
 
 SwingPolicy LoadSwingPolicy(const fs::path& path) {
@@ -169,29 +153,25 @@ Competitor GetCompetitor(const PolicyArguments& a, const std::string& robot) {
       return found;
     }
   }
-  return OfPolicy(std::make_shared<const LoadedPolicy>(GetPolicy(a)), robot);
+  const auto loaded = std::make_shared<const LoadedPolicy>(GetPolicy(a));
+  if (!HasPlant(loaded->task)) {
+    throw BadInput(Concat(Printable(loaded->name),
+                          ": expected a policy of the double pendulum, got "
+                          "one of ",
+                          loaded->task));
+  }
+  const auto own = static_cast<Robot>(static_cast<int>(loaded->plant.actuated_joint));
+  ExpectRobot(loaded->name, own, ParseRobot(robot, own));
+  return {loaded->name, own, [loaded](size_t) { return ControllerOf(*loaded, kBoardBlock); },
+          DesignText(loaded->plant), kPolicyPeriod};
 }
 
-Competitor GetCompetitor(const PolicyArguments& a, const std::string& robot, const Twin& twin,
-                         double compensation) {
-  if (!IsController(a.name) || !a.made_for.empty()) return GetCompetitor(a, robot);
-  const auto loaded = std::make_shared<LoadedPolicy>(GetPolicy(a));
-  if (!loaded->design_for || !HasPlant(loaded->task)) return OfPolicy(loaded, robot);
-  Plant& plant = loaded->plant = twin.plant;
+Plant DesignPlant(const Twin& twin, const std::string& robot) {
+  Plant plant = twin.plant;
   const auto usual = static_cast<Robot>(static_cast<int>(plant.actuated_joint));
   plant.actuated_joint = static_cast<int>(ParseRobot(robot, usual));
-  plant.coulomb1 *= 1 - compensation;
-  plant.coulomb2 *= 1 - compensation;
-  try {
-    loaded->policy = loaded->design_for(plant);
-  } catch (const Error&) {
-    // With much dry friction some designs find no solution.
-    plant.coulomb1 = plant.coulomb2 = 0;
-    loaded->policy = loaded->design_for(plant);
-  }
-  Competitor found = OfPolicy(loaded, robot);
-  found.plant = PlantText(plant);
-  return found;
+  plant.coulomb1 = plant.coulomb2 = 0;
+  return plant;
 }
 
 std::vector<BoardEntry> PublishedEntries(Robot robot) {

@@ -21,7 +21,11 @@ struct Competitor {
   Robot robot = Robot::kPendubot;
   BoardControllerMaker make;
   std::string plant = {};  // plant of its design; empty: the board's
+  int period = 1;          // steps of kBoardTimestep from one action to the next
 };
+
+/// Steps of the board in a control period of the task, 20 ms.
+inline constexpr int kPolicyPeriod = static_cast<int>(kControlPeriod / kBoardTimestep + 0.5);
 
 /// Controls `count` simulations with a policy of the double pendulum. It acts every 20 ms, on
 /// PendulumEnv's observations of the plant that the policy was made for. `loaded` must outlive it.
@@ -33,11 +37,10 @@ inline constexpr const char* kBoardRegulator = "baseline-lqr";
 /// The competitor that the arguments name, for this robot ("": the policy's own robot). Throws
 /// BadInput.
 Competitor GetCompetitor(const PolicyArguments& a, const std::string& robot);
-/// The same for a twin's machine whose motors compensate a share of the dry friction. A controller
-/// without --made-for is designed for the twin with the friction that is left or, if there is no
-/// such design, without dry friction.
-Competitor GetCompetitor(const PolicyArguments& a, const std::string& robot, const Twin& twin,
-                         double compensation);
+/// The plant for which a controller of a twin's machine is designed, for this robot ("": the twin's
+/// own). It has no dry friction: the motors compensate most of it, and the linear model of upright
+/// cannot have it.
+Plant DesignPlant(const Twin& twin, const std::string& robot);
 
 /// Loads a policy that a search wrote. Throws BadInput.
 SwingPolicy LoadSwingPolicy(const std::filesystem::path& path);

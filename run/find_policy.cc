@@ -37,11 +37,11 @@ LoadedPolicy SwingUpNamed(const std::string& name) {
                         ", which was trained on another model"));
 }
 
-/// Applies --made-for: a plant file, if there is one, then the changes. Returns the plant file.
-/// Throws BadInput.
-PlantFile ChangeDesignPlant(const std::vector<std::string>& made_for, Plant& plant) {
+/// Applies --made-for: a plant file, if there is one, then the changes. Returns what was changed:
+/// the file, or the plant before. Throws BadInput.
+PlantFile ChangeDesignPlant(const PolicyArguments& a, Plant& plant) {
   std::vector<std::string> changes, files;
-  for (const std::string& text : made_for) {
+  for (const std::string& text : a.made_for) {
     (text.find('=') == std::string::npos ? files : changes).push_back(text);
   }
   if (files.size() > 1) {
@@ -49,6 +49,7 @@ PlantFile ChangeDesignPlant(const std::vector<std::string>& made_for, Plant& pla
         Concat("--made-for: expected at most one plant file, got ", Join(files, " and ")));
   }
   PlantFile file;
+  if (a.plant) file.plant = plant = *a.plant;
   if (!files.empty()) {
     file = ReadPlantFile(files.front(), "--made-for", "NAME=VALUE, ");
     file.name = files.front();
@@ -111,7 +112,7 @@ LoadedPolicy GetPolicy(const PolicyArguments& a) {
     config.plant = swing_up.plant;
     config.swing_up_policy = swing_up.policy;
   }
-  const PlantFile made_for = ChangeDesignPlant(a.made_for, config.plant);
+  const PlantFile made_for = ChangeDesignPlant(a, config.plant);
   const bool is_controller = IsController(a.name), is_path = fs::exists(a.name);
   if (is_controller && is_path) {
     throw BadInput(Concat(a.name, ": expected a controller or a file, got the name of both; ./",

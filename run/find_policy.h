@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@ struct PolicyArguments {
   std::vector<FlagValue> flags;  // settings of the controller
   // The controller's design plant: changes such as mass2=1.2, and at most one plant file.
   std::vector<std::string> made_for;
+  std::optional<Plant> plant = {};  // design plant before made_for; nothing: the task's
 
   bool has_settings() const { return !flags.empty() || !made_for.empty(); }
   bool empty() const { return name.empty() && !has_settings(); }
