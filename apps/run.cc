@@ -88,8 +88,8 @@ int Drive(const RunArguments& a, const Competitor& competitor, const std::option
   const MachineSensors sensors = twin ? twin->sensors : a.sensors;
   Supervisor supervisor(a.limits, start, motor, sensors.angle_range, sensors.quantum);
 
-  LoopConfig config{.hz = hz, .seconds = a.seconds, .actuated_joint = joint};
-  config.compensation = {a.compensation, a.compensation};
+  LoopConfig config{
+      .hz = hz, .seconds = a.seconds, .actuated_joint = joint, .compensation = a.compensation};
   config.stop = [] { return StopSignal() != 0; };
 
   LogWriter log(a.log);

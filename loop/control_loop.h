@@ -38,7 +38,7 @@ struct LoopConfig {
   int64_t hz = 500;                 // cycles per second
   double seconds = 10;              // time in which the controller drives
   int actuated_joint = 1;           // the controller's motor, 1 or 2
-  Joints compensation{};            // share of each joint's dry friction that motors compensate
+  double compensation = 0;          // share of each joint's dry friction that motors compensate
   std::function<bool()> stop = {};  // asks for a stop, such as by a signal
 };
 

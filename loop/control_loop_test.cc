@@ -195,7 +195,7 @@ TEST(ControlLoop, ATwinGivesEqualBitsForEqualSeeds) {
 TEST(ControlLoop, CompensatesTheFrictionOfTheOtherJoint) {
   LoopBench bench;
   bench.twin.plant.coulomb2 = 0.1;
-  bench.config.compensation = {0, 1};
+  bench.config.compensation = 1;
   bench.link = std::make_unique<FakeLink>(bench.twin, FakeConfig{});
   bench.Make();
   double largest = 0;
@@ -211,14 +211,9 @@ TEST(ControlLoop, CompensatesTheFrictionOfTheOtherJoint) {
 }
 
 TEST(LoopController, KeepsThePeriodOfAPolicy) {
-  LoadedPolicy lqr = GetPolicy({"lqr", {}, {}});
+  const Competitor lqr = GetCompetitor({"lqr", {}, {}}, "");
   for (const int64_t hz : {100, 250, 400, 500, 1000}) {
-    const Competitor competitor{"lqr",
-                                Robot::kPendubot,
-                                [&](size_t) { return ControllerOf(lqr, kBoardBlock); },
-                                {},
-                                kPolicyPeriod};
-    LoopController controller(competitor, hz);
+    LoopController controller(lqr, hz);
     const int64_t held = hz / 50;  // cycles in 20 ms
     double last = 0;
     for (int64_t cycle = 0; cycle < 10 * held; ++cycle) {
@@ -229,12 +224,7 @@ TEST(LoopController, KeepsThePeriodOfAPolicy) {
     }
   }
   // After missed cycles it acts once, and then at its own times again.
-  LoopController late({"lqr",
-                       Robot::kPendubot,
-                       [&](size_t) { return ControllerOf(lqr, kBoardBlock); },
-                       {},
-                       kPolicyPeriod},
-                      500);
+  LoopController late(lqr, 500);
   const double first = late.Act(0, {3.1, 0, 0, 0}, true),
                second = late.Act(47, {3.2, 0, 0, 0}, true);
   EXPECT_NE(first, second);

@@ -165,9 +165,9 @@ void Estimator::Update(double time, const Joints& sent, const TimedReading* read
   ahead_ = StateOf(Follow(now, time, period_ + model_->horizon));
 }
 
-Joints Estimator::CompensationTorque(const Joints& share) const {
-  return {DryFriction(share[0] * x_[kFriction], ahead_.w1),
-          DryFriction(share[1] * x_[kFriction + 1], ahead_.w2)};
+Joints Estimator::CompensationTorque(double share) const {
+  return {DryFriction(share * x_[kFriction], ahead_.w1),
+          DryFriction(share * x_[kFriction + 1], ahead_.w2)};
 }
 
 double Estimator::energy() const {

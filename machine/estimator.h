@@ -46,7 +46,7 @@ class Estimator {
   Joints friction() const { return {x_[kFriction], x_[kFriction + 1]}; }
   /// The torques (N·m) that compensate a share of each joint's estimated dry friction, when they
   /// act.
-  Joints CompensationTorque(const Joints& share) const;
+  Joints CompensationTorque(double share) const;
   /// Mechanical energy now, 0 hanging at rest and 1 upright at rest; 0 without a twin.
   double energy() const;
 

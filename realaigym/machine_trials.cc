@@ -84,7 +84,7 @@ TrialController OnMachine(const BoardControllerMaker& make, const Twin& twin, Ro
       for (; own->steps * kBoardTimestep <= in.time; ++own->steps) {
         own->controller->Act(own->steps, own->measured, 1, own->torque);
       }
-      Joints torque = own->estimator.CompensationTorque({kCompensated, kCompensated});
+      Joints torque = own->estimator.CompensationTorque(kCompensated);
       torque[static_cast<size_t>(robot) - 1] += own->torque[0];
       for (size_t j = 0; j < 2; ++j) torque[j] = std::clamp(torque[j], -limit[j], limit[j]);
       return own->sent = torque;
