@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "core/error.h"
@@ -254,25 +255,37 @@ class Problem {
   }
 
  private:
-  /// The machine's values. Their covariance includes the variance between sessions.
+  /// Covariance of a session's values about the machine's values. One row for each of these.
+  MatrixXd BetweenSessions(int own) const {
+    MatrixXd deviation = MatrixXd::Zero(std::ssize(sessions_), own);
+    int column = -1;
+    for (int i = 0; i < size(); ++i) {
+      if (values_[i].session < 0) {
+        ++column;
+      } else {
+        deviation(values_[i].session, column) = theta_(i);
+      }
+    }
+    std::set<int> seen;  // a session without windows has no deviations
+    for (const Shot& shot : shots_) seen.insert(shot.session);
+    return deviation.transpose() * deviation / std::max<double>(std::ssize(seen) - 1, 1);
+  }
+
+  /// The machine's values. Their covariance includes the covariance between sessions.
   FitResult Combine(const MatrixXd& covariance) const {
     FitResult result;
     result.twin = TwinAt(theta_, -1);
     std::vector<int> own;  // the entries of θ without a session
-    std::vector<double> between;
     for (int i = 0; i < size(); ++i) {
-      if (values_[i].session < 0) {
-        own.push_back(i);
-        between.push_back(0);
-        result.twin.uncertain.push_back(values_[i].name);
-      } else {
-        between.back() += theta_(i) * theta_(i) / static_cast<double>(sessions_.size());
-      }
+      if (values_[i].session >= 0) continue;
+      own.push_back(i);
+      result.twin.uncertain.push_back(values_[i].name);
     }
+    const MatrixXd between = BetweenSessions(static_cast<int>(own.size()));
     for (size_t i = 0; i < own.size(); ++i) {
       for (size_t j = 0; j < own.size(); ++j) {
         const double both = (covariance(own[i], own[j]) + covariance(own[j], own[i])) / 2;
-        result.twin.covariance.push_back(both + (i == j ? between[i] : 0));
+        result.twin.covariance.push_back(both + between(i, j));
       }
     }
     for (int s = 0; s < static_cast<int>(sessions_.size()); ++s) {
