@@ -370,7 +370,9 @@ void AddRealAiGym(CommandLine& line) {
       "--hardware scores logs of the real robot. The joint with more torque has the motor,\n"
       "unless --robot names the robot. A log with tau_pert belongs to the board with pushes.\n\n"
       "--twin designs a controller for the twin without dry friction; --made-for changes this\n"
-      "plant. The motors compensate 80% of the estimated dry friction.\n\n"
+      "plant. The motors compensate " +
+      fmt::format("{:.0f}%", 100 * kCompensated) +
+      " of the estimated dry friction.\n\n"
       "Examples:\n"
       "  ./upswing realaigym --search pendubot.safetensors         takes some minutes\n"
       "  ./upswing realaigym pendubot.safetensors --figure rows.svg\n"

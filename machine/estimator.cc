@@ -1,6 +1,6 @@
 #include "machine/estimator.h"
 
-#include <Eigen/LU>
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,18 +9,18 @@
 namespace upswing {
 namespace {
 
-// Unmodelled torques: random walk of the velocities, rad/s after 1 s. Zeros and friction get only a
-// share of the Kalman gain, because a real machine's errors are no white noise. On RealAIGym's
-// logs, less noise and the whole gain have larger errors than the twin's zeros.
-constexpr double kVelocityNoise = 0.7;
-constexpr double kSessionShare = 0.2;
-// Links without torque rest below this velocity, rad/s: more than a quantum in a cycle.
-constexpr double kMoving = 0.3;
-constexpr double kFirstVelocity = 3;  // deviation of the velocities at the beginning, rad/s
-constexpr double kLeastNoise = 1e-6;  // of the measured angles, rad
-constexpr double kKept = 0.1;         // time for which sent torques are kept, s
-constexpr double kLongestGap = 0.1;   // s; after it the filter begins again
-constexpr int kMostKept = 512;        // torques sent in kKept and the longest delay, at 1 kHz
+// Unmodelled torques: random walk of the velocities, rad/s after 1 s. The larger one holds during
+// pushes, and while static friction may hold the links.
+constexpr double kVelocityNoise = 0.5, kDisturbedNoise = 4;
+constexpr double kMoving = 0.1;            // rad/s; static friction may hold slower links
+constexpr double kOutlier = 3;             // largest innovation, in standard deviations
+constexpr double kLargestMean = 2;         // of the innovations without a push, in the same unit
+constexpr double kInnovationTime = 0.025;  // time constant of this mean, s
+constexpr double kFirstVelocity = 3;       // deviation of the velocities at the beginning, rad/s
+constexpr double kLeastNoise = 1e-6;       // of the measured angles, rad
+constexpr double kKept = 0.1;              // time for which sent torques are kept, s
+constexpr double kLongestGap = 0.1;        // s; after it the filter begins again
+constexpr int kMostKept = 512;             // torques sent in kKept and the longest delay, at 1 kHz
 
 /// A twin's covariance of two values; 0 if it has none.
 double CovarianceOf(const Twin& twin, std::string_view a, std::string_view b) {
@@ -84,6 +84,8 @@ double Estimator::AngleNoise() const {
 void Estimator::Begin(const Joints& angle, double moment) {
   begun_ = true;
   time_ = moment;
+  innovation_.setZero();
+  disturbed_until_ = moment;
   // Angle = measured angle - zero, so their errors are opposite.
   for (int j = 0; j < 2; ++j) x_[kAngle + j] = angle[j] - x_[kZero + j];
   x_.segment<2>(kVelocity).setZero();
@@ -106,41 +108,54 @@ void Estimator::Predict(double seconds) {
     F.col(i) = (Follow(other, time_, seconds) - next) / kStep;
   }
   P_ = F * P_ * F.transpose();
-  P_.diagonal().segment<2>(kVelocity).array() += Square(kVelocityNoise) * seconds;
+  const bool disturbed = time_ < disturbed_until_ || Slow();
+  const double noise = disturbed ? kDisturbedNoise : kVelocityNoise;
+  P_.diagonal().segment<2>(kVelocity).array() += Square(noise) * seconds;
   x_ = next;
   time_ += seconds;
 }
 
-void Estimator::Correct(const Joints& angle) {
+void Estimator::Correct(const Joints& angle, double seconds) {
   Eigen::Matrix<double, 2, kStates> H = Eigen::Matrix<double, 2, kStates>::Zero();
   H(0, kAngle) = H(1, kAngle + 1) = H(0, kZero) = H(1, kZero + 1) = 1;
-  const Eigen::Vector2d error = Eigen::Vector2d(angle[0], angle[1]) - H * x_;
+  const Eigen::Vector2d innovation = Eigen::Vector2d(angle[0], angle[1]) - H * x_;
   Eigen::Matrix2d S = H * P_ * H.transpose();
   S.diagonal().array() += Square(AngleNoise());
-  const Eigen::Matrix<double, kStates, 2> K = P_ * H.transpose() * S.inverse();
-  // Partial update: Brink, "Partial-Update Schmidt-Kalman Filter", Journal of Guidance, Control,
-  // and Dynamics 40 (2017).
-  Vector rest = Vector::Zero();
-  rest.tail<kStates - kZero>().setConstant(1 - kSessionShare);
-  x_ += (Vector::Ones() - rest).cwiseProduct(K * error);
-  P_ -= (Matrix::Ones() - rest * rest.transpose()).cwiseProduct(K * H * P_).eval();
-  P_ = (0.5 * (P_ + P_.transpose())).eval();
+  const Eigen::LLT<Eigen::Matrix2d> factor(S);
+  const Eigen::Matrix<double, kStates, 2> K = factor.solve(H * P_).transpose();
+  // While the model holds, normalized innovations are white with variance 1. Larger ones come from
+  // readings with a wrong time.
+  const Eigen::Vector2d normalized =
+      factor.matrixL().solve(innovation).cwiseMin(kOutlier).cwiseMax(-kOutlier);
+  x_ += K * (factor.matrixL() * normalized);
   x_.tail<2>() = x_.tail<2>().cwiseMax(0);  // friction never drives
+  P_ -= K * H * P_;
+  P_ = (0.5 * (P_ + P_.transpose())).eval();
+
+  // A push gives many of them the same sign, so their low-passed mean is too large.
+  const double share = std::min(seconds / kInnovationTime, 1.0);
+  innovation_ += share * (normalized - innovation_);
+  const double variance = share / (2 - share);
+  if (innovation_.squaredNorm() > Square(kLargestMean) * variance) {
+    disturbed_until_ = time_ + kInnovationTime;
+  }
 }
 
+bool Estimator::Slow() const { return x_.segment<2>(kVelocity).cwiseAbs().maxCoeff() < kMoving; }
+
 void Estimator::Take(const TimedReading& reading, bool driven) {
-  const double moment = reading.time - model_->age;
-  if (!begun_ || std::abs(moment - time_) > kLongestGap) {
+  const double moment = reading.time - model_->age, seconds = moment - time_;
+  if (!begun_ || std::abs(seconds) > kLongestGap) {
     Begin(reading.angle, moment);
     return;
   }
-  if (moment <= time_) return;
+  if (seconds <= 0) return;
   const Vector x = x_;
   const Matrix P = P_;
-  Predict(moment - time_);
-  Correct(reading.angle);
-  if (driven || x_.segment<2>(kVelocity).cwiseAbs().maxCoeff() >= kMoving) return;
-  // Stiction may hold links off their equilibrium, which the model lacks: nothing is learned.
+  Predict(seconds);
+  Correct(reading.angle, seconds);
+  if (driven || !Slow()) return;
+  // Links may rest for minutes, held off their equilibrium: nothing is learned.
   x_ = x;
   P_ = P;
   Begin(reading.angle, moment);

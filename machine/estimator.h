@@ -19,10 +19,14 @@ namespace upswing {
 /// With a twin, an extended Kalman filter follows the twin's motion under the sent torques:
 ///   x = (q1, q2, w1, w2, z1, z2, f1, f2),   measured angles = (q1 + z1, q2 + z2)
 /// z are the encoders' zeros and f the dry friction, which differ from session to session. They
-/// begin at the twin's values. Those with a covariance are estimated, slowly, while the machine
-/// is driven: gravity and friction show in the motion. The prediction bridges lost readings. The
-/// controller gets the state at the time when its torque will act: a cycle, the motors' delay and
-/// their lag later.
+/// begin at the twin's values. Those with a covariance are estimated: gravity and friction show in
+/// the motion. Pushes and static friction are not in the model. While they may act, the noise of
+/// the velocities is larger, so the filter follows the angles and learns little. Innovations that
+/// keep their sign show a push (whiteness test of Bar-Shalom, Li, and Kirubarajan, Estimation with
+/// Applications to Tracking and Navigation, 2001, 5.4). Large innovations are clipped (Huber).
+///
+/// The prediction bridges lost readings. The controller gets the state at the time when its torque
+/// will act: a cycle, the motors' delay and their lag later.
 ///
 /// No function allocates memory after the constructor.
 class Estimator {
@@ -72,8 +76,10 @@ class Estimator {
   void Begin(const Joints& angle, double moment);
   /// Lets the filter follow the motion for `seconds`.
   void Predict(double seconds);
-  /// Corrects x with measured angles.
-  void Correct(const Joints& angle);
+  /// Corrects x with measured angles, `seconds` after the last ones.
+  void Correct(const Joints& angle, double seconds);
+  /// Whether static friction may hold the links.
+  bool Slow() const;
 
   MachineSensors sensors_;
   double period_;
@@ -82,7 +88,9 @@ class Estimator {
   bool begun_ = false;
   double time_ = 0;  // of x_, s
   Vector x_ = Vector::Zero();
-  Matrix P_ = Matrix::Zero();  // covariance of x_
+  Matrix P_ = Matrix::Zero();                             // covariance of x_
+  Eigen::Vector2d innovation_ = Eigen::Vector2d::Zero();  // normalized, low-passed
+  double disturbed_until_ = 0;                            // s
   PendulumState now_, ahead_;
 };
 

@@ -154,5 +154,24 @@ TEST(Fit, FindsTheMachineBehindItsLogs) {
   EXPECT_GE(share, 0.9);
 }
 
+/// Links that hang off at joint 1 and straight down at joint 2 have opposite zeros.
+TEST(Fit, TheCovarianceKnowsWhichValuesOfSessionsVaryTogether) {
+  std::vector<MachineLog> logs;
+  for (const int session : {-3, -1, 1, 3}) {
+    Twin machine = FirstGuess();
+    machine.sensors.zero1 = 0.02 * session;
+    machine.sensors.zero2 = -0.02 * session;
+    logs.push_back(LogsOf(machine, 1, 50 + static_cast<uint64_t>(session)).front());
+    logs.back().name = std::string("session ") + "abcdefg"[3 + session];
+  }
+  ThreadPool pool(2);
+  const FitResult fit = Fit(logs, FirstGuess(), {"zero1", "zero2"}, {}, &pool);
+  ASSERT_EQ(fit.twin.uncertain, (std::vector<std::string>{"zero1", "zero2"}));
+  // Four sessions 0.04 rad apart: variance 0.02² (9 + 1 + 1 + 9) / 3.
+  EXPECT_NEAR(std::sqrt(fit.twin.covariance[0]), 0.0516, 0.003);
+  EXPECT_NEAR(std::sqrt(fit.twin.covariance[3]), 0.0516, 0.003);
+  EXPECT_NEAR(fit.twin.covariance[1], -0.0516 * 0.0516, 0.0003);
+}
+
 }  // namespace
 }  // namespace upswing

@@ -17,7 +17,7 @@ namespace upswing {
 
 /// Share of the estimated dry friction that the motors compensate, of both joints. The rules allow
 /// it. Less than all keeps the sum from driving a joint whose friction is overestimated.
-inline constexpr double kCompensated = 0.8;
+inline constexpr double kCompensated = 0.95;
 
 /// A twin's machine with an Estimator, as an episode of a search: friction less its compensation,
 /// and the motors' lag. The prediction removes the delay.
