@@ -130,10 +130,13 @@ int RunRun(const RunArguments& a) {
   if (in_process && !a.twin.empty()) {
     throw BadInput("--twin: expected a link by UDP or a serial line with it, got a twin as --link");
   }
+  if (a.draw && (!in_process || twin->covariance.empty()))
+    throw BadInput("--draw: expected a twin with [covariance] as --link, got none");
   if (!twin && a.compensation > 0)
     throw BadInput("--compensation: expected --twin with it, got none");
   if (a.differences && a.compensation > 0)
-    throw BadInput("--compensation: expected no --differences with it, which estimate no friction");
+    throw BadInput(
+        "--compensation: expected no --differences with it, which estimates no friction");
   PolicyArguments policy = a.policy;
   if (twin) policy.plant = DesignPlant(*twin, a.robot);
   return Drive(a, GetCompetitor(policy, a.robot), twin, address);

@@ -9,12 +9,13 @@
 namespace upswing {
 namespace {
 
-// Unmodelled torques: random walk of the velocities, rad/s after 1 s. The larger one holds during
-// pushes, and while static friction may hold the links.
+// Noise of the velocities, which stands for unmodelled torques, rad/s/√s: usually, and while a push
+// or static friction may act.
 constexpr double kVelocityNoise = 0.5, kDisturbedNoise = 4;
-constexpr double kMoving = 0.1;            // rad/s; static friction may hold slower links
-constexpr double kOutlier = 3;             // largest innovation, in standard deviations
-constexpr double kLargestMean = 2;         // of the innovations without a push, in the same unit
+constexpr double kMoving = 0.1;  // rad/s; static friction may hold slower links
+// Limits of the normalized innovations and of their mean, in standard deviations. They are tuned on
+// RealAIGym's logs and in simulation, because the noise of the angles is a bound.
+constexpr double kOutlier = 3, kLargestMean = 2;
 constexpr double kInnovationTime = 0.025;  // time constant of this mean, s
 constexpr double kFirstVelocity = 3;       // deviation of the velocities at the beginning, rad/s
 constexpr double kLeastNoise = 1e-6;       // of the measured angles, rad
@@ -84,8 +85,8 @@ double Estimator::AngleNoise() const {
 void Estimator::Begin(const Joints& angle, double moment) {
   begun_ = true;
   time_ = moment;
-  innovation_.setZero();
-  disturbed_until_ = moment;
+  mean_innovation_.setZero();
+  begin_ = disturbed_until_ = moment;
   // Angle = measured angle - zero, so their errors are opposite.
   for (int j = 0; j < 2; ++j) x_[kAngle + j] = angle[j] - x_[kZero + j];
   x_.segment<2>(kVelocity).setZero();
@@ -123,20 +124,20 @@ void Estimator::Correct(const Joints& angle, double seconds) {
   S.diagonal().array() += Square(AngleNoise());
   const Eigen::LLT<Eigen::Matrix2d> factor(S);
   const Eigen::Matrix<double, kStates, 2> K = factor.solve(H * P_).transpose();
-  // While the model holds, normalized innovations are white with variance 1. Larger ones come from
-  // readings with a wrong time.
+  // Readings with a wrong time have large innovations. At the beginning, so have right ones.
+  const double limit = time_ < begin_ + kInnovationTime ? 1e9 : kOutlier;
   const Eigen::Vector2d normalized =
-      factor.matrixL().solve(innovation).cwiseMin(kOutlier).cwiseMax(-kOutlier);
+      factor.matrixL().solve(innovation).cwiseMin(limit).cwiseMax(-limit);
   x_ += K * (factor.matrixL() * normalized);
   x_.tail<2>() = x_.tail<2>().cwiseMax(0);  // friction never drives
   P_ -= K * H * P_;
   P_ = (0.5 * (P_ + P_.transpose())).eval();
 
-  // A push gives many of them the same sign, so their low-passed mean is too large.
-  const double share = std::min(seconds / kInnovationTime, 1.0);
-  innovation_ += share * (normalized - innovation_);
-  const double variance = share / (2 - share);
-  if (innovation_.squaredNorm() > Square(kLargestMean) * variance) {
+  // While the model holds, normalized innovations are white. A push gives many of them the same
+  // sign, so their mean exceeds that of white ones, whose variance is weight / (2 - weight).
+  const double weight = std::min(seconds / kInnovationTime, 1.0);
+  mean_innovation_ += weight * (normalized - mean_innovation_);
+  if (mean_innovation_.squaredNorm() > Square(kLargestMean) * weight / (2 - weight)) {
     disturbed_until_ = time_ + kInnovationTime;
   }
 }

@@ -20,10 +20,10 @@ namespace upswing {
 ///   x = (q1, q2, w1, w2, z1, z2, f1, f2),   measured angles = (q1 + z1, q2 + z2)
 /// z are the encoders' zeros and f the dry friction, which differ from session to session. They
 /// begin at the twin's values. Those with a covariance are estimated: gravity and friction show in
-/// the motion. Pushes and static friction are not in the model. While they may act, the noise of
-/// the velocities is larger, so the filter follows the angles and learns little. Innovations that
+/// the motion. The model lacks pushes and static friction. While they may act, a larger noise of
+/// the velocities makes the filter follow the angles and change z and f little. Innovations that
 /// keep their sign show a push (whiteness test of Bar-Shalom, Li, and Kirubarajan, Estimation with
-/// Applications to Tracking and Navigation, 2001, 5.4). Large innovations are clipped (Huber).
+/// Applications to Tracking and Navigation, 2001, 5.4). Outliers among the innovations are clipped.
 ///
 /// The prediction bridges lost readings. The controller gets the state at the time when its torque
 /// will act: a cycle, the motors' delay and their lag later.
@@ -78,7 +78,7 @@ class Estimator {
   void Predict(double seconds);
   /// Corrects x with measured angles, `seconds` after the last ones.
   void Correct(const Joints& angle, double seconds);
-  /// Whether static friction may hold the links.
+  /// Whether static friction may hold both links.
   bool Slow() const;
 
   MachineSensors sensors_;
@@ -88,9 +88,9 @@ class Estimator {
   bool begun_ = false;
   double time_ = 0;  // of x_, s
   Vector x_ = Vector::Zero();
-  Matrix P_ = Matrix::Zero();                             // covariance of x_
-  Eigen::Vector2d innovation_ = Eigen::Vector2d::Zero();  // normalized, low-passed
-  double disturbed_until_ = 0;                            // s
+  Matrix P_ = Matrix::Zero();                                  // covariance of x_
+  Eigen::Vector2d mean_innovation_ = Eigen::Vector2d::Zero();  // normalized, low-passed
+  double begin_ = 0, disturbed_until_ = 0;                     // s
   PendulumState now_, ahead_;
 };
 

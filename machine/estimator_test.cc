@@ -163,7 +163,7 @@ TEST(Estimator, FindsTheZerosAndTheFrictionOfASession) {
   Estimator learns(twin, 0.002);
   EXPECT_LT(LargestShare(learns, session), 0.1);
   Estimator pushed(twin, 0.002);
-  EXPECT_LT(LargestShare(pushed, session, 0.4), 0.5);
+  EXPECT_LT(LargestShare(pushed, session, 0.4), 0.4);  // 0.8 if pushes were not recognised
 
   // After a gap the state begins again, and the session stays known.
   const TimedReading later{{{0.5, 0.1}, {}}, 20};
@@ -173,7 +173,45 @@ TEST(Estimator, FindsTheZerosAndTheFrictionOfASession) {
   EXPECT_NEAR(learns.now().q1, 0.5 - zero[0], 1e-9);
 }
 
-/// Joints that stand still show no friction and no gravity, with torque or without.
+/// Dry friction holds links away from where they hang, while a torque that cannot move them is
+/// sent.
+TEST(Estimator, LearnsLittleFromLinksThatStandUnderTorque) {
+  Twin twin = TestTwin();
+  twin.uncertain = {"zero1", "zero2"};
+  twin.covariance = {9e-4, 0, 0, 9e-4};
+  Estimator estimator(twin, 0.002);
+  for (int k = 0; k < 5000; ++k) {
+    const TimedReading held{{{0.07, -0.05}, {}}, 0.002 * k};
+    estimator.Update(held.time, {0.02, 0}, &held);
+  }
+  EXPECT_NEAR(estimator.zero()[0], twin.sensors.zero1, 0.015);
+  EXPECT_NEAR(estimator.zero()[1], twin.sensors.zero2, 0.015);
+}
+
+TEST(Estimator, AWrongReadingChangesTheVelocityLittle) {
+  const Twin twin = TestTwin();
+  Estimator estimator(twin, 0.002);
+  for (int k = 0; k < 500; ++k) {
+    const TimedReading reading{{{0.02 + (k == 499 ? 0.1 : 0), -0.01}, {}}, 0.002 * k};
+    estimator.Update(reading.time, {1e-9, 0}, &reading);
+  }
+  EXPECT_NEAR(estimator.now().w1, 0, 0.5);  // 2.8 rad/s if it were taken as it is
+}
+
+TEST(Estimator, BeginsInFastMotion) {
+  Twin twin = TestTwin();
+  const PendulumState start{0, 0, 15, -18};
+  SimulatedMachine machine(twin, start);
+  Estimator estimator(twin, 0.002);
+  for (int k = 0; k <= 20; ++k) {
+    machine.Advance(0.002 * k);
+    const TimedReading reading{machine.Read(), 0.002 * k};
+    estimator.Update(reading.time, {}, &reading);
+  }
+  EXPECT_NEAR(estimator.now().w1, machine.state().w1, 0.2);
+  EXPECT_NEAR(estimator.now().w2, machine.state().w2, 0.2);
+}
+
 TEST(Estimator, LearnsNothingAtRestNorFromReadingsThatAreNotNumbers) {
   Twin twin = TestTwin();
   twin.uncertain = {"zero1", "coulomb2"};
@@ -255,7 +293,7 @@ TEST(Estimator, WhatARunTeachesPredictsTheNextRealRuns) {
     std::printf("all: found %.4f, twin %.4f, session %.4f rad\n", PooledMedian(all_found),
                 PooledMedian(all_general), PooledMedian(all_known));
   }
-  EXPECT_LT(PooledMedian(all_found), PooledMedian(all_general));
+  EXPECT_LT(PooledMedian(all_found), 0.9 * PooledMedian(all_general));
 }
 
 TEST(Estimator, KnowsTheEnergy) {

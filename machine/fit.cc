@@ -68,6 +68,8 @@ double PriorDeviation(const std::string& name) {
   return name == "delay" || name == "lag" || name == "current_delay" ? 0.005 : 0;  // s
 }
 
+double Square(double x) { return x * x; }
+
 /// The weight of a prior with this standard deviation; 0: none.
 double WeightOf(double deviation) { return deviation > 0 ? 1 / (deviation * deviation) : 0; }
 
@@ -255,20 +257,24 @@ class Problem {
   }
 
  private:
-  /// Covariance of a session's values about the machine's values. One row for each of these.
-  MatrixXd BetweenSessions(int own) const {
-    MatrixXd deviation = MatrixXd::Zero(std::ssize(sessions_), own);
+  /// Covariance (n × n) of the differences between sessions, n machine's values. The prior counts
+  /// as one session, so that a single session, which shows no differences, has that of the prior.
+  MatrixXd BetweenSessions(int n) const {
+    MatrixXd squares = MatrixXd::Zero(n, n);
+    MatrixXd difference = MatrixXd::Zero(std::ssize(sessions_), n);
     int column = -1;
     for (int i = 0; i < size(); ++i) {
       if (values_[i].session < 0) {
         ++column;
+        squares(column, column) = Square(SessionDeviation(values_[i].name));
       } else {
-        deviation(values_[i].session, column) = theta_(i);
+        difference(values_[i].session, column) = theta_(i);
       }
     }
-    std::set<int> seen;  // a session without windows has no deviations
+    squares += difference.transpose() * difference;
+    std::set<int> seen;  // sessions with windows; their mean takes one degree of freedom
     for (const Shot& shot : shots_) seen.insert(shot.session);
-    return deviation.transpose() * deviation / std::max<double>(std::ssize(seen) - 1, 1);
+    return squares / std::max<double>(std::ssize(seen), 1);
   }
 
   /// The machine's values. Their covariance includes the covariance between sessions.

@@ -154,23 +154,30 @@ TEST(Fit, FindsTheMachineBehindItsLogs) {
   EXPECT_GE(share, 0.9);
 }
 
-/// Links that hang off at joint 1 and straight down at joint 2 have opposite zeros.
-TEST(Fit, TheCovarianceKnowsWhichValuesOfSessionsVaryTogether) {
+/// Fits the zeros of sessions whose second zero is the opposite of the first (rad).
+std::vector<double> CovarianceOfZeros(const std::vector<double>& zeros) {
   std::vector<MachineLog> logs;
-  for (const int session : {-3, -1, 1, 3}) {
+  for (const double zero : zeros) {
     Twin machine = FirstGuess();
-    machine.sensors.zero1 = 0.02 * session;
-    machine.sensors.zero2 = -0.02 * session;
-    logs.push_back(LogsOf(machine, 1, 50 + static_cast<uint64_t>(session)).front());
-    logs.back().name = std::string("session ") + "abcdefg"[3 + session];
+    machine.sensors.zero1 = zero;
+    machine.sensors.zero2 = -zero;
+    logs.push_back(LogsOf(machine, 1, 50 + logs.size()).front());
+    logs.back().name = std::string("session ") + "abcd"[logs.size() - 1];
   }
   ThreadPool pool(2);
-  const FitResult fit = Fit(logs, FirstGuess(), {"zero1", "zero2"}, {}, &pool);
-  ASSERT_EQ(fit.twin.uncertain, (std::vector<std::string>{"zero1", "zero2"}));
-  // Four sessions 0.04 rad apart: variance 0.02² (9 + 1 + 1 + 9) / 3.
-  EXPECT_NEAR(std::sqrt(fit.twin.covariance[0]), 0.0516, 0.003);
-  EXPECT_NEAR(std::sqrt(fit.twin.covariance[3]), 0.0516, 0.003);
-  EXPECT_NEAR(fit.twin.covariance[1], -0.0516 * 0.0516, 0.0003);
+  return Fit(logs, FirstGuess(), {"zero1", "zero2"}, {}, &pool).twin.covariance;
+}
+
+TEST(Fit, CountsThePriorAsASessionInTheCovarianceBetweenSessions) {
+  constexpr double kPrior = 0.05 * 0.05;
+  const std::vector<double> one = CovarianceOfZeros({0.02});
+  EXPECT_NEAR(one[0], kPrior, 0.1 * kPrior);
+  EXPECT_NEAR(one[1], 0, 0.1 * kPrior);
+  const std::vector<double> four = CovarianceOfZeros({-0.06, -0.02, 0.02, 0.06});
+  constexpr double kSquares = 2 * (0.06 * 0.06 + 0.02 * 0.02);
+  EXPECT_NEAR(four[0], (kPrior + kSquares) / 4, 0.2e-3);
+  EXPECT_NEAR(four[3], (kPrior + kSquares) / 4, 0.2e-3);
+  EXPECT_NEAR(four[1], -kSquares / 4, 0.2e-3);
 }
 
 }  // namespace
