@@ -83,10 +83,8 @@ double Estimator::AngleNoise() const {
 }
 
 void Estimator::Begin(const Joints& angle, double moment) {
-  begun_ = true;
-  time_ = moment;
+  begin_ = time_ = disturbed_until_ = moment;
   mean_innovation_.setZero();
-  begin_ = disturbed_until_ = moment;
   // Angle = measured angle - zero, so their errors are opposite.
   for (int j = 0; j < 2; ++j) x_[kAngle + j] = angle[j] - x_[kZero + j];
   x_.segment<2>(kVelocity).setZero();
@@ -125,7 +123,7 @@ void Estimator::Correct(const Joints& angle, double seconds) {
   const Eigen::LLT<Eigen::Matrix2d> factor(S);
   const Eigen::Matrix<double, kStates, 2> K = factor.solve(H * P_).transpose();
   // Readings with a wrong time have large innovations. At the beginning, so have right ones.
-  const double limit = time_ < begin_ + kInnovationTime ? 1e9 : kOutlier;
+  const double limit = time_ < *begin_ + kInnovationTime ? 1e9 : kOutlier;
   const Eigen::Vector2d normalized =
       factor.matrixL().solve(innovation).cwiseMin(limit).cwiseMax(-limit);
   x_ += K * (factor.matrixL() * normalized);
@@ -146,7 +144,7 @@ bool Estimator::Slow() const { return x_.segment<2>(kVelocity).cwiseAbs().maxCoe
 
 void Estimator::Take(const TimedReading& reading, bool driven) {
   const double moment = reading.time - model_->age, seconds = moment - time_;
-  if (!begun_ || std::abs(seconds) > kLongestGap) {
+  if (!begin_ || std::abs(seconds) > kLongestGap) {
     Begin(reading.angle, moment);
     return;
   }
@@ -175,7 +173,7 @@ void Estimator::Update(double time, const Joints& sent, const TimedReading* read
   if (reading != nullptr && std::isfinite(reading->angle[0] + reading->angle[1])) {
     Take(*reading, sent != Joints{});
   }
-  if (!begun_) return;
+  if (!begin_) return;
   const Vector now = Follow(x_, time_, std::clamp(time - time_, 0.0, kKept));
   now_ = StateOf(now);
   ahead_ = StateOf(Follow(now, time, period_ + model_->horizon));

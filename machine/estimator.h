@@ -85,12 +85,12 @@ class Estimator {
   double period_;
   VelocityEstimate velocity_;
   std::optional<Model> model_;
-  bool begun_ = false;
-  double time_ = 0;  // of x_, s
+  std::optional<double> begin_;  // time of the last Begin, s
+  double time_ = 0;              // of x_, s
   Vector x_ = Vector::Zero();
   Matrix P_ = Matrix::Zero();                                  // covariance of x_
   Eigen::Vector2d mean_innovation_ = Eigen::Vector2d::Zero();  // normalized, low-passed
-  double begin_ = 0, disturbed_until_ = 0;                     // s
+  double disturbed_until_ = 0;                                 // s
   PendulumState now_, ahead_;
 };
 

@@ -68,8 +68,6 @@ double PriorDeviation(const std::string& name) {
   return name == "delay" || name == "lag" || name == "current_delay" ? 0.005 : 0;  // s
 }
 
-double Square(double x) { return x * x; }
-
 /// The weight of a prior with this standard deviation; 0: none.
 double WeightOf(double deviation) { return deviation > 0 ? 1 / (deviation * deviation) : 0; }
 
@@ -266,7 +264,7 @@ class Problem {
     for (int i = 0; i < size(); ++i) {
       if (values_[i].session < 0) {
         ++column;
-        squares(column, column) = Square(SessionDeviation(values_[i].name));
+        squares(column, column) = std::pow(SessionDeviation(values_[i].name), 2);
       } else {
         difference(values_[i].session, column) = theta_(i);
       }
