@@ -155,6 +155,19 @@ void PrintHardware(const HardwareReport& report) {
   }
 }
 
+/// The twin's share of successes with the pushes of each run. Trials take the runs in turn; runs
+/// without a trial are left out.
+std::vector<double> SharesOfRuns(const HardwareReport& trials, size_t runs) {
+  runs = std::min(runs, trials.runs.size());
+  std::vector<double> successes(runs), counts(runs);
+  for (size_t i = 0; i < trials.runs.size(); ++i) {
+    if (trials.runs[i].outcome.above_line) ++successes[i % runs];
+    ++counts[i % runs];
+  }
+  for (size_t k = 0; k < runs; ++k) successes[k] /= counts[k];
+  return successes;
+}
+
 /// Runs the TVLQR of the logs on a twin, and compares successes.
 int CompareTvlqr(const RealAiGymArguments& a, std::span<const MachineLog> logs,
                  const HardwareReport& real) {
@@ -180,16 +193,23 @@ int CompareTvlqr(const RealAiGymArguments& a, std::span<const MachineLog> logs,
   }
   const Interval interval = WilsonInterval(successes, runs);
   const double share = report.successes() / static_cast<double>(a.draws);
+  const std::vector<double> shares =
+      real.pushed ? SharesOfRuns(report, real.runs.size()) : std::vector<double>();
   if (a.as_json) {
-    fmt::print("{}\n", PrintableJson(
-                           nlohmann::ordered_json{{"robot", NameOf(real.robot)},
-                                                  {"pushed", real.pushed},
-                                                  {"law_misfit", Median(misfits)},
-                                                  {"real_successes", successes},
-                                                  {"real_runs", runs},
-                                                  {"real_interval", {interval.low, interval.high}},
-                                                  {"twin", share},
-                                                  {"mean_score", report.mean()}}));
+    nlohmann::ordered_json json{{"robot", NameOf(real.robot)},
+                                {"pushed", real.pushed},
+                                {"law_misfit", Median(misfits)},
+                                {"real_successes", successes},
+                                {"real_runs", runs},
+                                {"real_interval", {interval.low, interval.high}},
+                                {"twin", share},
+                                {"mean_score", report.mean()}};
+    for (size_t k = 0; k < shares.size(); ++k) {
+      const HardwareRun& run = real.runs[k];
+      json["runs"].push_back(
+          {{"name", run.name}, {"success", run.outcome.above_line}, {"twin", shares[k]}});
+    }
+    fmt::print("{}\n", PrintableJson(json));
     return 0;
   }
   fmt::print(
@@ -199,6 +219,11 @@ int CompareTvlqr(const RealAiGymArguments& a, std::span<const MachineLog> logs,
       NameOf(real.robot), real.pushed ? ", pushed" : "", Counted(of_law.size(), "run"),
       Median(misfits), successes, runs, 100 * interval.low, 100 * interval.high,
       Printable(twin.name), 100 * share, Counted(a.draws, "machine"), report.mean());
+  for (size_t k = 0; k < shares.size(); ++k) {
+    const HardwareRun& run = real.runs[k];
+    fmt::print("  with the pushes of {}, which {}: {:.1f}%\n", Printable(run.name),
+               run.outcome.above_line ? "succeeds" : "fails", 100 * shares[k]);
+  }
   return 0;
 }
 
@@ -250,6 +275,9 @@ int ScoreOnTwin(const RealAiGymArguments& a, const Twin& twin, const Competitor&
       report.pushed ? ", pushed" : "", report.successes(), a.draws,
       100.0 * report.successes() / static_cast<double>(a.draws), 100 * interval.low,
       100 * interval.high, report.mean());
+  if (twin.covariance.empty()) {
+    fmt::print("  all machines are equal, because the twin has no [covariance]\n");
+  }
   return 0;
 }
 
@@ -301,9 +329,8 @@ int RunRealAiGym(const RealAiGymArguments& a) {
   ThreadPool pool(ResolveThreads(a.threads));
   std::optional<Twin> twin;
   if (!a.twin.empty()) twin = ReadTwin(a.twin, "--twin");
-  PolicyArguments policy = a.policy;
-  if (twin) policy.plant = DesignPlant(*twin, robot);
-  const Competitor competitor = searches ? Search(a, twin, pool) : GetCompetitor(policy, robot);
+  const Competitor competitor =
+      searches ? Search(a, twin, pool) : GetCompetitor(a.policy, robot, twin);
   if (StopSignal() != 0) return 128 + StopSignal();
   if (twin) return ScoreOnTwin(a, *twin, competitor, pool);
   BoardReport report;

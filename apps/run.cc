@@ -137,9 +137,7 @@ int RunRun(const RunArguments& a) {
   if (a.differences && a.compensation > 0)
     throw BadInput(
         "--compensation: expected no --differences with it, which estimates no friction");
-  PolicyArguments policy = a.policy;
-  if (twin) policy.plant = DesignPlant(*twin, a.robot);
-  return Drive(a, GetCompetitor(policy, a.robot), twin, address);
+  return Drive(a, GetCompetitor(a.policy, a.robot, twin), twin, address);
 }
 
 }  // namespace

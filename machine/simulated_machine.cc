@@ -109,7 +109,7 @@ MachineLog RunLoop(const Twin& twin, const LoopRun& run, const CycleController& 
     if (run.push) log.push.push_back(push);
     bool within = true;
     for (int j = 0; j < 2; ++j) {
-      within = within && std::abs(input.angle[j]) <= run.largest_angle &&
+      within = within && std::abs(input.angle[j]) < run.largest_angle &&
                std::abs(input.velocity[j]) <= run.largest_velocity;
     }
     if (!within) break;

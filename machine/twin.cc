@@ -43,19 +43,29 @@ Matrix Factor(const Twin& twin, const std::string& where) {
   const Eigen::Map<const Matrix> covariance(twin.covariance.data(), n, n);
   // Scaled to ones on the diagonal, so that the test does not depend on units.
   const Eigen::VectorXd deviation = covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  const auto refuse = [&](const std::string& names, const std::string& expected, double got) {
+    throw BadInput(Concat(where, ": [covariance]: ", names, ": expected ", expected, ", got ", got));
+  };
   Matrix correlation = Matrix::Zero(n, n);
+  constexpr double kRounding = 1e-6;
   for (int i = 0; i < n; ++i) {
+    const std::string& name = twin.uncertain[static_cast<size_t>(i)];
+    if (covariance(i, i) < 0) refuse(name, "a variance of 0 or more", covariance(i, i));
     for (int j = 0; j < n; ++j) {
       const double scale = deviation(i) * deviation(j);
-      correlation(i, j) = scale > 0 ? covariance(i, j) / scale : covariance(i, j);
+      if (std::abs(covariance(i, j)) > (1 + kRounding) * scale) {
+        refuse(Concat(name, " and ", twin.uncertain[static_cast<size_t>(j)]),
+               Concat("a covariance within ", scale, ", the product of their deviations"),
+               covariance(i, j));
+      }
+      if (scale > 0) correlation(i, j) = covariance(i, j) / scale;
     }
   }
-  constexpr double kRounding = 1e-6;
   const Eigen::LDLT<Matrix> factors(correlation);
   const Eigen::VectorXd D = factors.vectorD();
-  if (covariance.diagonal().minCoeff() < 0 || D.minCoeff() < -kRounding) {
-    throw BadInput(Concat(where, ": [covariance]: expected a positive matrix, got one with ",
-                          "negative variances"));
+  if (D.minCoeff() < -kRounding) {
+    throw BadInput(Concat(where, ": [covariance]: expected a positive semidefinite matrix, got one ",
+                          "with a negative eigenvalue"));
   }
   Matrix L = factors.matrixL();
   L = factors.transpositionsP().transpose() * L;

@@ -101,9 +101,16 @@ TEST(Twin, DrawsStayWithinTheRanges) {
 
 TEST(Twin, RefusesCovariancesThatAreNone) {
   const std::string plant = "[plant]\nmass1 = 1\n[covariance]\n";
-  EXPECT_NE(MessageFor(plant + "mass1 = [-1]").find("positive"), std::string::npos);
-  EXPECT_NE(MessageFor(plant + "mass1 = [1, 2]\nmass2 = [2, 1]").find("positive"),
+  EXPECT_NE(MessageFor(plant + "mass1 = [-1]").find("mass1: expected a variance"),
             std::string::npos);
+  for (const char* rows : {"mass1 = [1, 2]\nmass2 = [2, 1]", "mass1 = [0, 1]\nmass2 = [1, 1]"}) {
+    EXPECT_NE(MessageFor(plant + rows).find("mass1 and mass2: expected a covariance within"),
+              std::string::npos);
+  }
+  // Each pair is possible, but not all three.
+  const std::string three =
+      "mass1 = [1, 0.9, 0.9]\nmass2 = [0.9, 1, -0.9]\ninertia1 = [0.9, -0.9, 1]";
+  EXPECT_NE(MessageFor(plant + three).find("positive semidefinite"), std::string::npos);
   EXPECT_NE(MessageFor(plant + "mass1 = [1, 0.5]\nmass2 = [0, 1]").find("symmetric"),
             std::string::npos);
   EXPECT_NE(MessageFor(plant + "mass1 = [1, 0]").find("list of 1"), std::string::npos);

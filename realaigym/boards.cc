@@ -102,6 +102,15 @@ Robot ParseRobot(const std::string& name, Robot usual) {
   throw BadInput(Concat("--robot: expected pendubot or acrobot, got \"", Printable(name), "\""));
 }
 
+/// The plant for which a controller of a twin's machine is designed.
+Plant DesignPlant(const Twin& twin, const std::string& robot) {
+  Plant plant = twin.plant;
+  const auto usual = static_cast<Robot>(static_cast<int>(plant.actuated_joint));
+  plant.actuated_joint = static_cast<int>(ParseRobot(robot, usual));
+  plant.coulomb1 = plant.coulomb2 = 0;
+  return plant;
+}
+
 /// Throws BadInput if a policy is for the other robot.
 void ExpectRobot(const std::string& name, Robot own, Robot asked) {
   if (own == asked) return;
@@ -139,7 +148,9 @@ std::unique_ptr<BoardController> ControllerOf(const LoadedPolicy& loaded, size_t
   return std::make_unique<PolicyController>(loaded, count);
 }
 
-Competitor GetCompetitor(const PolicyArguments& a, const std::string& robot) {
+Competitor GetCompetitor(PolicyArguments a, const std::string& robot,
+                         const std::optional<Twin>& twin) {
+  if (twin) a.plant = DesignPlant(*twin, robot);
   if (a.name == kBoardRegulator && !a.has_settings() && !fs::exists(a.name)) {
     const Robot asked = ParseRobot(robot, Robot::kPendubot);
     return {kBoardRegulator, asked,
@@ -164,14 +175,6 @@ Competitor GetCompetitor(const PolicyArguments& a, const std::string& robot) {
   ExpectRobot(loaded->name, own, ParseRobot(robot, own));
   return {loaded->name, own, [loaded](size_t) { return ControllerOf(*loaded, kBoardBlock); },
           DesignText(loaded->plant), kPolicyPeriod};
-}
-
-Plant DesignPlant(const Twin& twin, const std::string& robot) {
-  Plant plant = twin.plant;
-  const auto usual = static_cast<Robot>(static_cast<int>(plant.actuated_joint));
-  plant.actuated_joint = static_cast<int>(ParseRobot(robot, usual));
-  plant.coulomb1 = plant.coulomb2 = 0;
-  return plant;
 }
 
 std::vector<BoardEntry> PublishedEntries(Robot robot) {

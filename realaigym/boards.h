@@ -34,13 +34,11 @@ std::unique_ptr<BoardController> ControllerOf(const LoadedPolicy& loaded, size_t
 /// The name of the benchmark's regulator, which holds upright but does not swing up.
 inline constexpr const char* kBoardRegulator = "baseline-lqr";
 
-/// The competitor that the arguments name, for this robot ("": the policy's own robot). Throws
-/// BadInput.
-Competitor GetCompetitor(const PolicyArguments& a, const std::string& robot);
-/// The plant for which a controller of a twin's machine is designed, for this robot ("": the twin's
-/// own). It has no dry friction: the motors compensate most of it, and the linear model of upright
-/// cannot have it.
-Plant DesignPlant(const Twin& twin, const std::string& robot);
+/// The competitor that the arguments name, for this robot ("": the policy's own robot). A
+/// controller for a twin's machine is designed for the twin without dry friction: the motors
+/// compensate most of it, and the linear model of upright cannot have it. Throws BadInput.
+Competitor GetCompetitor(PolicyArguments a, const std::string& robot,
+                         const std::optional<Twin>& twin = {});
 
 /// Loads a policy that a search wrote. Throws BadInput.
 SwingPolicy LoadSwingPolicy(const std::filesystem::path& path);

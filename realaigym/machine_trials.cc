@@ -55,6 +55,7 @@ BoardEpisode EpisodeOf(const Twin& machine) {
   episode.body = BodyOf(machine);
   episode.body->f1 *= 1 - kCompensated;
   episode.body->f2 *= 1 - kCompensated;
+  episode.angle_range = machine.sensors.angle_range;
   episode.response = 1 - std::exp(-kBoardTimestep / std::max(machine.actuator.lag, 1e-5));
   return episode;
 }
@@ -103,6 +104,7 @@ HardwareReport RunTrials(const Twin& twin, Robot robot, const TrialController& m
     LoopRun run;
     run.seconds = kBoardSteps * kBoardTimestep;
     run.actuated_joint = static_cast<int>(robot);
+    run.largest_angle = machine.sensors.angle_range;
     run.largest_velocity = rules.largest_velocity;
     if (rules.pushes) {
       run.push = rules.push_of ? rules.push_of(i) : PushTorques(HardwarePushes(robot, rng), robot);

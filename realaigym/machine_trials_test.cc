@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <memory>
 #include <numbers>
@@ -115,6 +116,25 @@ TEST(SwingNet, EstimatedVelocitiesCountLikeDifferencesOfAngles) {
   EXPECT_GT(std::abs(a[0] - b[0]), 0.01);
 }
 
+TEST(SwingNet, AMirroringNetworkControlsTheMirrorImageBeyondUpright) {
+  const SwingNet net(Robot::kPendubot, 8), mirroring(Robot::kPendubot, 8, true);
+  const std::vector<double> numbers = net.Initial(1);
+  const auto torque = [&](const SwingNet& of, double q1, double sign) {
+    Lanes torques{};
+    BoardMeasurement measured{};
+    measured.SetFirst({sign * q1, sign * 0.8, sign * 2, -sign * 3}, true);
+    of.Control(numbers)->Act(0, measured, kBoardBlock, torques);
+    return torques[0];
+  };
+  for (const double q1 : {0.3, -2.8, 3.1}) EXPECT_EQ(torque(mirroring, q1, 1), torque(net, q1, 1));
+  for (const double q1 : {3.2, 5.0, -7.0}) {
+    EXPECT_EQ(torque(mirroring, q1, 1), -torque(net, q1, -1));
+    EXPECT_NE(torque(mirroring, q1, 1), torque(net, q1, 1));
+  }
+  EXPECT_TRUE(ReadSwingPolicy(mirroring.ToTensors(numbers)).net.mirrors());
+  EXPECT_FALSE(ReadSwingPolicy(net.ToTensors(numbers)).net.mirrors());
+}
+
 TEST(RunTrials, ARegulatorHoldsOnlyFromUprightAndDoesNotSwingUp) {
   Twin twin = SomeMachine();
   const TrialController idle = []() -> CycleController {
@@ -125,6 +145,21 @@ TEST(RunTrials, ARegulatorHoldsOnlyFromUprightAndDoesNotSwingUp) {
   ASSERT_EQ(report.runs.size(), 4u);
   EXPECT_EQ(report.successes(), 0);
   EXPECT_TRUE(report.pushed);
+}
+
+TEST(RunTrials, EndWhereAnEncoderSaturates) {
+  Twin twin = SomeMachine();
+  const auto seconds = [&](double range) {
+    twin.sensors.angle_range = range;
+    const TrialController whirl = []() -> CycleController {
+      return [](const CycleInput&) { return Joints{5, 0}; };
+    };
+    const TrialRules rules{.count = 1, .pushes = false, .largest_velocity = 1e9};
+    return RunTrials(twin, Robot::kPendubot, whirl, rules, nullptr).runs.front().seconds;
+  };
+  EXPECT_LT(seconds(6), seconds(12.5));
+  EXPECT_LT(seconds(12.5), 2);
+  EXPECT_GT(seconds(1e6), 9.9);
 }
 
 TEST(RunTrials, SameSeedSameRunsForAnyNumberOfThreads) {
@@ -171,6 +206,22 @@ TEST(PublishedTvlqr, SwingsUpTheTwinLikeTheMachine) {
   const HardwareReport report = RunTvlqrTrials(twin, Robot::kAcrobot, law, logs, rules, nullptr);
   EXPECT_GE(report.successes(), 17);
   EXPECT_NEAR(report.mean(), 0.587, 0.08);  // the published mean of ten real runs
+
+  // With the pushes of each real run, the twin does what the machine did.
+  std::vector<MachineLog> pushed;
+  for (int run = 1; run <= 5; ++run) {
+    const auto file = RealData() / "C.1" / Concat("pushed/acrobot-tvlqr-0", run, ".csv.gz");
+    pushed.push_back(ReadLog(file).front());
+  }
+  const auto real = ScoreHardware(pushed, Robot::kAcrobot).runs;
+  constexpr int kEach = 4;
+  const TrialRules each{.count = kEach * 5};
+  const auto runs = RunTvlqrTrials(twin, Robot::kAcrobot, law, pushed, each, nullptr).runs;
+  std::array<int, 5> successes{};
+  for (size_t i = 0; i < runs.size(); ++i) successes[i % 5] += runs[i].outcome.above_line ? 1 : 0;
+  for (size_t k = 0; k < 5; ++k) {
+    EXPECT_EQ(successes[k], real[k].outcome.above_line ? kEach : 0) << real[k].name;
+  }
 }
 
 }  // namespace

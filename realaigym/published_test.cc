@@ -184,6 +184,14 @@ TEST(RealAiGymPublished, TvlqrHasItsPublishedScores) {
   EXPECT_NEAR(o.max_torque, 1.77, 0.007);
   EXPECT_NEAR(PerformanceScore(o), 0.526, 0.0006);
 
+  // An encoder that ends before upright loses the run.
+  std::array<BoardEpisode, 1> narrow;
+  narrow[0].angle_range = 3;
+  const BoardOutcome lost = SimulateOnBoard(Robot::kPendubot, narrow, make, nullptr).front();
+  EXPECT_TRUE(o.above_line && o.at_goal && o.held > 0.9);
+  EXPECT_FALSE(lost.above_line || lost.at_goal || lost.held > 0);
+  EXPECT_EQ(lost.energy, o.energy);
+
   const std::vector<RobustnessCase> cases = RobustnessCases(1);
   std::vector<BoardEpisode> episodes;
   episodes.reserve(cases.size());

@@ -15,8 +15,9 @@ namespace {
 
 constexpr double kGridStep = 0.002;  // of the reference, s
 
-// Published settings of the runs (experiments/design_C.1/tvlqr_*.py of the benchmark): friction
-// compensation c atan(100 w) + d w, low-pass and dead zone of the velocities.
+// Published settings of the runs (experiments/design_C.1/tvlqr_*.py of the benchmark): limits of the
+// law's torques, friction compensation c atan(100 w) + d w, low-pass and dead zone of the velocities.
+constexpr double kMotorLimit = 5, kPassiveLimit = 0.5;  // N·m
 constexpr double kComp1 = 0.16, kComp2 = 0.12;  // N·m
 constexpr double kCompDamping = 0.001;          // N·m·s/rad
 constexpr MachineSensors kFilter{.velocity_share = 0.2, .velocity_dead_zone = 0.1};
@@ -161,14 +162,20 @@ void PublishedTvlqr::Linearise() {
 }
 
 Eigen::Vector2d PublishedTvlqr::Torque(double time, const State& x, bool upright) const {
+  Eigen::Vector2d limit(kPassiveLimit, kPassiveLimit);
+  limit(static_cast<int>(robot_) - 1) = kMotorLimit;
+  const auto limited = [&](const Eigen::Vector2d& u) -> Eigen::Vector2d {
+    return u.cwiseMin(limit).cwiseMax(-limit);
+  };
   if (upright) {
-    return -regulator_ * State(Wrapped(x(0) - std::numbers::pi), Wrapped(x(1)), x(2), x(3));
+    return limited(-regulator_ *
+                   State(Wrapped(x(0) - std::numbers::pi), Wrapped(x(1)), x(2), x(3)));
   }
   const double place = std::clamp(time / kGridStep, 0.0, static_cast<double>(x_.size()) - 1 - 1e-9);
   const auto k = static_cast<size_t>(place);
   const double share = place - static_cast<double>(k);
   const State reference = x_[k] + share * (x_[k + 1] - x_[k]);
-  return u_[k] + share * (u_[k + 1] - u_[k]) - K_[k] * (x - reference);
+  return limited(u_[k] + share * (u_[k + 1] - u_[k]) - K_[k] * (x - reference));
 }
 
 bool PublishedTvlqr::Catches(double time, const State& x) const {

@@ -31,7 +31,8 @@ class PublishedTvlqr {
   using State = Eigen::Vector4d;
   using Gain = Eigen::Matrix<double, 2, 4>;
 
-  /// The torques without friction compensation; `upright`: whether the regulator holds.
+  /// The torques within the law's limits, to which friction compensation is added. `upright`:
+  /// whether the regulator holds.
   Eigen::Vector2d Torque(double time, const State& x, bool upright) const;
   bool Catches(double time, const State& x) const;
   void Linearise();

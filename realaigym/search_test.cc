@@ -119,6 +119,7 @@ TEST(SwingNet, WhatIsNoPolicyIsRefused) {
   };
   refuses("format_version", "1");
   refuses("robot", "cartpole");
+  refuses("mirrors", "false");
   for (const char* hidden : {"7", "2", "34", "-8", "1e9", "x", "10"}) refuses("hidden", hidden);
   std::vector<double> numbers = net.Initial(1);
   numbers[3] = std::nan("");

@@ -31,6 +31,7 @@ struct Sums {
   Lanes change{}, changes_squared{};  // of the torque
   Lanes last_below;                   // last step below the line
   Lanes nearest{}, held{};
+  Lanes largest_angle{};  // measured, rad
 };
 
 /// A push of a simulation, active after step `first` up to step `last`.
@@ -81,6 +82,7 @@ class Run {
       controller.Act(step, Measure(step), episodes_.size(), wanted_);
       Drive(step);
       if (trace != nullptr) trace->push_back({step * kBoardTimestep, StateOf(0), torque_[0]});
+      NoteAngles();
       if (step % kNoted == 0) NoteNearness(step);
       if (step < steps_ - 1) NoteVelocities();
       Advance(block_, 1, 0, kBoardBlock, kBoardTimestep);
@@ -157,6 +159,14 @@ class Run {
     block_.w2[lane] += impulse * (first ? -M.M12 : M.M11);
   }
 
+  void NoteAngles() {
+    for (size_t i = 0; i < kBoardBlock; ++i) {
+      const double a1 = std::abs(seen_.q1[i]), a2 = std::abs(seen_.q2[i]);
+      const double larger = a1 > a2 ? a1 : a2;
+      sums_.largest_angle[i] = sums_.largest_angle[i] > larger ? sums_.largest_angle[i] : larger;
+    }
+  }
+
   void NoteNearness(int step) {
     const bool holds = step >= steps_ - kHeldSteps;
     for (size_t lane = 0; lane < episodes_.size(); ++lane) {
@@ -211,6 +221,10 @@ class Run {
     o.swing_up_seconds = std::min(first, steps_ - 1) * kBoardTimestep;
     const BoardState end = StateOf(lane);
     o.at_goal = AtGoal(end);
+    if (sums_.largest_angle[lane] >= episodes_[lane].angle_range) {
+      o.above_line = o.at_goal = false;
+      o.held = 0;
+    }
     // A simulation that has blown up gets the worst outcome.
     const auto [q1, q2, w1, w2] = end;
     if (!std::isfinite(q1 + q2 + w1 + w2 + o.energy + o.velocity_cost)) {

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numbers>
 
 #include "core/error.h"
 #include "core/rng.h"
@@ -13,6 +15,7 @@ namespace {
 
 constexpr const char* kFormat = "upswing-realaigym";
 constexpr int kVersion = 2;
+constexpr const char* kMirrors = "mirrors";
 constexpr int kLeastHidden = 4;
 constexpr double kMostExponent = 50, kMostWeight = 1e6;  // limits of numbers in files
 
@@ -43,7 +46,8 @@ class SwingController : public BoardController {
 
 }  // namespace
 
-SwingNet::SwingNet(Robot robot, int hidden) : robot_(robot), hidden_(hidden) {
+SwingNet::SwingNet(Robot robot, int hidden, bool mirrors)
+    : robot_(robot), hidden_(hidden), mirrors_(mirrors) {
   const Lqr regulator = SolveBoardLqr(robot, {1, 1, 0.1, 0.1}, 1);
   for (size_t i = 0; i < 4; ++i) {
     K_[i] = regulator.K[static_cast<Eigen::Index>(i)];
@@ -70,6 +74,7 @@ std::unique_ptr<BoardController> SwingNet::Control(std::span<const std::span<con
   block.hidden = hidden_;
   block.lanes_each = lanes_each;
   block.P = P_;
+  block.mirrored_beyond = mirrors_ ? std::numbers::pi : std::numeric_limits<double>::infinity();
   const size_t W = SwingWeights(hidden_), policies = kBoardBlock / lanes_each;
   block.weights.resize(W * policies);
   for (size_t k = 0; k < policies; ++k) {
@@ -98,6 +103,7 @@ Tensors SwingNet::ToTensors(std::span<const double> numbers) const {
   tensors.metadata["format_version"] = std::to_string(kVersion);
   tensors.metadata["robot"] = NameOf(robot_);
   tensors.metadata["hidden"] = std::to_string(hidden_);
+  if (mirrors_) tensors.metadata[kMirrors] = "true";
   tensors.AddCopy("numbers", numbers);
   return tensors;
 }
@@ -122,7 +128,9 @@ SwingPolicy ReadSwingPolicy(const Tensors& tensors) {
     throw expect("hidden",
                  Concat("an even number in [", kLeastHidden, ", ", kSwingMostHidden, "]"));
   }
-  SwingPolicy policy{{*robot, static_cast<int>(*hidden)}, {}};
+  const bool mirrors = tensors.metadata.contains(kMirrors);
+  if (mirrors && tensors.Metadata(kMirrors) != "true") throw expect(kMirrors, "true or no such key");
+  SwingPolicy policy{{*robot, static_cast<int>(*hidden), mirrors}, {}};
   policy.numbers.resize(policy.net.size());
   tensors.Read("numbers", std::span(policy.numbers), {static_cast<int64_t>(policy.net.size())});
   for (size_t i = 0; i < policy.numbers.size(); ++i) {

@@ -16,16 +16,21 @@ namespace upswing {
 /// x is the deviation from upright. The velocities come from the last measured angles, which have
 /// no noise on the board: w = (3 q - 4 q' + q'')/(2 h).
 ///
+/// A network that mirrors controls the mirror image of the pendulum where |q1| > π. After a fall
+/// past upright it swings back, so links do not turn further and further: a machine's encoders have
+/// a range.
+///
 /// All parameters form one vector, so that they can be searched (search.h).
 class SwingNet {
  public:
   /// Number of parameters before the network's: K (4), log ρ, sharpness of the blend.
   static constexpr int kLinear = 6;
 
-  SwingNet(Robot robot, int hidden);
+  SwingNet(Robot robot, int hidden, bool mirrors = false);
 
   int hidden() const { return hidden_; }
   Robot robot() const { return robot_; }
+  bool mirrors() const { return mirrors_; }
   /// Number of parameters.
   size_t size() const;
   /// Initial parameters of a search: the regulator of the nominal plant, and a random network.
@@ -39,13 +44,14 @@ class SwingNet {
   std::unique_ptr<BoardController> Control(std::span<const std::span<const double>> numbers,
                                            size_t lanes_each) const;
 
-  /// The file's tensors. Metadata: `format` upswing-realaigym, `format_version`, `robot` and
-  /// `hidden`. Tensor: `numbers`, F64 (size).
+  /// The file's tensors. Metadata: `format` upswing-realaigym, `format_version`, `robot`, `hidden`,
+  /// and `mirrors` if it does. Tensor: `numbers`, F64 (size).
   Tensors ToTensors(std::span<const double> numbers) const;
 
  private:
   Robot robot_;
   int hidden_;
+  bool mirrors_;
   std::array<double, 4> K_;   // initial gain of a search
   std::array<double, 16> P_;  // (4 × 4), of the initial regulator
 };
