@@ -32,7 +32,7 @@ MpcPolicy::MpcPolicy(LqrConfig lqr, MpcConfig config, const Plant& plant)
     : PendulumController("mpc", OptionsOfAll(lqr, config), plant),
       config_(config),
       lqr_(SolveLqr(lqr, plant)),
-      cost_(WeightsOf(lqr), lqr.torque, lqr_.P) {}
+      cost_(WeightsOf(lqr), lqr.torque, lqr_.P, config.angle_range) {}
 
 std::string MpcPolicy::description() const {
   return Concat("model predictive control, ", Rounded(config_.seconds), " s ahead, ",
@@ -51,6 +51,7 @@ double MpcPolicy::Torque(const StateVector& deviation, size_t env, Memory& memor
   StateVector x = FromUpright(deviation);
   const bool first = trajectory.u.empty();
   if (first) {
+    x[0] = Wrapped(x[0]);  // hanging is 0
     trajectory = optimizer.Follow(cost_, x, std::vector<double>(T, 0.0));
   } else {
     // Shift the plan by one step; the regulator chooses the new last torque.
@@ -73,7 +74,10 @@ double MpcPolicy::Torque(const StateVector& deviation, size_t env, Memory& memor
   optimizer.Improve(cost_, first ? kTolerance : 0,
                     first ? kFirstIterations : static_cast<int>(config_.iterations), trajectory);
   K = optimizer.gains();
-  return trajectory.u[0];
+  // A fall may be faster than a few iterations can plan. The torque that accelerates the motor's
+  // joint fades out, and beyond the velocity it brakes.
+  const double w = x[plant().actuated_joint == 1 ? 2 : 3], u = trajectory.u[0];
+  return u * w > 0 ? u * std::clamp(3 * (1 - std::abs(w) / config_.velocity), -1.0, 1.0) : u;
 }
 
 }  // namespace upswing

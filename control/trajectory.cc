@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "control/controller.h"
 
@@ -19,15 +20,31 @@ double Form(const Eigen::Matrix4d& Q, const StateVector& x) { return x.dot(Q * x
 
 }  // namespace
 
-double QuadraticCost::Running(const StateVector& x, double u) const {
-  return Form(Q_, UprightDeviation(x)) + R_ * u * u;
+QuadraticCost::QuadraticCost(const Eigen::Matrix4d& Q, double R, const Eigen::Matrix4d& P,
+                             double angle_range)
+    : Q_(Q), R_(R), P_(P) {
+  constexpr double kTurn = 2 * std::numbers::pi;
+  largest1_ = (std::floor(angle_range / kTurn - 0.5) + 0.5) * kTurn;
+  largest2_ = std::floor(angle_range / kTurn) * kTurn;
 }
 
-double QuadraticCost::Final(const StateVector& x) const { return Form(P_, UprightDeviation(x)); }
+StateVector QuadraticCost::Deviation(const StateVector& x) const {
+  StateVector d = UprightDeviation(x);
+  const double upright1 = x[0] - d[0], upright2 = x[1] - d[1];
+  d[0] += upright1 - std::clamp(upright1, -largest1_, largest1_);
+  d[1] += upright2 - std::clamp(upright2, -largest2_, largest2_);
+  return d;
+}
+
+double QuadraticCost::Running(const StateVector& x, double u) const {
+  return Form(Q_, Deviation(x)) + R_ * u * u;
+}
+
+double QuadraticCost::Final(const StateVector& x) const { return Form(P_, Deviation(x)); }
 
 CostExpansion QuadraticCost::ExpandRunning(const StateVector& x, double u) const {
   CostExpansion l;
-  l.x = 2 * Q_ * UprightDeviation(x);
+  l.x = 2 * Q_ * Deviation(x);
   l.u = 2 * R_ * u;
   l.xx = 2 * Q_;
   l.uu = 2 * R_;
@@ -36,7 +53,7 @@ CostExpansion QuadraticCost::ExpandRunning(const StateVector& x, double u) const
 
 CostExpansion QuadraticCost::ExpandFinal(const StateVector& x) const {
   CostExpansion l;
-  l.x = 2 * P_ * UprightDeviation(x);
+  l.x = 2 * P_ * Deviation(x);
   l.xx = 2 * P_;
   return l;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -41,12 +42,12 @@ class TrajectoryCost {
   virtual CostExpansion ExpandFinal(const StateVector& x) const = 0;
 };
 
-/// The cost d' Q d + R u² of each step and d' P d at the end, where d is the deviation from upright
-/// with angles in [-π, π].
+/// The cost d' Q d + R u² of each step and d' P d at the end, where d is the deviation from the
+/// nearest upright whose angles, with their full turns, are within `angle_range` (rad, at least π).
 class QuadraticCost : public TrajectoryCost {
  public:
-  QuadraticCost(const Eigen::Matrix4d& Q, double R, const Eigen::Matrix4d& P)
-      : Q_(Q), R_(R), P_(P) {}
+  QuadraticCost(const Eigen::Matrix4d& Q, double R, const Eigen::Matrix4d& P,
+                double angle_range = std::numeric_limits<double>::infinity());
 
   double Running(const StateVector& x, double u) const override;
   double Final(const StateVector& x) const override;
@@ -54,9 +55,12 @@ class QuadraticCost : public TrajectoryCost {
   CostExpansion ExpandFinal(const StateVector& x) const override;
 
  private:
+  StateVector Deviation(const StateVector& x) const;
+
   Eigen::Matrix4d Q_;
   double R_;
   Eigen::Matrix4d P_;
+  double largest1_, largest2_;  // angles of an upright within the range, rad
 };
 
 /// Finds locally best torques within the plant's limit. It keeps its buffers, so one object serves

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 #include "control/lqr.h"
@@ -31,6 +32,33 @@ TEST(Trajectory, EqualsSciPyWhereThePendulumIsLinear) {
     for (size_t t = 0; t < expected.size(); ++t) {
       EXPECT_NEAR(trajectory.u[t], expected[t], 1e-3 * 1e-3) << "step " << t;
     }
+  }
+}
+
+TEST(QuadraticCost, CountsGoalsWithinTheRange) {
+  constexpr double kPi = std::numbers::pi;
+  const Eigen::Matrix4d Q = Eigen::Vector4d(1, 2, 0, 0).asDiagonal();
+  const auto cost = [&](double range, double q1, double q2) {
+    const QuadraticCost quadratic(Q, 1, 3 * Q, range);
+    const StateVector x(q1, q2, 0, 0);
+    const double running = quadratic.Running(x, 0);
+    EXPECT_NEAR(quadratic.Final(x), 3 * running, 1e-9);
+    // The expansion's slope against differences.
+    constexpr double kStep = 1e-6;
+    const StateVector step(kStep, 0.5 * kStep, 0, 0);
+    const double slope = (quadratic.Running(x + step, 0) - quadratic.Running(x - step, 0)) / 2;
+    EXPECT_NEAR(quadratic.ExpandRunning(x, 0).x.dot(step), slope, 1e-9);
+    EXPECT_NEAR(quadratic.ExpandFinal(x).x.dot(step), 3 * slope, 1e-9);
+    return running;
+  };
+  const auto square = [](double x) { return x * x; };
+  for (const double sign : {1.0, -1.0}) {
+    EXPECT_NEAR(cost(1e6, sign * 3.1 * kPi, sign * 4 * kPi), square(0.1 * kPi), 1e-9);
+    EXPECT_NEAR(cost(12.5, sign * 3.1 * kPi, sign * 4 * kPi),
+                square(0.1 * kPi) + 2 * square(2 * kPi), 1e-9);
+    EXPECT_NEAR(cost(4, sign * 3.1 * kPi, sign * 2 * kPi), square(2.1 * kPi) + 2 * square(2 * kPi),
+                1e-9);
+    EXPECT_NEAR(cost(4, sign * 0.9 * kPi, sign * 0.2), square(0.1 * kPi) + 2 * square(0.2), 1e-9);
   }
 }
 

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
+
 #include "control/hybrid.h"
 #include "control/mpc.h"
 #include "control/swing_up.h"
@@ -80,6 +83,58 @@ TEST(Mpc, UprightItIsTheRegulator) {
   const StateVector start = FromUpright({0.0004, 0.0002, 0, 0.001});
   const auto one = Simulate(mpc, start, 2, plant), other = Simulate(lqr, start, 2, plant);
   for (size_t t = 0; t < one.size(); ++t) EXPECT_LT((one[t] - other[t]).norm(), 2e-5);
+}
+
+TEST(Mpc, SwingsBackToAGoalWithinTheRange) {
+  const Plant plant;
+  const auto turned = [&](double angle_range) {
+    MpcConfig config;
+    config.angle_range = angle_range;
+    const MpcPolicy policy(LqrConfig(), config, plant);
+    // Link 1 passes upright.
+    const auto d = Simulate(policy, {2, 0, 9, 0}, 8, plant);
+    EXPECT_LT(d.back().norm(), 1e-3);
+    double sum = d[0][0];
+    for (size_t t = 1; t < d.size(); ++t) sum += Wrapped(d[t][0] - d[t - 1][0]);
+    return sum / (2 * std::numbers::pi);
+  };
+  EXPECT_GT(turned(MpcConfig().angle_range), 0.9);
+  EXPECT_NEAR(turned(4), 0, 1e-3);
+}
+
+TEST(Mpc, BrakesAFastJoint) {
+  for (const double joint : {1, 2}) {
+    Plant plant;
+    plant.actuated_joint = joint;
+    const size_t w = joint == 1 ? 2 : 3;
+    Rng rng(4, "states");
+    int accelerates = 0;
+    for (int trial = 0; trial < 10; ++trial) {
+      StateVector x;
+      for (double& number : x) number = rng.Uniform(-3, 3);
+      x[w] = trial % 2 == 0 ? 6 : -6;
+      const auto torque = [&](double velocity) {
+        MpcConfig config;
+        config.velocity = velocity;
+        const MpcPolicy policy(LqrConfig(), config, plant);
+        const auto obs = Observe(plant, {x[0], x[1], x[2], x[3]});
+        double u = 0;
+        policy.Act(Matrix<const float>(obs, 1, kObservationSize), Matrix<double>(&u, 1, 1),
+                   *policy.Start(1));
+        return u;
+      };
+      const double free = torque(MpcConfig().velocity);
+      if (free * x[w] <= 0) {
+        EXPECT_EQ(torque(4), free);
+        continue;
+      }
+      ++accelerates;
+      EXPECT_NEAR(torque(6), 0, 1e-3 * std::abs(free));
+      EXPECT_NEAR(torque(4), -free, 1e-9);
+      EXPECT_NEAR(torque(9.1), free, 1e-9);
+    }
+    EXPECT_GE(accelerates, 3) << joint;
+  }
 }
 
 TEST(Hybrid, CatchesWhatALawBringsUp) {

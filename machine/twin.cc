@@ -44,7 +44,8 @@ Matrix Factor(const Twin& twin, const std::string& where) {
   // Scaled to ones on the diagonal, so that the test does not depend on units.
   const Eigen::VectorXd deviation = covariance.diagonal().cwiseMax(0).cwiseSqrt();
   const auto refuse = [&](const std::string& names, const std::string& expected, double got) {
-    throw BadInput(Concat(where, ": [covariance]: ", names, ": expected ", expected, ", got ", got));
+    throw BadInput(
+        Concat(where, ": [covariance]: ", names, ": expected ", expected, ", got ", got));
   };
   Matrix correlation = Matrix::Zero(n, n);
   constexpr double kRounding = 1e-6;
@@ -64,7 +65,8 @@ Matrix Factor(const Twin& twin, const std::string& where) {
   const Eigen::LDLT<Matrix> factors(correlation);
   const Eigen::VectorXd D = factors.vectorD();
   if (D.minCoeff() < -kRounding) {
-    throw BadInput(Concat(where, ": [covariance]: expected a positive semidefinite matrix, got one ",
+    throw BadInput(Concat(where,
+                          ": [covariance]: expected a positive semidefinite matrix, got one ",
                           "with a negative eigenvalue"));
   }
   Matrix L = factors.matrixL();

@@ -15,11 +15,12 @@ namespace {
 
 constexpr double kGridStep = 0.002;  // of the reference, s
 
-// Published settings of the runs (experiments/design_C.1/tvlqr_*.py of the benchmark): limits of the
-// law's torques, friction compensation c atan(100 w) + d w, low-pass and dead zone of the velocities.
+// Published settings of the runs (experiments/design_C.1/tvlqr_*.py of the benchmark): limits of
+// the law's torques, friction compensation c atan(100 w) + d w, low-pass and dead zone of the
+// velocities.
 constexpr double kMotorLimit = 5, kPassiveLimit = 0.5;  // N·m
-constexpr double kComp1 = 0.16, kComp2 = 0.12;  // N·m
-constexpr double kCompDamping = 0.001;          // N·m·s/rad
+constexpr double kComp1 = 0.16, kComp2 = 0.12;          // N·m
+constexpr double kCompDamping = 0.001;                  // N·m·s/rad
 constexpr MachineSensors kFilter{.velocity_share = 0.2, .velocity_dead_zone = 0.1};
 // The regulator takes over at the end of the reference within these angles and velocities. The real
 // switch, an ellipsoid, needs the reference beyond the first switch, which the logs do not show.

@@ -135,11 +135,12 @@ void ActOnBlock(SwingBlock& block, const BoardMeasurement& measured, Lanes& torq
     const V v1 = Velocity(block.q1, q1, i), v2 = Velocity(block.q2, q2, i);
     const auto [sine1, c1] = SineCosineOf(q1);
     const auto [sine2, c2] = SineCosineOf(q2);
-    const V mirror = hn::IfThenElse(hn::Abs(q1) > Constant(block.mirrored_beyond), Constant(-1),
-                                    Constant(1));
+    const V mirror =
+        hn::IfThenElse(hn::Abs(q1) > Constant(block.mirrored_beyond), Constant(-1), Constant(1));
     const V s1 = mirror * sine1, s2 = mirror * sine2, scale = mirror * Constant(0.1);
-    const V in[kSwingInputs] = {s1, c1, MulAdd(s1, c2, c1 * s2), NegMulAdd(s1, s2, c1 * c2),
-                                s2, c2, scale * v1,              scale * v2};
+    const V in[kSwingInputs] = {
+        s1,         c1,        MulAdd(s1, c2, c1 * s2), NegMulAdd(s1, s2, c1 * c2), s2, c2,
+        scale * v1, scale * v2};
     for (int j = 0; j < kSwingInputs; ++j) {
       hn::Store(hn::DemoteTo(halves, in[j]), halves, a.in[j] + i);
     }

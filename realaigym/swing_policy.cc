@@ -129,7 +129,8 @@ SwingPolicy ReadSwingPolicy(const Tensors& tensors) {
                  Concat("an even number in [", kLeastHidden, ", ", kSwingMostHidden, "]"));
   }
   const bool mirrors = tensors.metadata.contains(kMirrors);
-  if (mirrors && tensors.Metadata(kMirrors) != "true") throw expect(kMirrors, "true or no such key");
+  if (mirrors && tensors.Metadata(kMirrors) != "true")
+    throw expect(kMirrors, "true or no such key");
   SwingPolicy policy{{*robot, static_cast<int>(*hidden), mirrors}, {}};
   policy.numbers.resize(policy.net.size());
   tensors.Read("numbers", std::span(policy.numbers), {static_cast<int64_t>(policy.net.size())});
