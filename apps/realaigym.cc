@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <functional>
 #include <optional>
 #include <span>
@@ -155,26 +156,36 @@ void PrintHardware(const HardwareReport& report) {
   }
 }
 
-/// The twin's share of successes with the pushes of each run. Trials take the runs in turn; runs
-/// without a trial are left out.
-std::vector<double> SharesOfRuns(const HardwareReport& trials, size_t runs) {
-  runs = std::min(runs, trials.runs.size());
-  std::vector<double> successes(runs), counts(runs);
+/// Successes of the twin's machines with the pushes of one run.
+struct SuccessesOfRun {
+  int successes = 0, machines = 0;
+};
+
+/// Splits trials, which take the pushes of `runs` runs in turn.
+std::vector<SuccessesOfRun> SplitByRun(const HardwareReport& trials, size_t runs) {
+  std::vector<SuccessesOfRun> split(runs);
   for (size_t i = 0; i < trials.runs.size(); ++i) {
-    if (trials.runs[i].outcome.above_line) ++successes[i % runs];
-    ++counts[i % runs];
+    auto& [successes, machines] = split[i % runs];
+    if (trials.runs[i].outcome.above_line) ++successes;
+    ++machines;
   }
-  for (size_t k = 0; k < runs; ++k) successes[k] /= counts[k];
-  return successes;
+  return split;
 }
 
 /// Runs the TVLQR of the logs on a twin, and compares successes.
 int CompareTvlqr(const RealAiGymArguments& a, std::span<const MachineLog> logs,
                  const HardwareReport& real) {
+  if (a.no_pushes) throw BadInput("--no-pushes: expected no --hardware with it, whose logs decide");
+  if (real.pushed && a.law.empty()) {
+    throw BadInput("--law: expected runs without pushes to rebuild the TVLQR from, got none");
+  }
   const Twin twin = ReadTwin(a.twin, "--twin");
   std::vector<MachineLog> of_law;
   for (const std::string& file : a.law.empty() ? a.hardware : a.law) {
     for (MachineLog& log : ReadLog(file)) of_law.push_back(std::move(log));
+  }
+  if (ScoreHardware(of_law, {}).robot != real.robot) {
+    throw BadInput(Concat("--law: expected runs of the ", NameOf(real.robot), ", got others"));
   }
   const PublishedTvlqr law(of_law, real.robot);
   std::vector<double> misfits;
@@ -193,8 +204,8 @@ int CompareTvlqr(const RealAiGymArguments& a, std::span<const MachineLog> logs,
   }
   const Interval interval = WilsonInterval(successes, runs);
   const double share = report.successes() / static_cast<double>(a.draws);
-  const std::vector<double> shares =
-      real.pushed ? SharesOfRuns(report, real.runs.size()) : std::vector<double>();
+  const std::vector<SuccessesOfRun> split =
+      real.pushed ? SplitByRun(report, real.runs.size()) : std::vector<SuccessesOfRun>();
   if (a.as_json) {
     nlohmann::ordered_json json{{"robot", NameOf(real.robot)},
                                 {"pushed", real.pushed},
@@ -204,10 +215,11 @@ int CompareTvlqr(const RealAiGymArguments& a, std::span<const MachineLog> logs,
                                 {"real_interval", {interval.low, interval.high}},
                                 {"twin", share},
                                 {"mean_score", report.mean()}};
-    for (size_t k = 0; k < shares.size(); ++k) {
-      const HardwareRun& run = real.runs[k];
-      json["runs"].push_back(
-          {{"name", run.name}, {"success", run.outcome.above_line}, {"twin", shares[k]}});
+    for (size_t k = 0; k < split.size(); ++k) {
+      json["runs"].push_back({{"name", real.runs[k].name},
+                              {"swung_up", real.runs[k].outcome.above_line},
+                              {"twin_successes", split[k].successes},
+                              {"twin_machines", split[k].machines}});
     }
     fmt::print("{}\n", PrintableJson(json));
     return 0;
@@ -219,10 +231,12 @@ int CompareTvlqr(const RealAiGymArguments& a, std::span<const MachineLog> logs,
       NameOf(real.robot), real.pushed ? ", pushed" : "", Counted(of_law.size(), "run"),
       Median(misfits), successes, runs, 100 * interval.low, 100 * interval.high,
       Printable(twin.name), 100 * share, Counted(a.draws, "machine"), report.mean());
-  for (size_t k = 0; k < shares.size(); ++k) {
-    const HardwareRun& run = real.runs[k];
-    fmt::print("  with the pushes of {}, which {}: {:.1f}%\n", Printable(run.name),
-               run.outcome.above_line ? "succeeds" : "fails", 100 * shares[k]);
+  if (!split.empty()) fmt::print("  with the pushes of a run {:>17} {:>14}\n", "real", "twin");
+  for (size_t k = 0; k < split.size(); ++k) {
+    const std::string name = std::filesystem::path(real.runs[k].name).filename().string();
+    fmt::print("    {:<32} {:>8} {:>14}\n", Shortened(Printable(name), 32),
+               real.runs[k].outcome.above_line ? "succeeds" : "fails",
+               fmt::format("{} of {}", split[k].successes, split[k].machines));
   }
   return 0;
 }
@@ -395,11 +409,13 @@ void AddRealAiGym(CommandLine& line) {
       "pushes; each score is the share of simulations that end upright. A policy with a\n"
       "longer control period keeps its period. These results are simulated.\n\n"
       "--hardware scores logs of the real robot. The joint with more torque has the motor,\n"
-      "unless --robot names the robot. A log with tau_pert belongs to the board with pushes.\n\n"
+      "unless --robot names the robot. A log with tau_pert belongs to the board with pushes.\n"
+      "With --twin, the TVLQR of these runs also runs on machines drawn from the twin.\n\n"
       "--twin designs a controller for the twin without dry friction; --made-for changes this\n"
       "plant. The motors compensate " +
       fmt::format("{:.0f}%", 100 * kCompensated) +
-      " of the estimated dry friction.\n\n"
+      " of the estimated dry friction.\n"
+      "A policy of --search --twin mirrors: beyond upright, |q1| > 180°, it swings back.\n\n"
       "Examples:\n"
       "  ./upswing realaigym --search pendubot.safetensors         takes some minutes\n"
       "  ./upswing realaigym pendubot.safetensors --figure rows.svg\n"

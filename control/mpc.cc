@@ -65,7 +65,8 @@ double MpcPolicy::Torque(const StateVector& deviation, size_t env, Memory& memor
     x = trajectory.x[0] + Difference(x, trajectory.x[0]);
     trajectory = optimizer.Follow(cost_, x, trajectory, K);
   }
-  // Take the regulator's own trajectory if it costs less.
+  // Take the regulator's own trajectory if it costs less. It holds the nearest upright, also one
+  // that is no goal; then its cost is large.
   const Trajectory upright{std::vector<StateVector>(T + 1, x - UprightDeviation(x)),
                            std::vector<double>(T, 0.0), 0};
   Trajectory regulated =
@@ -74,8 +75,8 @@ double MpcPolicy::Torque(const StateVector& deviation, size_t env, Memory& memor
   optimizer.Improve(cost_, first ? kTolerance : 0,
                     first ? kFirstIterations : static_cast<int>(config_.iterations), trajectory);
   K = optimizer.gains();
-  // A fall may be faster than a few iterations can plan. The torque that accelerates the motor's
-  // joint fades out, and beyond the velocity it brakes.
+  // A fall may be faster than a few iterations can plan. The share of a torque that accelerates the
+  // motor's joint: 1 up to 2/3 of the velocity, 0 at the velocity, -1 from 4/3 on.
   const double w = x[plant().actuated_joint == 1 ? 2 : 3], u = trajectory.u[0];
   return u * w > 0 ? u * std::clamp(3 * (1 - std::abs(w) / config_.velocity), -1.0, 1.0) : u;
 }

@@ -1,7 +1,5 @@
 #include "control/settings.h"
 
-#include <numbers>
-
 #include "sim/double_pendulum.h"
 
 namespace upswing {
@@ -22,10 +20,10 @@ void MpcConfig::Describe(Options& o) {
   o.Add(&seconds, "mpc_seconds", {0.1, 10}, "s", "planning horizon of mpc").step = kControlPeriod;
   o.Add(&iterations, "mpc_iterations", {1, 1000}, "",
         "optimisation steps of mpc's plan at each decision");
-  o.Add(&angle_range, "mpc_angle_range", {std::numbers::pi, 1e6}, "rad",
-        "goals of mpc: upright with angles, counted with full turns since the start, within this");
+  o.Add(&angle_range, "mpc_angle_range", {3.2, 1e6}, "rad",
+        "largest angle, with full turns, of an upright that mpc aims at; the default is no limit");
   o.Add(&velocity, "mpc_velocity", {0.1, 1e6}, "rad/s",
-        "velocity of the motor's joint where mpc stops accelerating it; faster, it brakes");
+        "velocity of the motor's joint above which mpc brakes; the default is no limit");
 }
 
 void SwingUpConfig::Describe(Options& o) {

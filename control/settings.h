@@ -25,7 +25,7 @@ struct MpcConfig {
   double seconds = 2.5;      // length of the horizon, s
   int64_t iterations = 2;    // iterations of trajectory optimisation at each decision
   double angle_range = 1e6;  // largest angle of an upright goal, with full turns, rad
-  double velocity = 1e6;     // of the motor's joint, from which it does not accelerate, rad/s
+  double velocity = 1e6;     // of the motor's joint, above which mpc brakes, rad/s
 
   /// Declares each setting in `options`: name, range, unit, help.
   void Describe(Options& options);

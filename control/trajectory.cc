@@ -23,16 +23,18 @@ double Form(const Eigen::Matrix4d& Q, const StateVector& x) { return x.dot(Q * x
 QuadraticCost::QuadraticCost(const Eigen::Matrix4d& Q, double R, const Eigen::Matrix4d& P,
                              double angle_range)
     : Q_(Q), R_(R), P_(P) {
+  // Upright, q1 is an odd multiple of π, and q2 a multiple of 2π.
   constexpr double kTurn = 2 * std::numbers::pi;
-  largest1_ = (std::floor(angle_range / kTurn - 0.5) + 0.5) * kTurn;
-  largest2_ = std::floor(angle_range / kTurn) * kTurn;
+  largest_upright1_ = (std::floor(angle_range / kTurn - 0.5) + 0.5) * kTurn;
+  largest_upright2_ = std::floor(angle_range / kTurn) * kTurn;
 }
 
 StateVector QuadraticCost::Deviation(const StateVector& x) const {
   StateVector d = UprightDeviation(x);
+  // Move the goal into the range.
   const double upright1 = x[0] - d[0], upright2 = x[1] - d[1];
-  d[0] += upright1 - std::clamp(upright1, -largest1_, largest1_);
-  d[1] += upright2 - std::clamp(upright2, -largest2_, largest2_);
+  d[0] += upright1 - std::clamp(upright1, -largest_upright1_, largest_upright1_);
+  d[1] += upright2 - std::clamp(upright2, -largest_upright2_, largest_upright2_);
   return d;
 }
 

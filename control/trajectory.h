@@ -60,7 +60,7 @@ class QuadraticCost : public TrajectoryCost {
   Eigen::Matrix4d Q_;
   double R_;
   Eigen::Matrix4d P_;
-  double largest1_, largest2_;  // angles of an upright within the range, rad
+  double largest_upright1_, largest_upright2_;  // largest angles of a goal, rad
 };
 
 /// Finds locally best torques within the plant's limit. It keeps its buffers, so one object serves

@@ -58,6 +58,7 @@ TEST(QuadraticCost, CountsGoalsWithinTheRange) {
                 square(0.1 * kPi) + 2 * square(2 * kPi), 1e-9);
     EXPECT_NEAR(cost(4, sign * 3.1 * kPi, sign * 2 * kPi), square(2.1 * kPi) + 2 * square(2 * kPi),
                 1e-9);
+    EXPECT_NEAR(cost(kPi, sign * 0.9 * kPi, 0), square(0.1 * kPi), 1e-9);
     EXPECT_NEAR(cost(4, sign * 0.9 * kPi, sign * 0.2), square(0.1 * kPi) + 2 * square(0.2), 1e-9);
   }
 }

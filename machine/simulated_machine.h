@@ -91,7 +91,7 @@ struct LoopRun {
   double seconds = 10;
   PendulumState start = {};                 // true angles
   std::function<Joints(double)> push = {};  // torques (N·m) added at a time (s); empty: none
-  // The loop stops at this angle (rad), where encoders saturate, or at a larger velocity (rad/s).
+  // The loop stops at largest_angle (rad) and beyond largest_velocity (rad/s).
   double largest_angle = 1e9, largest_velocity = 1e9;
   int actuated_joint = 0;  // the other motor is limited to passive_limit; 0: both are alike
   uint64_t seed = 0;       // of the cycles' periods

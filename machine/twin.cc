@@ -49,14 +49,18 @@ Matrix Factor(const Twin& twin, const std::string& where) {
   };
   Matrix correlation = Matrix::Zero(n, n);
   constexpr double kRounding = 1e-6;
+  const auto name = [&](int i) -> const std::string& {
+    return twin.uncertain[static_cast<size_t>(i)];
+  };
   for (int i = 0; i < n; ++i) {
-    const std::string& name = twin.uncertain[static_cast<size_t>(i)];
-    if (covariance(i, i) < 0) refuse(name, "a variance of 0 or more", covariance(i, i));
+    if (covariance(i, i) < 0) refuse(name(i), "a variance of 0 or more", covariance(i, i));
+  }
+  for (int i = 0; i < n; ++i) {
     for (int j = 0; j < n; ++j) {
       const double scale = deviation(i) * deviation(j);
       if (std::abs(covariance(i, j)) > (1 + kRounding) * scale) {
-        refuse(Concat(name, " and ", twin.uncertain[static_cast<size_t>(j)]),
-               Concat("a covariance within ", scale, ", the product of their deviations"),
+        refuse(Concat(name(i), " and ", name(j)),
+               Concat("a covariance within ", scale, ", the product of their standard deviations"),
                covariance(i, j));
       }
       if (scale > 0) correlation(i, j) = covariance(i, j) / scale;

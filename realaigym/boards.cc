@@ -102,7 +102,8 @@ Robot ParseRobot(const std::string& name, Robot usual) {
   throw BadInput(Concat("--robot: expected pendubot or acrobot, got \"", Printable(name), "\""));
 }
 
-/// The plant for which a controller of a twin's machine is designed.
+/// The plant for which a controller of a twin's machine is designed, for this robot ("": the
+/// twin's own).
 Plant DesignPlant(const Twin& twin, const std::string& robot) {
   Plant plant = twin.plant;
   const auto usual = static_cast<Robot>(static_cast<int>(plant.actuated_joint));

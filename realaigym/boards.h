@@ -34,9 +34,9 @@ std::unique_ptr<BoardController> ControllerOf(const LoadedPolicy& loaded, size_t
 /// The name of the benchmark's regulator, which holds upright but does not swing up.
 inline constexpr const char* kBoardRegulator = "baseline-lqr";
 
-/// The competitor that the arguments name, for this robot ("": the policy's own robot). A
-/// controller for a twin's machine is designed for the twin without dry friction: the motors
-/// compensate most of it, and the linear model of upright cannot have it. Throws BadInput.
+/// The competitor that the arguments name, for this robot ("": the policy's own robot, a
+/// controller's that of the twin). With `twin`, a controller is designed for its plant without dry
+/// friction: the motors compensate most of it, and a linear model has none. Throws BadInput.
 Competitor GetCompetitor(PolicyArguments a, const std::string& robot,
                          const std::optional<Twin>& twin = {});
 

@@ -15,9 +15,9 @@ namespace {
 
 constexpr double kGridStep = 0.002;  // of the reference, s
 
-// Published settings of the runs (experiments/design_C.1/tvlqr_*.py of the benchmark): limits of
-// the law's torques, friction compensation c atan(100 w) + d w, low-pass and dead zone of the
-// velocities.
+// Published settings of the runs (experiments/design_C.1/tvlqr_*.py of the benchmark): friction
+// compensation c atan(100 w) + d w, low-pass and dead zone of the velocities. The logs show limits
+// of the law's torques before compensation; the motors limit the sum (TorqueLimits).
 constexpr double kMotorLimit = 5, kPassiveLimit = 0.5;  // N·m
 constexpr double kComp1 = 0.16, kComp2 = 0.12;          // N·m
 constexpr double kCompDamping = 0.001;                  // N·m·s/rad

@@ -47,7 +47,7 @@ struct BoardEpisode {
   double torque_noise = 0;               // N·m
   double response = 1;                   // k of u = u_before + k (u_wanted - u_before)
   int delay = 0;                         // of the measured state, steps
-  double angle_range = 1e9;              // of the encoders; a link that leaves it fails, rad
+  double angle_range = 1e9;  // largest angle of the encoders, where an episode fails, rad
   std::array<BoardPush, 4> pushes{};
   uint64_t seed = 0;        // of the noise
   int steps = kBoardSteps;  // fewer for a search; equal within a block

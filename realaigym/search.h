@@ -61,8 +61,8 @@ class BoardSearch {
   /// Begins with a policy instead of a random network, and takes its robot and size.
   BoardSearch(const BoardSearchConfig& config, const SwingPolicy& first);
   /// Searches for a real machine: all simulations are of the twin's machine, and each generation
-  /// draws machines of its posterior, with pushes (realaigym/machine_trials.h). The network
-  /// mirrors.
+  /// draws machines of its posterior, with pushes (realaigym/machine_trials.h). The policy becomes
+  /// one that mirrors (swing_policy.h).
   void SearchOn(const Twin& twin) {
     twin_ = twin;
     net_ = SwingNet(net_.robot(), net_.hidden(), /*mirrors=*/true);

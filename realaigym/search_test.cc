@@ -61,6 +61,13 @@ TEST(BoardSearch, ThreadsChangeNoBitAndItClimbs) {
   EXPECT_GT(a.best_fitness, first);
 }
 
+TEST(BoardSearch, OnATwinThePolicyMirrors) {
+  BoardSearch search(Small());
+  EXPECT_FALSE(search.net().mirrors());
+  search.SearchOn(ReadTwin("realaigym-twin", "test"));
+  EXPECT_TRUE(search.net().mirrors());
+}
+
 TEST(BoardSearch, TheBestStartGoesOn) {
   const auto run = [](int64_t seed, int64_t starts) {
     BoardSearchConfig config = Small();
@@ -117,9 +124,8 @@ TEST(SwingNet, WhatIsNoPolicyIsRefused) {
     file.metadata[key] = value;
     EXPECT_THROW(ReadSwingPolicy(file), Error) << key;
   };
-  refuses("format_version", "1");
+  for (const char* version : {"1", "4", "x"}) refuses("format_version", version);
   refuses("robot", "cartpole");
-  refuses("mirrors", "false");
   for (const char* hidden : {"7", "2", "34", "-8", "1e9", "x", "10"}) refuses("hidden", hidden);
   std::vector<double> numbers = net.Initial(1);
   numbers[3] = std::nan("");

@@ -159,6 +159,7 @@ class Run {
     block_.w2[lane] += impulse * (first ? -M.M12 : M.M11);
   }
 
+  /// Records the largest measured angle of both joints.
   void NoteAngles() {
     for (size_t i = 0; i < kBoardBlock; ++i) {
       const double a1 = std::abs(seen_.q1[i]), a2 = std::abs(seen_.q2[i]);
@@ -224,6 +225,7 @@ class Run {
     if (sums_.largest_angle[lane] >= episodes_[lane].angle_range) {
       o.above_line = o.at_goal = false;
       o.held = 0;
+      o.swing_up_seconds = (steps_ - 1) * kBoardTimestep;
     }
     // A simulation that has blown up gets the worst outcome.
     const auto [q1, q2, w1, w2] = end;

@@ -128,23 +128,23 @@ HWY_INLINE Linear LinearTorque(const SwingBlock& block, size_t i, const V (&x)[4
 
 void ActOnBlock(SwingBlock& block, const BoardMeasurement& measured, Lanes& torque) {
   Activations a;
-  Lanes w1, w2, mirrors;
+  Lanes w1, w2, sides;  // sides: -1 where the network sees the mirror image, else 1
   const hn::Rebind<float, D> halves;
   for (size_t i = 0; i < kBoardBlock; i += hn::Lanes(kDoubles)) {
     const V q1 = From(measured.q1, i), q2 = From(measured.q2, i);
     const V v1 = Velocity(block.q1, q1, i), v2 = Velocity(block.q2, q2, i);
     const auto [sine1, c1] = SineCosineOf(q1);
     const auto [sine2, c2] = SineCosineOf(q2);
-    const V mirror =
+    const V side =
         hn::IfThenElse(hn::Abs(q1) > Constant(block.mirrored_beyond), Constant(-1), Constant(1));
-    const V s1 = mirror * sine1, s2 = mirror * sine2, scale = mirror * Constant(0.1);
+    const V s1 = side * sine1, s2 = side * sine2, tenth = side * Constant(0.1);
     const V in[kSwingInputs] = {
         s1,         c1,        MulAdd(s1, c2, c1 * s2), NegMulAdd(s1, s2, c1 * c2), s2, c2,
-        scale * v1, scale * v2};
+        tenth * v1, tenth * v2};
     for (int j = 0; j < kSwingInputs; ++j) {
       hn::Store(hn::DemoteTo(halves, in[j]), halves, a.in[j] + i);
     }
-    To(mirror, mirrors, i);
+    To(side, sides, i);
     To(v1, w1, i);
     To(v2, w2, i);
     To(From(block.q1[0], i), block.q1[1], i);
@@ -163,7 +163,7 @@ void ActOnBlock(SwingBlock& block, const BoardMeasurement& measured, Lanes& torq
     const V x[4] = {Wrap(From(measured.q1, i) - Constant(std::numbers::pi)),
                     Wrap(From(measured.q2, i)), From(w1, i), From(w2, i)};
     const Linear linear = LinearTorque(block, i, x);
-    const V net = From(mirrors, i) * hn::PromoteTo(kDoubles, hn::Load(halves, a.out + i));
+    const V net = From(sides, i) * hn::PromoteTo(kDoubles, hn::Load(halves, a.out + i));
     // Outside its region the linear torque may be large, so it is clipped first.
     const V limit = Constant(kBoardTorqueLimit);
     const V cut = hn::Min(hn::Max(linear.torque, hn::Neg(limit)), limit);

@@ -25,7 +25,7 @@ struct SwingBlock {
   Lanes inverse_rho, sharpness;  //
   std::array<double, 16> P;      // (4 × 4)
   std::array<Lanes, 2> q1, q2;   // angles one and two steps ago, rad
-  double mirrored_beyond;        // |q1| beyond which the network controls the mirror image, rad
+  double mirrored_beyond;        // |q1| beyond which the network sees the mirror image, rad
 };
 /// Number of floats in a vector.
 inline constexpr size_t kSwingGroup = 16;

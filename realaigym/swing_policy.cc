@@ -14,8 +14,7 @@ namespace upswing {
 namespace {
 
 constexpr const char* kFormat = "upswing-realaigym";
-constexpr int kVersion = 2;
-constexpr const char* kMirrors = "mirrors";
+constexpr int kVersion = 2, kMirroringVersion = 3;
 constexpr int kLeastHidden = 4;
 constexpr double kMostExponent = 50, kMostWeight = 1e6;  // limits of numbers in files
 
@@ -100,10 +99,9 @@ std::unique_ptr<BoardController> SwingNet::Control(std::span<const double> numbe
 Tensors SwingNet::ToTensors(std::span<const double> numbers) const {
   Tensors tensors;
   tensors.metadata["format"] = kFormat;
-  tensors.metadata["format_version"] = std::to_string(kVersion);
+  tensors.metadata["format_version"] = std::to_string(mirrors_ ? kMirroringVersion : kVersion);
   tensors.metadata["robot"] = NameOf(robot_);
   tensors.metadata["hidden"] = std::to_string(hidden_);
-  if (mirrors_) tensors.metadata[kMirrors] = "true";
   tensors.AddCopy("numbers", numbers);
   return tensors;
 }
@@ -118,8 +116,9 @@ SwingPolicy ReadSwingPolicy(const Tensors& tensors) {
     return BadInput(Concat(tensors.where(), ": metadata \"", key, "\": expected ", expected,
                            ", got \"", Printable(tensors.Metadata(key)), "\""));
   };
-  if (tensors.Metadata("format_version") != std::to_string(kVersion)) {
-    throw expect("format_version", std::to_string(kVersion));
+  const auto version = ParseInteger(tensors.Metadata("format_version"));
+  if (version != kVersion && version != kMirroringVersion) {
+    throw expect("format_version", Concat(kVersion, " or ", kMirroringVersion));
   }
   const auto robot = RobotNamed(tensors.Metadata("robot"));
   if (!robot) throw expect("robot", "pendubot or acrobot");
@@ -128,10 +127,7 @@ SwingPolicy ReadSwingPolicy(const Tensors& tensors) {
     throw expect("hidden",
                  Concat("an even number in [", kLeastHidden, ", ", kSwingMostHidden, "]"));
   }
-  const bool mirrors = tensors.metadata.contains(kMirrors);
-  if (mirrors && tensors.Metadata(kMirrors) != "true")
-    throw expect(kMirrors, "true or no such key");
-  SwingPolicy policy{{*robot, static_cast<int>(*hidden), mirrors}, {}};
+  SwingPolicy policy{{*robot, static_cast<int>(*hidden), version == kMirroringVersion}, {}};
   policy.numbers.resize(policy.net.size());
   tensors.Read("numbers", std::span(policy.numbers), {static_cast<int64_t>(policy.net.size())});
   for (size_t i = 0; i < policy.numbers.size(); ++i) {

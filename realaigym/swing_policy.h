@@ -16,9 +16,9 @@ namespace upswing {
 /// x is the deviation from upright. The velocities come from the last measured angles, which have
 /// no noise on the board: w = (3 q - 4 q' + q'')/(2 h).
 ///
-/// A network that mirrors controls the mirror image of the pendulum where |q1| > π. After a fall
-/// past upright it swings back, so links do not turn further and further: a machine's encoders have
-/// a range.
+/// A network that mirrors sees the mirror image of the pendulum where |q1| > π, and its torque
+/// changes sign. So a network that swings up in one direction swings back after a fall past
+/// upright, within the range of a machine's encoders.
 ///
 /// All parameters form one vector, so that they can be searched (search.h).
 class SwingNet {
@@ -44,8 +44,8 @@ class SwingNet {
   std::unique_ptr<BoardController> Control(std::span<const std::span<const double>> numbers,
                                            size_t lanes_each) const;
 
-  /// The file's tensors. Metadata: `format` upswing-realaigym, `format_version`, `robot`, `hidden`,
-  /// and `mirrors` if it does. Tensor: `numbers`, F64 (size).
+  /// The file's tensors. Metadata: `format` upswing-realaigym, `format_version` (2; 3 mirrors),
+  /// `robot` and `hidden`. Tensor: `numbers`, F64 (size).
   Tensors ToTensors(std::span<const double> numbers) const;
 
  private:
