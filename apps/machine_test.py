@@ -187,7 +187,7 @@ class Machine(ProgramTest):
                 ("", "expected a table [plant]"),
                 ("[plant]\n[sessions.day]\nzero = 1\n", "twin.toml:3", "did you mean zero1?"),
                 ("[plant]\n[covariance]\nlag = 1\n", "twin.toml:3: lag", "list of 1"),
-                ("[plant]\n[covariance]\nlag = [-1]\n", "twin.toml", "positive")):
+                ("[plant]\n[covariance]\nlag = [-1]\n", "twin.toml", "0 or more")):
             self.refuse(["machine", "validate", self.write("twin.toml", text), good], *words)
         (self.folder / "twin.toml").unlink()
         # Angles that no model follows, and a clock with gaps of days.

@@ -51,7 +51,8 @@ double MpcPolicy::Torque(const StateVector& deviation, size_t env, Memory& memor
   StateVector x = FromUpright(deviation);
   const bool first = trajectory.u.empty();
   if (first) {
-    x[0] = Wrapped(x[0]);  // hanging is 0
+    // A range counts turns from hanging at 0. Without one, 0 and 2π are alike.
+    if (config_.angle_range < MpcConfig().angle_range) x[0] = Wrapped(x[0]);
     trajectory = optimizer.Follow(cost_, x, std::vector<double>(T, 0.0));
   } else {
     // Shift the plan by one step; the regulator chooses the new last torque.
