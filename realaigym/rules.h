@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -47,7 +48,8 @@ struct BoardEpisode {
   double torque_noise = 0;               // N·m
   double response = 1;                   // k of u = u_before + k (u_wanted - u_before)
   int delay = 0;                         // of the measured state, steps
-  double angle_range = 1e9;  // largest angle of the encoders, where an episode fails, rad
+  // Largest angle of the encoders, where an episode fails, rad.
+  double angle_range = std::numeric_limits<double>::infinity();
   std::array<BoardPush, 4> pushes{};
   uint64_t seed = 0;        // of the noise
   int steps = kBoardSteps;  // fewer for a search; equal within a block

@@ -66,6 +66,7 @@ class Run {
       if (episode.velocity_noise > 0) velocity_noise_.push_back(lane);
       if (episode.torque_noise > 0) torque_noise_.push_back(lane);
       if (episode.delay > 0) delayed_.push_back(lane);
+      if (std::isfinite(episode.angle_range)) ranged_.push_back(lane);
       if (episode.response != 1) responding_.push_back(lane);
       for (const BoardPush& push : episode.pushes) {
         if (push.amplitude == 0) continue;
@@ -159,12 +160,11 @@ class Run {
     block_.w2[lane] += impulse * (first ? -M.M12 : M.M11);
   }
 
-  /// Records the largest measured angle of both joints.
+  /// Records the largest measured angle of both joints, where encoders have a range.
   void NoteAngles() {
-    for (size_t i = 0; i < kBoardBlock; ++i) {
-      const double a1 = std::abs(seen_.q1[i]), a2 = std::abs(seen_.q2[i]);
-      const double larger = a1 > a2 ? a1 : a2;
-      sums_.largest_angle[i] = sums_.largest_angle[i] > larger ? sums_.largest_angle[i] : larger;
+    for (const size_t lane : ranged_) {
+      double& largest = sums_.largest_angle[lane];
+      largest = std::max({largest, std::abs(seen_.q1[lane]), std::abs(seen_.q2[lane])});
     }
   }
 
@@ -240,8 +240,8 @@ class Run {
   int steps_;
   ClosedFormBatch block_;
   std::vector<Rng> rngs_;
-  // Simulations with shifted zeros, velocity noise, torque noise, delay and slow response:
-  std::vector<size_t> shifted_, velocity_noise_, torque_noise_, delayed_, responding_;
+  // Simulations with shifted zeros, velocity noise, torque noise, delay, slow response and a range:
+  std::vector<size_t> shifted_, velocity_noise_, torque_noise_, delayed_, responding_, ranged_;
   std::vector<LanePush> pushes_;
   std::vector<BoardMeasurement> past_;  // ring of the last kMostDelay states
   BoardMeasurement seen_{};
