@@ -28,7 +28,9 @@ struct RunArguments {
 };
 
 constexpr std::string_view kBraking =
-    "\nbraking; once more ends at once, and the machine's watchdog switches the motors off\n";
+    "\nbraking; once more switches the motors off and ends at once\n";
+
+std::unique_ptr<MachineLink> g_link;  // global for signal handlers, which may come until the end
 
 /// Throws BadInput if a serial line is too slow for a frame per cycle in each direction.
 void CheckBaud(const LinkAddress& link, int64_t hz) {
@@ -86,26 +88,32 @@ int Drive(const RunArguments& a, const Competitor& competitor, const std::option
   Joints motor{a.passive_torque, a.passive_torque};
   motor[static_cast<size_t>(joint - 1)] = twin ? twin->plant.torque_limit : a.limits.torque;
   const MachineSensors sensors = twin ? twin->sensors : a.sensors;
-  Supervisor supervisor(a.limits, start, motor, sensors.angle_range, sensors.quantum);
+  Supervisor supervisor({.limits = a.limits,
+                         .start = start,
+                         .motor_limit = motor,
+                         .angle_range = sensors.angle_range,
+                         .quantum = sensors.quantum,
+                         .period = period});
 
   LoopConfig config{
       .hz = hz, .seconds = a.seconds, .actuated_joint = joint, .compensation = a.compensation};
   config.stop = [] { return StopSignal() != 0; };
 
+  g_link = OpenLink(a, address, twin, start);
+  MachineLink& link = *g_link;
   LogWriter log(a.log);
-  const std::unique_ptr<MachineLink> link = OpenLink(a, address, twin, start);
   fmt::print("{} on {}, {} Hz, {}\n", Printable(competitor.name), Printable(a.link), a.hz,
              NameOf(competitor.robot));
-  if (!link->simulated()) {
+  if (!link.simulated()) {
     const std::string missing = EnterRealTime();
     if (!missing.empty()) fmt::print("  not permitted: {}; cycles may be late\n", missing);
   }
   std::fflush(stdout);
-  InstallSignalHandlers(kBraking);
-  ControlLoop loop(config, *link, estimator, supervisor, controller, log);
+  GuardMotors(kBraking, [] { g_link->SwitchOffAtOnce(); });
+  ControlLoop loop(config, link, estimator, supervisor, controller, log);
   loop.Run();
   log.Finish();
-  PrintSummary(loop.summary(), link->counts(), supervisor, link->simulated());
+  PrintSummary(loop.summary(), link.counts(), supervisor, link.simulated());
   if (log.dropped() > 0) fmt::print("  log      {} rows left out\n", log.dropped());
   if (!a.log.empty()) fmt::print("written {}\n", Printable(a.log));
   if (!supervisor.reason().empty()) throw Failure(supervisor.reason());

@@ -1,11 +1,15 @@
 #!/usr/bin/env python3
 """Tests of `upswing run` and `upswing fake`: a control loop on a twin, over UDP and a terminal."""
 
+import itertools
+import math
 import re
+import resource
 import signal
 import socket
 import struct
 import subprocess
+import threading
 import time
 import unittest
 import zlib
@@ -39,6 +43,190 @@ class Fake:
         self.process.send_signal(number)
         out, _ = self.process.communicate(timeout=PATIENCE)
         return self.process.returncode, out
+
+
+class Firmware(threading.Thread):
+    """A machine in Python that follows docs/reference/machine-link.md, with the readings of a test.
+
+    `reading(i)` gives the angles [rad] in the answer to the i-th command with motors on; before, the
+    links hang. `pack(frame, i)` gives the datagram. `commands` has (flags, torques) as they came.
+    """
+
+    def __init__(self, test, reading=lambda i: (0, 0), pack=lambda frame, i: frame):
+        super().__init__(daemon=True)
+        self.reading, self.pack, self.commands = reading, pack, []
+        self.driven = threading.Event()  # motors were on for 50 commands
+        self.silent = threading.Event()  # no command for a while, once they were
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(("127.0.0.1", 0))
+        self.link = f"udp:127.0.0.1:{self.socket.getsockname()[1]}"
+        test.addCleanup(self.socket.close)
+        self.socket.settimeout(0.3)
+        self.start()
+
+    def run(self):
+        on = 0
+        for number in itertools.count(1):
+            try:
+                command, sender = self.socket.recvfrom(1000)
+            except TimeoutError:
+                if self.driven.is_set():
+                    self.silent.set()
+                continue
+            except OSError:
+                return
+            flags, sequence = struct.unpack_from("<HI", command, 6)
+            self.commands.append((flags & 1, struct.unpack_from("<2f", command, 24)))
+            angles = self.reading(on) if on > 0 else (0, 0)
+            on += flags & 1
+            if on == 50:
+                self.driven.set()
+            body = b"UPSW" + struct.pack("<BBHIIQ4f", 1, 2, 0, number, sequence, 0, 0, 0, *angles)
+            self.socket.sendto(self.pack(body + struct.pack("<I", zlib.crc32(body)), on), sender)
+
+
+class Protection(ProgramTest):
+    """What docs/howto/protection.md promises."""
+
+    def drive(self, firmware, *arguments, **options):
+        """Starts a run that drives the machine with full torque until something ends it."""
+        run = subprocess.Popen([UPSWING, "run", "lqr", "--link", firmware.link, "--max-age", "0.5",
+                                "--max-torque", "0.1", "--seconds", "60", *map(str, arguments)],
+                               cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                               encoding="utf-8", **options)
+        self.addCleanup(run.communicate)
+        self.addCleanup(run.kill)
+        return run
+
+    def assert_off(self, firmware):
+        self.assertEqual(firmware.commands[-1], (0, (0, 0)))
+        for on, torques in firmware.commands:
+            self.assertTrue(all(abs(torque) <= on * 0.1 for torque in torques), (on, torques))
+        self.assertIn(1, [on for on, _ in firmware.commands])
+
+    def test_every_signal_switches_the_motors_off(self):
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP,
+                       signal.SIGALRM, signal.SIGXCPU, signal.SIGABRT, signal.SIGSEGV):
+            with self.subTest(signal=number.name):
+                firmware = Firmware(self)
+                run = self.drive(firmware)
+                self.assertTrue(firmware.driven.wait(PATIENCE))
+                run.send_signal(number)
+                if number is signal.SIGHUP:  # a terminal that closes sends it twice
+                    run.send_signal(number)
+                run.communicate(timeout=PATIENCE)
+                crash = number in (signal.SIGABRT, signal.SIGSEGV)
+                self.assertEqual(run.returncode, -number if crash else 128 + number)
+                self.assertTrue(firmware.silent.wait(PATIENCE))
+                self.assert_off(firmware)
+
+    def test_a_second_interrupt_switches_the_motors_off_at_once(self):
+        # The links do not hang, so braking would take seconds.
+        firmware = Firmware(self, lambda i: (min(0.001 * i, 1.5), 0))
+        run = self.drive(firmware, "--brake-seconds", 60)
+        self.assertTrue(firmware.driven.wait(PATIENCE))
+        while firmware.reading(len(firmware.commands) - 100)[0] < 1.5:
+            time.sleep(0.01)
+        run.send_signal(signal.SIGINT)
+        count = len(firmware.commands)
+        while len(firmware.commands) < count + 100:
+            time.sleep(0.01)
+        self.assertIsNone(run.poll())
+        run.send_signal(signal.SIGINT)
+        run.communicate(timeout=PATIENCE)
+        self.assertEqual(run.returncode, -signal.SIGINT)
+        self.assertTrue(firmware.silent.wait(PATIENCE))
+        self.assert_off(firmware)
+
+    def test_a_program_that_was_stopped_sends_no_old_torque(self):
+        firmware = Firmware(self)
+        run = self.drive(firmware)
+        self.assertTrue(firmware.driven.wait(PATIENCE))
+        run.send_signal(signal.SIGSTOP)
+        self.assertTrue(firmware.silent.wait(PATIENCE))
+        time.sleep(0.5)  # longer than --max-age
+        count = len(firmware.commands)
+        run.send_signal(signal.SIGCONT)
+        _, err = run.communicate(timeout=PATIENCE)
+        self.assertEqual(run.returncode, 1)
+        self.assertRegex(err, r"the last reading is \S+ s old")
+        self.assertEqual({on for on, _ in firmware.commands[count:]}, {0})
+
+    def test_the_watchdog_acts_where_the_program_is_killed(self):
+        fake = Fake(self, "udp:0")
+        run = subprocess.Popen([UPSWING, "run", "lqr", "--link", fake.link, "--log", "log.csv",
+                                *map(str, PATIENT)], cwd=self.folder, stdout=subprocess.PIPE)
+        self.addCleanup(run.communicate)
+        while not (self.folder / "log.csv").is_file() or not any(
+                row["state"] == 2 for row in read_csv(self.folder / "log.csv")):
+            time.sleep(0.05)
+        run.kill()
+        while " 1 watchdog" not in fake.process.stdout.readline():
+            pass
+
+    def test_readings_that_no_motion_explains(self):
+        for name, change in (("a turn", 2 * math.pi), ("two turns", 14), ("a slip", -1)):
+            for once in (False, True):
+                with self.subTest(fault=name, once=once):
+                    wrong = []
+
+                    def reading(i):
+                        if i < 60 or (once and i > 100):
+                            return 0, 0
+                        wrong.append(len(firmware.commands))
+                        return 0, change
+
+                    firmware = Firmware(self, reading)
+                    run = self.drive(firmware)
+                    _, err = run.communicate(timeout=PATIENCE)
+                    self.assertEqual(run.returncode, 1)
+                    self.assertRegex(err, "joint 2: the (angle jumps by|encoder saturates)")
+                    # On a busy machine one command may cross the reading.
+                    self.assertLessEqual(len(firmware.commands[wrong[0]:]), 4)
+                    self.assertEqual({on for on, _ in firmware.commands[wrong[0] + 1:]}, {0})
+                    self.assert_off(firmware)
+
+    def test_a_datagram_is_one_frame(self):
+        for pack in (lambda frame, i: frame + frame, lambda frame, i: frame[:22],
+                     lambda frame, i: frame + b"x"):
+            firmware = Firmware(self, pack=pack)
+            run = self.drive(firmware, "--patience", 0.5)
+            self.assertEqual(run.communicate(timeout=PATIENCE)[1],
+                             "upswing: no readings within 0.5 s\n")
+
+    def test_a_log_is_never_lost(self):
+        run = ["run", "lqr", "--link", TWIN, "--seconds", 0.2, "--log"]
+        self.succeed(*run, "log.csv")
+        log = (self.folder / "log.csv").read_bytes()
+        for link in (TWIN, "serial:none", "udp:127.0.0.1:9"):
+            self.refuse(["run", "lqr", "--link", link, "--patience", 0.2, "--log", "log.csv"],
+                        "none" if link == "serial:none" else "--log: expected a new file")
+            self.assertEqual((self.folder / "log.csv").read_bytes(), log)
+        # Two runs at once.
+        firmware = Firmware(self)
+        first = self.drive(firmware, "--log", "other.csv")
+        self.assertTrue(firmware.driven.wait(PATIENCE))
+        self.assert_one_line(self.run_here(*run, "other.csv"), 2, "--log: expected a new file")
+        first.send_signal(signal.SIGINT)
+        first.communicate(timeout=PATIENCE)
+        self.assertGreater(len(read_csv(self.folder / "other.csv")), 50)
+        # Without a machine the file stays free.
+        for _ in range(2):
+            done = self.run_here("run", "lqr", "--link", "udp:127.0.0.1:9", "--patience", 0.2,
+                                 "--log", "free.csv")
+            self.assert_one_line(done, 1, "no readings")
+
+    def test_a_full_disk_leaves_a_whole_log(self):
+        limit = 100_000  # bytes
+        done = subprocess.run([UPSWING, "run", "lqr", "--link", TWIN, "--seconds", "5", "--log",
+                               "log.csv"], cwd=self.folder, capture_output=True, encoding="utf-8",
+                              preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE,
+                                                                    (limit, limit)))
+        self.assert_one_line(done, 1, "cannot write log.csv: File too large")
+        text = (self.folder / "log.csv").read_text()
+        self.assertGreater(len(text), 10_000)
+        self.assertTrue(text.endswith("\n"))
+        self.succeed("machine", "check", "log.csv")
 
 
 class Run(ProgramTest):
@@ -83,10 +271,10 @@ class Run(ProgramTest):
         # Two runs after another: the machine accepts a new program.
         for hz in (500, 250):
             out = self.succeed("run", "lqr", "--link", fake.link, "--seconds", 0.5, "--hz", hz,
-                               "--log", "log.csv", *PATIENT)
+                               "--log", f"{hz}.csv", *PATIENT)
             self.assertIn("ran      0.50 s", out)
             self.assertIn(" 0 lost, 0 doubled, 0 too old, 0 broken bytes", out)
-            self.assertGreater(len(read_csv(self.folder / "log.csv")), 0.3 * hz)
+            self.assertGreater(len(read_csv(self.folder / f"{hz}.csv")), 0.3 * hz)
         code, out = fake.end()
         self.assertEqual(code, 0)
         # The second run is refused until the watchdog of the first one.

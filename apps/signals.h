@@ -21,13 +21,18 @@ inline constexpr std::string_view kStoppingTraining =
 /// `notice` (a literal, because it must outlive the handlers); empty: prints nothing.
 void InstallSignalHandlers(std::string_view notice);
 
+/// Like InstallSignalHandlers, for a program that drives motors. Records every signal that would
+/// end or pause it, so that it can brake. Before a second SIGINT, SIGTERM or SIGQUIT or a crash
+/// ends the program, the handler calls `switch_off`, which must be safe in a signal handler.
+void GuardMotors(std::string_view notice, void (*switch_off)());
+
 /// Also stops at SIGUSR1 and SIGUSR2, with which clusters announce the end of a job's time.
 void StopAtUserSignals();
 
 /// The request since the last call; kCheckpoint is returned once for each request.
 TrainRequest PollSignals();
 
-/// The received stop signal, SIGINT or SIGTERM; 0 if there is none.
+/// The received stop signal, such as SIGINT or SIGTERM; 0 if there is none.
 int StopSignal();
 
 }  // namespace upswing

@@ -31,7 +31,7 @@ bool TryInput(std::string_view input) {
   const size_t piece = static_cast<unsigned char>(input[0]) + size_t{1};
   auto bytes = BytesOf(input.substr(1));
   const auto total = static_cast<int64_t>(bytes.size());
-  FrameReader reader;
+  FrameReader reader(/*datagrams=*/false);
   int64_t frames = 0;
   while (!bytes.empty()) {
     const auto next = bytes.first(std::min(piece, bytes.size()));

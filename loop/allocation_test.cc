@@ -9,6 +9,7 @@
 #include <new>
 #include <thread>
 
+#include "io/file.h"
 #include "io/testing.h"
 #include "loop/fake_machine.h"
 #include "loop/testing.h"
@@ -84,7 +85,7 @@ TEST(ControlLoop, ACycleAllocatesNoMemory) {
     const Server server;
     LoopBench bench;
     bench.competitor = competitor;
-    bench.log_path = (folder / "log.csv").string();
+    bench.log_path = FreePath(folder / "log.csv").string();
     // The machine that runs the tests may be busy, and the searched policy is fast.
     bench.limits.age = 1;
     bench.limits.velocity = 1000;

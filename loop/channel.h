@@ -45,6 +45,8 @@ class Channel {
   /// Sends from now on to the sender of the last received bytes.
   void AnswerSender();
 
+  /// Whether Receive returns whole datagrams.
+  bool datagrams() const { return datagrams_; }
   /// Where it listens, such as `udp:127.0.0.1:4000` or `/dev/pts/3`.
   const std::string& name() const { return name_; }
 

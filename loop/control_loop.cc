@@ -11,7 +11,6 @@ namespace {
 
 constexpr int64_t kBoardHz = 500;     // steps per second of a BoardController
 constexpr double kAnswerShare = 0.5;  // share of a cycle that waits for the answer
-constexpr int kFarewells = 3;         // frames that say that the motors are off
 static_assert(kBoardTimestep * kBoardHz == 1);
 
 }  // namespace
@@ -72,7 +71,8 @@ CycleFacts ControlLoop::FactsOf(double now, const std::optional<LinkReading>& re
   CycleFacts facts{.time = now, .fresh = reading.has_value()};
   if (reading) {
     last_reading_ = reading->time;
-    facts.read_at = reading->clock;
+    facts.read_at = reading->time;
+    facts.received = reading->received;
     facts.angle = reading->angle;
     facts.torque = reading->torque;
     facts.locked = reading->locked;
@@ -80,7 +80,9 @@ CycleFacts ControlLoop::FactsOf(double now, const std::optional<LinkReading>& re
     ++summary_.unanswered;
   }
   facts.age = last_reading_ < 0 ? 0 : now - last_reading_;
+  facts.zero = estimator_.zero();
   facts.state = estimator_.now();
+  facts.ahead = estimator_.ahead();
   facts.energy = estimator_.energy();
   const bool over = running_cycle_ > 0 && static_cast<double>(cycle_ - running_cycle_) * period_ >=
                                               config_.seconds - period_ / 2;
@@ -104,6 +106,11 @@ bool ControlLoop::Cycle() {
   summary_.missed += missed;
   cycle_ += missed;
 
+  // The process may have been stopped: torques from old readings are not sent.
+  if (enabled_ && !supervisor_.MaySend(now - last_reading_)) {
+    torque_ = {};
+    enabled_ = false;
+  }
   // A late cycle waits for its answer, too.
   const double until = std::max(deadline, now - period_ / 4) + kAnswerShare * period_;
   const auto reading = link_.Exchange(torque_, enabled_, until);
@@ -137,8 +144,8 @@ bool ControlLoop::Cycle() {
 
 void ControlLoop::SwitchOff() {
   for (int i = 0; i < kFarewells; ++i) {
-    link_.WaitUntil(static_cast<double>(cycle_++) * period_);
     link_.Exchange({}, /*enabled=*/false, link_.Now() + kAnswerShare * period_);
+    link_.WaitUntil(link_.Now() + kAnswerShare * period_);
   }
 }
 

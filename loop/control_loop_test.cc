@@ -11,6 +11,7 @@
 #include "io/testing.h"
 #include "loop/fake_machine.h"
 #include "loop/testing.h"
+#include "machine/check.h"
 
 namespace upswing {
 namespace {
@@ -28,21 +29,14 @@ class FakeLink : public MachineLink {
                                       double /*until*/) override {
     enabled_ = enabled;
     torque_ = torque;
-    out_.Send({.flags = enabled ? Frame::kEnabled : uint16_t{0},
-               .sequence = ++sequence_,
-               .torque = torque},
-              now_);
-    std::optional<LinkReading> newest;
+    out_.Send(*Decode(protocol_.Command(torque, enabled, now_)), now_);
     while (const auto frame = out_.Receive(now_)) {
       if (const auto answer = machine_.Answer(*frame, now_)) in_.Send(*answer, now_);
     }
     machine_.Advance(now_);
+    std::optional<LinkReading> newest;
     while (const auto frame = in_.Receive(now_)) {
-      if (filter_.Judge(frame->sequence) != SequenceFilter::Verdict::kNew) continue;
-      newest =
-          LinkReading{{{frame->angle, frame->torque}, now_ - 0.002 * (sequence_ - frame->answers)},
-                      1e-6 * static_cast<double>(frame->microseconds),
-                      (frame->flags & Frame::kLocked) != 0};
+      if (const auto reading = protocol_.Take(Encode(*frame), now_)) newest = reading;
     }
     return newest;
   }
@@ -54,8 +48,7 @@ class FakeLink : public MachineLink {
  private:
   FakeMachine machine_;
   FaultyLine out_, in_;
-  SequenceFilter filter_;
-  uint32_t sequence_ = 0;
+  LinkProtocol protocol_{/*datagrams=*/true};
   double now_ = 0;
   bool enabled_ = false;
   Joints torque_{};
@@ -208,6 +201,48 @@ TEST(ControlLoop, CompensatesTheFrictionOfTheOtherJoint) {
     }
   }
   EXPECT_GT(largest, 0.1);
+}
+
+TEST(Supervisor, TakesTheReadingsOfARealMachineForMotions) {
+  const std::filesystem::path real = RealData();
+  if (real.empty()) GTEST_SKIP() << "no measured data";
+  Twin twin = ReadTwin("realaigym-twin", "twin");
+  int rows = 0, running = 0;
+  for (const char* kind : {"C.1/pushed", "C.1/swingup"}) {
+    for (const auto& file : std::filesystem::directory_iterator(real / kind)) {
+      const MachineLog log = ReadLog(file.path()).front();
+      const double period = MedianCycle(std::span(&log, 1));
+      if (period > 0.01) continue;  // MC-PILCO at 33 Hz
+      Estimator estimator(twin, period);
+      constexpr int kArmed = Supervisor::kArmReadings + 1;
+      const Joints& q = log.angle[kArmed];
+      const Joints& w = log.velocity[kArmed];
+      Supervisor supervisor({.limits = {.angle = 1e3, .velocity = 1e3, .energy = 1e3},
+                             .start = {q[0], q[1], w[0], w[1]},
+                             .angle_range = 1e3,
+                             .quantum = twin.sensors.quantum,
+                             .period = period});
+      for (int k = 1; k < log.rows(); ++k, ++rows) {
+        const double time = log.time[k];
+        const TimedReading reading{{log.angle[k], log.measured[k]}, time};
+        estimator.Update(time, log.commanded[k - 1], &reading);
+        supervisor.Step({.time = time,
+                         .fresh = true,
+                         .read_at = time,
+                         .received = time,
+                         .angle = log.angle[k],
+                         .torque = log.measured[k],
+                         .zero = estimator.zero(),
+                         .state = estimator.now(),
+                         .ahead = estimator.ahead(),
+                         .energy = estimator.energy()});
+      }
+      EXPECT_EQ(supervisor.reason(), "") << file.path();
+      running += supervisor.state() == LoopState::kRunning ? 1 : 0;
+    }
+  }
+  EXPECT_GE(running, 24);
+  EXPECT_GT(rows, 50'000);
 }
 
 TEST(LoopController, KeepsThePeriodOfAPolicy) {

@@ -137,7 +137,7 @@ void Serve(Channel& channel, FakeMachine& machine, const LineFaults& faults, uin
            const std::function<bool()>& stop, const std::function<void(double)>& report) {
   FaultyLine to_machine(faults, seed, "line: commands"),
       from_machine(faults, seed, "line: readings");
-  FrameReader reader;
+  FrameReader reader(channel.datagrams());
   const int64_t begin = MonotonicNanoseconds();
   const auto clock = [&] { return static_cast<double>(MonotonicNanoseconds() - begin) * 1e-9; };
   std::array<std::byte, 1024> buffer;

@@ -85,6 +85,10 @@ void FrameReader::Skip(size_t bytes) {
 }
 
 void FrameReader::Add(std::span<const std::byte> bytes) {
+  if (datagrams_ && (bytes.size() != kFrameBytes || !Decode(bytes.first<kFrameBytes>()))) {
+    skipped_ += static_cast<int64_t>(bytes.size());
+    return;
+  }
   if (bytes.size() > buffer_.size()) {
     skipped_ += static_cast<int64_t>(bytes.size() - buffer_.size());
     bytes = bytes.last(buffer_.size());

@@ -42,9 +42,12 @@ FrameBytes Encode(const Frame& frame);
 /// The frame in these bytes; nothing unless magic, version, kind and checksum are right.
 std::optional<Frame> Decode(std::span<const std::byte, kFrameBytes> bytes);
 
-/// Finds frames in a stream of bytes. After lost or broken bytes it finds the next whole frame.
+/// Finds frames in bytes that arrive. In a stream it finds the next whole frame after lost or
+/// broken bytes. A datagram that is not exactly one frame is dropped whole.
 class FrameReader {
  public:
+  /// `datagrams`: whether each call of Add has a datagram.
+  explicit FrameReader(bool datagrams) : datagrams_(datagrams) {}
   /// Adds bytes. If there is too little room, the oldest bytes are dropped.
   void Add(std::span<const std::byte> bytes);
   /// The next frame; nothing until more bytes come.
@@ -55,6 +58,7 @@ class FrameReader {
  private:
   void Skip(size_t bytes);
 
+  bool datagrams_;
   std::array<std::byte, 32 * kFrameBytes> buffer_{};
   size_t size_ = 0;
   int64_t skipped_ = 0;

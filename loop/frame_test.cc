@@ -68,7 +68,7 @@ TEST(FrameReader, FindsFramesInAnyPieces) {
     stream.insert(stream.end(), bytes.begin(), bytes.end());
   }
   for (const size_t piece : {1, 3, 43, 44, 45, 200}) {
-    FrameReader reader;
+    FrameReader reader(/*datagrams=*/false);
     uint32_t next = 0;
     for (size_t at = 0; at < stream.size(); at += piece) {
       reader.Add(std::span(stream).subspan(at, std::min(piece, stream.size() - at)));
@@ -81,7 +81,7 @@ TEST(FrameReader, FindsFramesInAnyPieces) {
 
 TEST(FrameReader, FindsTheNextFrameAfterBrokenBytes) {
   Rng rng(1, "test: bytes");
-  FrameReader reader;
+  FrameReader reader(/*datagrams=*/false);
   uint32_t whole = 0, found = 0;
   for (uint32_t i = 0; i < 500; ++i) {
     const FrameBytes bytes = Encode(Example(i));
@@ -108,7 +108,7 @@ TEST(FrameReader, FindsTheNextFrameAfterBrokenBytes) {
 }
 
 TEST(FrameReader, DropsTheOldestBytesOfAFlood) {
-  FrameReader reader;
+  FrameReader reader(/*datagrams=*/false);
   const std::vector<std::byte> flood(100'000, std::byte{0x55});
   reader.Add(flood);
   reader.Add(Encode(Example()));
@@ -116,6 +116,21 @@ TEST(FrameReader, DropsTheOldestBytesOfAFlood) {
   ASSERT_TRUE(frame);
   ExpectSame(*frame, Example());
   EXPECT_EQ(reader.skipped(), 100'000);
+}
+
+TEST(FrameReader, ADatagramIsOneFrame) {
+  const FrameBytes one = Encode(Example(1)), other = Encode(Example(2));
+  std::vector<std::byte> two(one.begin(), one.end());
+  two.insert(two.end(), other.begin(), other.end());
+  FrameReader reader(/*datagrams=*/true);
+  for (const size_t size : {88, 22, 22, 43, 45, 0}) reader.Add(std::span(two).first(size));
+  EXPECT_FALSE(reader.Next());
+  EXPECT_EQ(reader.skipped(), 88 + 22 + 22 + 43 + 45);
+  reader.Add(other);
+  const auto frame = reader.Next();
+  ASSERT_TRUE(frame);
+  ExpectSame(*frame, Example(2));
+  EXPECT_FALSE(reader.Next());
 }
 
 TEST(SequenceFilter, TellsNewFramesFromOthers) {

@@ -47,21 +47,23 @@ std::optional<LinkReading> TwinLink::Exchange(const Joints& torque, bool enabled
   return reading;
 }
 
-ChannelLink::ChannelLink(Channel channel)
-    : channel_(std::move(channel)), begin_(MonotonicNanoseconds()) {}
-
-double ChannelLink::Now() const {
-  return static_cast<double>(MonotonicNanoseconds() - begin_) / kSecond;
+FrameBytes LinkProtocol::Command(const Joints& torque, bool enabled, double now) {
+  const uint32_t own = ++sequence_;
+  sent_at_[own % sent_at_.size()] = now;
+  Frame command{.flags = enabled ? Frame::kEnabled : uint16_t{0},
+                .sequence = own,
+                .answers = filter_.last(),
+                .microseconds = static_cast<uint64_t>(std::max(now, 0.0) * 1e6)};
+  if (enabled) command.torque = torque;
+  return Encode(command);
 }
 
-void ChannelLink::WaitUntil(double time) {
-  const int64_t at = begin_ + std::llround(time * kSecond);
-  const timespec moment{at / kSecond, at % kSecond};
-  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &moment, nullptr) == EINTR) {
-  }
+FrameBytes LinkProtocol::LastCommand() const {
+  constexpr uint32_t kAhead = 1 << 22;  // commands of an hour at 1 kHz
+  return Encode({.sequence = sequence_ + kAhead, .answers = filter_.last()});
 }
 
-bool ChannelLink::Take(const Frame& frame) {
+bool LinkProtocol::IsNew(const Frame& frame) {
   if (frame.kind != Frame::Kind::kReading) return false;
   const bool first = counts_.received == 0;
   const uint32_t before = filter_.last();
@@ -80,45 +82,72 @@ bool ChannelLink::Take(const Frame& frame) {
   return true;
 }
 
-LinkReading ChannelLink::ReadingOf(const Frame& frame) const {
+LinkReading LinkProtocol::ReadingOf(const Frame& frame, double now) {
+  answered_ = frame.answers;
   const uint32_t ago = sequence_ - frame.answers;
   const bool known = ago < sent_at_.size() && ago < sequence_;
-  return {{{frame.angle, frame.torque}, known ? sent_at_[frame.answers % sent_at_.size()] : Now()},
-          1e-6 * static_cast<double>(frame.microseconds),
-          (frame.flags & Frame::kLocked) != 0};
+  double time = known ? sent_at_[frame.answers % sent_at_.size()] : now;
+  // The answers of a machine may stand still or go back; time does not.
+  if (time <= last_time_) time = now;
+  last_time_ = time;
+  return {{{frame.angle, frame.torque}, time}, now, (frame.flags & Frame::kLocked) != 0};
 }
 
-std::optional<LinkReading> ChannelLink::Exchange(const Joints& torque, bool enabled, double until) {
-  const uint32_t own = ++sequence_;
-  const int64_t now = MonotonicNanoseconds();
-  Frame command{.flags = enabled ? Frame::kEnabled : uint16_t{0},
-                .sequence = own,
-                .answers = filter_.last(),
-                .microseconds = static_cast<uint64_t>((now - begin_) / 1000)};
-  if (enabled) command.torque = torque;
-  sent_at_[own % sent_at_.size()] = Now();
-  counts_.sent += channel_.Send(Encode(command)) ? 1 : 0;
-
+std::optional<LinkReading> LinkProtocol::Take(std::span<const std::byte> bytes, double now) {
   std::optional<LinkReading> newest;
-  std::array<std::byte, 1024> buffer;
-  while (true) {
-    for (size_t got = 0; (got = channel_.Receive(buffer)) > 0;) {
-      reader_.Add(std::span(buffer).first(got));
-      while (const auto frame = reader_.Next()) {
-        if (!Take(*frame)) continue;
-        newest = ReadingOf(*frame);
-        if (frame->answers == own) return newest;
-      }
-    }
-    const double left = until - Now();
-    if (left <= 0) return newest;
-    channel_.Wait(left);
+  reader_.Add(bytes);
+  while (const auto frame = reader_.Next()) {
+    if (IsNew(*frame)) newest = ReadingOf(*frame, now);
+  }
+  return newest;
+}
+
+LinkCounts LinkProtocol::counts() const {
+  LinkCounts counts = counts_;
+  counts.broken = reader_.skipped();
+  return counts;
+}
+
+ChannelLink::ChannelLink(Channel channel)
+    : channel_(std::move(channel)),
+      begin_(MonotonicNanoseconds()),
+      protocol_(channel_.datagrams()) {}
+
+double ChannelLink::Now() const {
+  return static_cast<double>(MonotonicNanoseconds() - begin_) / kSecond;
+}
+
+void ChannelLink::WaitUntil(double time) {
+  const int64_t at = begin_ + std::llround(time * kSecond);
+  const timespec moment{at / kSecond, at % kSecond};
+  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &moment, nullptr) == EINTR) {
   }
 }
 
+std::optional<LinkReading> ChannelLink::Exchange(const Joints& torque, bool enabled, double until) {
+  sent_ += channel_.Send(protocol_.Command(torque, enabled, Now())) ? 1 : 0;
+  std::optional<LinkReading> newest;
+  std::array<std::byte, 1024> buffer;
+  do {
+    const size_t got = channel_.Receive(buffer);
+    if (got == 0) {
+      channel_.Wait(until - Now());
+      continue;
+    }
+    if (const auto reading = protocol_.Take(std::span(buffer).first(got), Now())) newest = reading;
+    if (newest && protocol_.answered()) return newest;
+  } while (Now() < until);
+  return newest;
+}
+
+void ChannelLink::SwitchOffAtOnce() {
+  const FrameBytes last = protocol_.LastCommand();
+  for (int i = 0; i < kFarewells; ++i) channel_.Send(last);
+}
+
 LinkCounts ChannelLink::counts() const {
-  LinkCounts counts = counts_;
-  counts.broken = reader_.skipped();
+  LinkCounts counts = protocol_.counts();
+  counts.sent = sent_;
   return counts;
 }
 

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 
 #include "core/rng.h"
 #include "loop/channel.h"
@@ -23,11 +25,15 @@ struct LinkCounts {
   int64_t broken = 0;      // bytes that belong to no frame
 };
 
-/// A reading with the machine's clock and the state of its watchdog.
+/// A reading by the loop's clock: the machine measured between `time`, when the answered command
+/// was sent, and `received`. The machine's own clock is not used.
 struct LinkReading : TimedReading {
-  double clock = 0;     // of the machine, at the measurement, s
+  double received = 0;  // s
   bool locked = false;  // whether the machine's watchdog has locked its motors
 };
+
+/// Number of commands at the end that say that the motors are off.
+inline constexpr int kFarewells = 3;
 
 class MachineLink {
  public:
@@ -40,6 +46,9 @@ class MachineLink {
   /// them. Without an answer at the time `until` (s), returns the newest reading since the last
   /// call, if there is one.
   virtual std::optional<LinkReading> Exchange(const Joints& torque, bool enabled, double until) = 0;
+  /// Tells the machine at once that its motors are off; commands after it are invalid. For the
+  /// handlers of signals that end the program: takes no lock and no memory.
+  virtual void SwitchOffAtOnce() {}
   virtual LinkCounts counts() const { return {}; }
   /// Whether the clock is simulated: the loop may run faster than time.
   virtual bool simulated() const { return false; }
@@ -63,6 +72,38 @@ class TwinLink : public MachineLink {
   Rng rng_;
 };
 
+/// The loop's side of the exchange of frames, without a line and a clock.
+class LinkProtocol {
+ public:
+  /// `datagrams`: whether bytes come in datagrams, of which each has to be one frame.
+  explicit LinkProtocol(bool datagrams) : reader_(datagrams) {}
+
+  /// The next command, to be sent at a time (s).
+  FrameBytes Command(const Joints& torque, bool enabled, double now);
+  /// A command that switches the motors off and makes all commands before it and for the next hour
+  /// too old.
+  FrameBytes LastCommand() const;
+  /// Takes bytes that arrived until a time (s). Returns the newest reading among them.
+  std::optional<LinkReading> Take(std::span<const std::byte> bytes, double now);
+  /// Whether the newest reading answers the last command.
+  bool answered() const { return answered_ == sequence_; }
+  /// All but `sent`.
+  LinkCounts counts() const;
+
+ private:
+  /// Whether a frame is a new reading.
+  bool IsNew(const Frame& frame);
+  LinkReading ReadingOf(const Frame& frame, double now);
+
+  FrameReader reader_;
+  SequenceFilter filter_;
+  LinkCounts counts_;
+  std::atomic<uint32_t> sequence_ = 0;  // of the last command; signal handlers read it
+  uint32_t answered_ = 0;               // sequence number that the newest reading answers
+  double last_time_ = -1;               // of the newest reading, s
+  std::array<double, 256> sent_at_{};   // of the last commands, by their sequence numbers, s
+};
+
 /// A machine behind a channel, in real time.
 class ChannelLink : public MachineLink {
  public:
@@ -71,20 +112,14 @@ class ChannelLink : public MachineLink {
   double Now() const override;
   void WaitUntil(double time) override;
   std::optional<LinkReading> Exchange(const Joints& torque, bool enabled, double until) override;
+  void SwitchOffAtOnce() override;
   LinkCounts counts() const override;
 
  private:
-  /// Takes a frame from the channel; returns whether it is a new reading.
-  bool Take(const Frame& frame);
-  LinkReading ReadingOf(const Frame& frame) const;
-
   Channel channel_;
   int64_t begin_;  // of the clock, ns
-  FrameReader reader_;
-  SequenceFilter filter_;
-  LinkCounts counts_;
-  uint32_t sequence_ = 0;
-  std::array<double, 256> sent_at_{};  // of the last commands, by their sequence numbers, s
+  LinkProtocol protocol_;
+  int64_t sent_ = 0;
 };
 
 /// Nanoseconds of the monotonic clock.

@@ -15,10 +15,23 @@ namespace {
 constexpr double kSlow = 0.3;         // velocity at which braking may end, rad/s
 constexpr double kLow = 0.9;          // cosine of a hanging link's angle: 26° from the vertical
 constexpr double kSlowSeconds = 0.2;  // time for which the links must hang that slow
-constexpr double kHardest = 1000;     // acceleration that no joint reaches, rad/s²
 constexpr int kStuckReadings = 2;     // unchanged readings after a fast one: a stuck encoder
 constexpr double kLargestReading = 1e6;
 constexpr double kLargestStart = 100;  // rad, rad/s
+
+// What a motion can explain. No joint accelerates as hard as kHardest. The 70,000 readings of a
+// real machine under pushes use at most 66% of the way that CheckMotion permits.
+constexpr double kHardest = 1000;      // rad/s²
+constexpr double kShortest = 1e-4;     // time between two measurements, s
+constexpr double kLeastStep = 0.02;    // rad; coarse encoders without a twin have such steps
+constexpr double kLargestError = 0.2;  // of the estimate at a slow joint, rad
+
+// Braking ends where it does not work.
+constexpr double kBrakeShare = 1.5;  // largest velocity and energy, in those of the limits
+// Above the least energy since the last torques of the controller acted: share, and energy.
+constexpr double kEnergyShare = 1.3, kEnergyRise = 0.1;
+constexpr double kLatency = 0.03;     // time after which the torques of the controller are over, s
+constexpr double kBrakeCycles = 2.5;  // age of the reading up to which the motors may brake
 
 bool Within(double x, double limit) { return std::abs(x) <= limit; }  // false for NaN
 
@@ -51,87 +64,137 @@ const char* NameOf(LoopState state) {
   return kNames[static_cast<size_t>(state)];
 }
 
-Supervisor::Supervisor(const Limits& limits, const PendulumState& start, const Joints& motor_limit,
-                       double angle_range, double quantum)
-    : limits_(limits),
-      start_(start),
-      motor_limit_(motor_limit),
-      angle_range_(angle_range),
-      quantum_(quantum) {
-  for (double& limit : motor_limit_) limit = std::min(limit, limits.torque);
+Supervisor::Supervisor(const SupervisorConfig& config) : config_(config) {
+  for (double& limit : config_.motor_limit) {
+    limit = std::min(limit, config_.limits.torque);
+    // Frames have singles, and their rounding must not exceed the limit.
+    const auto single = static_cast<float>(limit);
+    if (single > limit) limit = std::nextafter(single, 0.0F);
+  }
   constexpr size_t kLongestReason = 160;
   reason_.reserve(kLongestReason);
 }
 
-void Supervisor::Fault(const char* text, double first, double second) {
-  if (!reason_.empty()) return;  // the first reason stays
+LoopState Supervisor::Fault(const char* text, double first, double second) {
+  if (!reason_.empty()) return LoopState::kFault;  // the first reason stays
   std::array<char, 150> line{};
   std::snprintf(line.data(), line.size(), text, first, second);
   reason_ = line.data();
+  return LoopState::kFault;
 }
 
 void Supervisor::Brake(const CycleFacts& facts) {
   state_ = LoopState::kBraking;
   since_ = slow_since_ = facts.time;
+  least_energy_ = facts.energy;
 }
 
-bool Supervisor::IsStuck(const CycleFacts& facts) {
+bool Supervisor::CheckMotion(const CycleFacts& facts) {
+  // Time between the measurements: as the commands were sent, and at most.
   const double h = facts.read_at - last_time_;
-  const bool known = readings_ > 1 && h > 0;
-  bool stuck = false;
-  for (size_t j = 0; j < 2; ++j) {
+  const double span = std::max(facts.received - last_time_, kShortest);
+  bool good = true;
+  for (size_t j = 0; j < 2 && has_last_; ++j) {
     const double change = facts.angle[j] - last_angle_[j];
-    if (known && change == 0) {
-      // A joint cannot stop within a cycle: its encoder did.
-      const double stop = kHardest * h + 2 * quantum_ / h;
-      stuck = stuck || (++repeats_[j] >= kStuckReadings && std::abs(speed_[j]) > stop);
-    } else {
-      repeats_[j] = 0;
-      speed_[j] = known ? change / h : 0;
+    const double way =
+        (2 * speed_[j] + kHardest * span) * span + std::max(2 * config_.quantum, kLeastStep);
+    if (!Within(change, way)) {
+      Fault("joint %.0f: the angle jumps by %.4g rad, which no motion explains",
+            static_cast<double>(j + 1), change);
+      good = false;
+    }
+    speed_[j] = std::max({std::abs(change) / span, speed_[j] - kHardest * span, 0.0});
+    rate_[j] = h > 0 ? change / h : 0;
+    // A joint cannot stop within a cycle: its encoder did.
+    const double stop = kHardest * h + 2 * config_.quantum / h;
+    repeats_[j] = change == 0 ? repeats_[j] + 1 : 0;
+    if (change != 0) moved_[j] = rate_[j];
+    if (repeats_[j] >= kStuckReadings && std::abs(moved_[j]) > stop) {
+      Fault("joint %.0f: the encoder sticks while the joint moves", static_cast<double>(j + 1));
+      good = false;
     }
   }
+  has_last_ = true;
   last_time_ = facts.read_at;
   last_angle_ = facts.angle;
-  return stuck;
-}
-
-bool Supervisor::CheckReading(const CycleFacts& facts) {
-  bool good = true;
-  const auto fault = [&](const char* text, double first = 0, double second = 0) {
-    good = false;
-    Fault(text, first, second);
-  };
-  const bool driving = state_ == LoopState::kRunning || state_ == LoopState::kBraking;
-  if (facts.locked && driving) fault("the machine's watchdog has switched its motors off");
-  for (size_t j = 0; j < 2; ++j) {
-    const int joint = static_cast<int>(j) + 1;
-    if (!Within(facts.angle[j], kLargestReading) || !Within(facts.torque[j], kLargestReading)) {
-      fault("joint %.0f: expected a finite reading, got another number", joint);
-    } else if (std::abs(facts.angle[j]) >= angle_range_) {
-      fault("joint %.0f: the encoder saturates at %.4g rad", joint, facts.angle[j]);
-    }
-  }
-  if (good && IsStuck(facts)) fault("an encoder sticks while its joint moves");
   return good;
 }
 
-void Supervisor::CheckLimits(const CycleFacts& facts) {
+bool Supervisor::CheckReading(const CycleFacts& facts) {
+  const bool driving = state_ == LoopState::kRunning || state_ == LoopState::kBraking;
+  for (size_t j = 0; j < 2; ++j) {
+    const auto joint = static_cast<double>(j + 1);
+    if (!Within(facts.angle[j], kLargestReading) || !Within(facts.torque[j], kLargestReading)) {
+      Fault("joint %.0f: expected a finite reading, got another number", joint);
+      return false;
+    }
+    if (std::abs(facts.angle[j]) >= config_.angle_range) {
+      Fault("joint %.0f: the encoder saturates at %.4g rad", joint, facts.angle[j]);
+      return false;
+    }
+  }
+  if (facts.locked && driving) {
+    Fault("the machine's watchdog has switched its motors off");
+    return false;
+  }
+  return CheckMotion(facts);
+}
+
+bool Supervisor::CheckEstimate(const CycleFacts& facts) {
+  const auto& [q1, q2, w1, w2] = facts.state;
+  if (!std::isfinite(q1 + q2 + w1 + w2 + facts.energy)) {
+    Fault("the estimate of the state is not finite");
+    return false;
+  }
+  const Joints q{q1, q2}, w{w1, w2};
+  for (size_t j = 0; j < 2 && facts.fresh; ++j) {
+    const double error = facts.angle[j] - facts.zero[j] - q[j];
+    if (Within(error, kLargestError + std::abs(w[j]) * (facts.age + config_.period))) continue;
+    Fault("joint %.0f: the estimate is %.4g rad from the reading", static_cast<double>(j + 1),
+          error);
+    return false;
+  }
+  return true;
+}
+
+bool Supervisor::WithinLimits(const CycleFacts& facts) {
+  const Limits& limits = config_.limits;
   const auto& [q1, q2, w1, w2] = facts.state;
   const double angle = std::max(std::abs(q1), std::abs(q2));
   const double velocity = std::max(std::abs(w1), std::abs(w2));
-  if (!Within(angle, limits_.angle)) {
-    Fault("angle: %.4g rad is beyond the limit %.4g rad", angle, limits_.angle);
-  } else if (!Within(velocity, limits_.velocity)) {
-    Fault("velocity: %.4g rad/s is beyond the limit %.4g rad/s", velocity, limits_.velocity);
-  } else if (!Within(facts.energy, limits_.energy)) {
-    Fault("energy: %.4g is beyond the limit %.4g", facts.energy, limits_.energy);
+  if (!Within(angle, limits.angle)) {
+    Fault("angle: %.4g rad is beyond the limit %.4g rad", angle, limits.angle);
+  } else if (!Within(velocity, limits.velocity)) {
+    Fault("velocity: %.4g rad/s is beyond the limit %.4g rad/s", velocity, limits.velocity);
+  } else if (!Within(facts.energy, limits.energy)) {
+    Fault("energy: %.4g is beyond the limit %.4g", facts.energy, limits.energy);
   }
+  return reason_.empty();
+}
+
+LoopState Supervisor::GoOnBraking(const CycleFacts& facts) {
+  const double velocity = std::max(std::abs(facts.state.w1), std::abs(facts.state.w2));
+  const bool is_late = facts.time - since_ > kLatency;
+  least_energy_ = is_late ? std::min(least_energy_, facts.energy) : facts.energy;
+  if (!Within(velocity, kBrakeShare * config_.limits.velocity) ||
+      !Within(facts.energy, kBrakeShare * config_.limits.energy) ||
+      facts.energy > kEnergyShare * least_energy_ + kEnergyRise) {
+    return Fault("braking does not slow the links: %.4g rad/s", velocity);
+  }
+  if (!AtRest(facts.state)) slow_since_ = facts.time;
+  if (facts.time - slow_since_ < kSlowSeconds &&
+      facts.time - since_ < config_.limits.brake_seconds) {
+    return LoopState::kBraking;
+  }
+  ended_ = true;
+  return reason_.empty() ? LoopState::kIdle : LoopState::kFault;
 }
 
 bool Supervisor::AtStart(const PendulumState& s) const {
-  return Within(Wrapped(s.q1 - start_.q1), kStartAngle) &&
-         Within(Wrapped(s.q2 - start_.q2), kStartAngle) &&
-         Within(s.w1 - start_.w1, kStartVelocity) && Within(s.w2 - start_.w2, kStartVelocity);
+  return Within(Wrapped(s.q1 - config_.start.q1), kStartAngle) &&
+         Within(Wrapped(s.q2 - config_.start.q2), kStartAngle) &&
+         Within(s.w1 - config_.start.w1, kStartVelocity) &&
+         Within(s.w2 - config_.start.w2, kStartVelocity);
 }
 
 void Supervisor::Wait(const CycleFacts& facts) {
@@ -140,12 +203,11 @@ void Supervisor::Wait(const CycleFacts& facts) {
   if (facts.stop) {
     ended_ = true;
     state_ = LoopState::kIdle;
-  } else if (facts.time - since_ > limits_.patience) {
-    Fault(state_ == LoopState::kIdle
-              ? "no readings within %.4g s"
-              : "the machine did not come to rest in its start state within %.4g s",
-          limits_.patience);
-    state_ = LoopState::kFault;
+  } else if (facts.time - since_ > config_.limits.patience) {
+    state_ = Fault(state_ == LoopState::kIdle
+                       ? "no readings within %.4g s"
+                       : "the machine did not come to rest in its start state within %.4g s",
+                   config_.limits.patience);
   } else if (state_ == LoopState::kIdle && readings_ >= kArmReadings) {
     state_ = LoopState::kArmed;
     since_ = facts.time;
@@ -158,46 +220,57 @@ void Supervisor::Wait(const CycleFacts& facts) {
   }
 }
 
+bool Supervisor::MaySend(double age) {
+  if (state_ == LoopState::kIdle || Within(age, config_.limits.age)) return true;
+  state_ =
+      Fault("the last reading is %.4g s old, beyond the limit %.4g s", age, config_.limits.age);
+  return false;
+}
+
 LoopState Supervisor::Step(const CycleFacts& facts) {
   if (ended()) return state_;
   readings_ = facts.fresh ? readings_ + 1 : readings_;
   if (state_ == LoopState::kIdle && !facts.fresh) readings_ = 0;
   if (facts.fresh && !CheckReading(facts)) return state_ = LoopState::kFault;
-  if (state_ != LoopState::kIdle && facts.age > limits_.age) {
-    Fault("the last reading is %.4g s old, beyond the limit %.4g s", facts.age, limits_.age);
-    return state_ = LoopState::kFault;
-  }
-  if (state_ == LoopState::kRunning) {
-    CheckLimits(facts);
-    if (!reason_.empty() || facts.stop) Brake(facts);
-  } else if (state_ == LoopState::kBraking) {
-    if (!AtRest(facts.state)) slow_since_ = facts.time;
-    if (facts.time - slow_since_ >= kSlowSeconds || facts.time - since_ >= limits_.brake_seconds) {
-      ended_ = true;
-      state_ = reason_.empty() ? LoopState::kIdle : LoopState::kFault;
-    }
-  } else {
+  if (!MaySend(facts.age)) return state_;
+  if (state_ == LoopState::kIdle || state_ == LoopState::kArmed) {
     Wait(facts);
+  } else if (!CheckEstimate(facts)) {
+    state_ = LoopState::kFault;
+  } else if (state_ == LoopState::kBraking) {
+    state_ = GoOnBraking(facts);
+  } else if (!WithinLimits(facts) || facts.stop) {
+    Brake(facts);
   }
   return state_;
 }
 
+/// Damping by the least of the measured and the estimated velocities, where all have the same sign:
+/// a wrong one never drives a joint.
+Joints Supervisor::BrakeTorque(const CycleFacts& facts) const {
+  if (!facts.fresh || facts.age > kBrakeCycles * config_.period) return {};
+  const Joints now{facts.state.w1, facts.state.w2}, ahead{facts.ahead.w1, facts.ahead.w2};
+  Joints torque{};
+  for (size_t j = 0; j < 2; ++j) {
+    const auto [least, most] = std::minmax({rate_[j], now[j], ahead[j]});
+    const double velocity = least > 0 ? least : most < 0 ? most : 0;
+    torque[j] = -config_.limits.brake_damping * velocity;
+  }
+  return torque;
+}
+
 Joints Supervisor::Torque(const Joints& controller, const CycleFacts& facts) {
   Joints torque{};
-  if (state_ == LoopState::kRunning) {
-    torque = controller;
-    if (!std::isfinite(torque[0]) || !std::isfinite(torque[1])) {
-      Fault("the controller's torque is not a finite number");
-      state_ = LoopState::kFault;
-      return {};
-    }
-  } else if (state_ == LoopState::kBraking) {
-    torque = {-limits_.brake_damping * facts.state.w1, -limits_.brake_damping * facts.state.w2};
+  if (state_ == LoopState::kRunning) torque = controller;
+  if (state_ == LoopState::kBraking) torque = BrakeTorque(facts);
+  if (!std::isfinite(torque[0]) || !std::isfinite(torque[1])) {
+    state_ = Fault("the controller's torque is not a finite number");
+    return {};
   }
   bool clipped = false;
   for (size_t j = 0; j < 2; ++j) {
-    const double asked = torque[j];
-    torque[j] = std::clamp(asked, -motor_limit_[j], motor_limit_[j]);
+    const double limit = config_.motor_limit[j], asked = torque[j];
+    torque[j] = std::clamp(asked, -limit, limit);
     clipped = clipped || torque[j] != asked;
   }
   clipped_ += clipped && state_ == LoopState::kRunning ? 1 : 0;

@@ -30,37 +30,51 @@ enum class LoopState {
   kIdle,     // waits for readings; motors off
   kArmed,    // readings come; motors hold torque 0 until the machine is in its start state
   kRunning,  // the controller drives
-  kBraking,  // damped torques until the machine is slow; then kIdle, or kFault if there is a reason
+  kBraking,  // torques against the motion until the links hang; then kIdle, or kFault with a reason
   kFault,    // motors off until the program ends
 };
 const char* NameOf(LoopState state);
 
-/// What a cycle knows when the supervisor decides.
+/// What a cycle knows when the supervisor decides. All times are of the loop's clock.
 struct CycleFacts {
   double time = 0;           // s
   bool fresh = false;        // whether a new reading came in this cycle
-  double read_at = 0;        // time of the new reading by the machine's clock, s
+  double read_at = 0;        // when the new reading's command was sent, s
+  double received = 0;       // when the new reading came, s; it was measured in between
   double age = 0;            // of the last reading, s
   Joints angle{}, torque{};  // of the new reading, rad and N·m; untrusted
   bool locked = false;       // whether the machine says that its motors are locked
-  PendulumState state{};     // estimate of the true state
+  Joints zero{};             // estimate of the angles that the encoders show at 0, rad
+  PendulumState state{};     // estimate of the true state now
+  PendulumState ahead{};     // the same when a torque that is sent next will act
   double energy = 0;         // see Limits; 0 if unknown
   bool stop = false;         // whether the user or the end of the run asks for a stop
 };
 
-/// The state machine. Faults are latched.
+/// The settings of a supervisor.
+struct SupervisorConfig {
+  Limits limits;
+  // State in which the controller takes over, to within kStartAngle and kStartVelocity.
+  PendulumState start = {};
+  Joints motor_limit{};    // largest torque of each joint, N·m
+  double angle_range = 0;  // of the encoders, rad
+  double quantum = 0;      // of the encoders, rad
+  double period = 0.002;   // of the cycles, s
+};
+
+/// The state machine. Faults are latched. Whatever the facts are, torques are finite and within
+/// their limits, and 0 after a fault.
 class Supervisor {
  public:
-  /// `start`: state in which the controller takes over, to within kStartAngle and kStartVelocity.
-  /// `motor_limit`: largest torque of each joint, N·m. `angle_range` (rad) and `quantum` (rad): of
-  /// the encoders.
-  Supervisor(const Limits& limits, const PendulumState& start, const Joints& motor_limit,
-             double angle_range, double quantum);
+  explicit Supervisor(const SupervisorConfig& config);
 
+  /// Whether the torques of the cycle before may be sent when the last reading is `age` seconds
+  /// old. If not, the run has a fault: the process was stopped, or the machine is silent.
+  bool MaySend(double age);
   /// Takes a cycle's facts and returns the state in which the cycle's torques are chosen.
   LoopState Step(const CycleFacts& facts);
-  /// The torques (N·m) to send: the controller's within the limits, damping, or 0. A torque that is
-  /// not finite is a fault. Call it after Step with the same facts.
+  /// The torques (N·m) to send: the controller's within the limits, torques against the motion, or
+  /// 0. A torque that is not finite is a fault. Call it after Step with the same facts.
   Joints Torque(const Joints& controller, const CycleFacts& facts);
 
   LoopState state() const { return state_; }
@@ -76,29 +90,33 @@ class Supervisor {
   static constexpr int kArmReadings = 5;  // readings in a row before the motors are armed
 
  private:
-  /// Sets the reason from a format of two numbers, unless there is one.
-  void Fault(const char* text, double first = 0, double second = 0);
+  /// Sets the reason from a format of two numbers, unless there is one, and returns kFault.
+  LoopState Fault(const char* text, double first = 0, double second = 0);
   void Brake(const CycleFacts& facts);
   bool CheckReading(const CycleFacts& facts);
-  bool IsStuck(const CycleFacts& facts);
-  void CheckLimits(const CycleFacts& facts);
+  bool CheckMotion(const CycleFacts& facts);
+  bool CheckEstimate(const CycleFacts& facts);
+  bool WithinLimits(const CycleFacts& facts);
+  LoopState GoOnBraking(const CycleFacts& facts);
+  Joints BrakeTorque(const CycleFacts& facts) const;
   bool AtStart(const PendulumState& s) const;
   void Wait(const CycleFacts& facts);
 
-  Limits limits_;
-  PendulumState start_;
-  Joints motor_limit_;
-  double angle_range_, quantum_;
+  SupervisorConfig config_;
   LoopState state_ = LoopState::kIdle;
   bool ended_ = false, begun_ = false;
   std::string reason_;
-  int readings_ = 0;
+  int readings_ = 0;                   // in a row
   double since_ = 0, slow_since_ = 0;  // s
+  double least_energy_ = 0;            // since braking began; see Limits
   int64_t clipped_ = 0;
-  // The last readings, for stuck encoders.
-  double last_time_ = 0;
+  // The last reading.
+  bool has_last_ = false;
+  double last_time_ = 0;  // when its command was sent, s
   Joints last_angle_{};
-  Joints speed_{};                // of the last change that was not 0, rad/s
+  Joints rate_{};                 // last change over its time, rad/s
+  Joints speed_{};                // upper estimate of the speed, rad/s
+  Joints moved_{};                // rate of the last change that was not 0, rad/s
   std::array<int, 2> repeats_{};  // readings without a change after it
 };
 

@@ -20,21 +20,32 @@ constexpr double kQuantum = 0.0004, kRange = 12.5;  // rad
 /// A supervisor and the facts of its next cycle.
 struct Bench {
   Limits limits;
-  Supervisor supervisor{limits, {}, {5, 0.5}, kRange, kQuantum};
+  Supervisor supervisor{{.limits = limits,
+                         .motor_limit = {5, 0.5},
+                         .angle_range = kRange,
+                         .quantum = kQuantum,
+                         .period = kCycle}};
   CycleFacts facts{.fresh = true};
 
   explicit Bench(const Limits& l = {}) : limits(l) {}
 
   LoopState Step() {
     facts.time += kCycle;
-    if (facts.fresh) facts.read_at = facts.time;
+    if (facts.fresh) facts.read_at = facts.received = facts.time;
     facts.age = facts.time - facts.read_at;
     return supervisor.Step(facts);
   }
-  /// Runs a cycle with another estimate.
+  /// Runs a cycle with another estimate, which is wrong by the same as the encoders' zeros.
   LoopState Step(const PendulumState& state) {
-    facts.state = state;
+    facts.state = facts.ahead = state;
+    facts.zero = {facts.angle[0] - state.q1, facts.angle[1] - state.q2};
     return Step();
+  }
+  /// Runs a cycle in which the joints move with these velocities (rad/s), as the estimate says.
+  LoopState Move(double w1, double w2) {
+    facts.angle[0] += w1 * kCycle;
+    facts.angle[1] += w2 * kCycle;
+    return Step({facts.angle[0], facts.angle[1], w1, w2});
   }
   LoopState Step(int cycles) {
     for (int i = 0; i < cycles; ++i) Step();
@@ -104,6 +115,17 @@ TEST(Supervisor, CutsTorques) {
   EXPECT_EQ(b.supervisor.clipped(), 0);
   EXPECT_EQ(b.supervisor.Torque({9, -2}, b.facts), (Joints{5, -0.5}));
   EXPECT_EQ(b.supervisor.clipped(), 1);
+  // A single that is sent is not beyond the limit either.
+  Supervisor tenth({.limits = {.torque = 0.1}, .motor_limit = {5, 5}, .angle_range = kRange});
+  CycleFacts facts{.fresh = true};
+  for (int i = 1; i < 8; ++i) {
+    facts.time = facts.read_at = facts.received = i * kCycle;
+    tenth.Step(facts);
+  }
+  const Joints cut = tenth.Torque({1, -1}, facts);
+  EXPECT_LE(static_cast<float>(cut[0]), 0.1);
+  EXPECT_NEAR(cut[0], 0.1, 1e-8);
+  EXPECT_GE(static_cast<float>(cut[1]), -0.1);
 }
 
 TEST(Supervisor, ATorqueThatIsNotFiniteIsAFault) {
@@ -118,17 +140,65 @@ TEST(Supervisor, ATorqueThatIsNotFiniteIsAFault) {
 TEST(Supervisor, BrakesAtAStopUntilTheLinksHang) {
   Bench b;
   b.Run();
+  b.Move(2, -1);
   b.facts.stop = true;
-  EXPECT_EQ(b.Step({0.1, 0, 2, -1}), kBraking);
+  EXPECT_EQ(b.Move(2, -1), kBraking);
   const Joints damping = b.supervisor.Torque({3, 3}, b.facts);
-  EXPECT_DOUBLE_EQ(damping[0], -2 * b.limits.brake_damping);
-  EXPECT_DOUBLE_EQ(damping[1], b.limits.brake_damping);
+  EXPECT_NEAR(damping[0], -2 * b.limits.brake_damping, 1e-9);
+  EXPECT_NEAR(damping[1], b.limits.brake_damping, 1e-9);
   b.Step({0.1, 0, 0, 0});
   EXPECT_EQ(b.Step(98), kBraking);
   EXPECT_EQ(b.Step(4), kIdle);
   EXPECT_TRUE(b.supervisor.ended());
   EXPECT_EQ(b.supervisor.Torque({3, 3}, b.facts), (Joints{0, 0}));
   EXPECT_EQ(b.supervisor.reason(), "");
+}
+
+TEST(Supervisor, BrakesOnlyAgainstAMotionOfWhichAllAreSure) {
+  Bench b;
+  b.Run();
+  b.facts.stop = true;
+  ASSERT_EQ(b.Move(2, -1), kBraking);
+  b.facts.state.w1 = 9;  // the encoder says 2
+  b.facts.ahead.w2 = 1;  // joint 2 is about to turn
+  Joints torque = b.supervisor.Torque({}, b.facts);
+  EXPECT_NEAR(torque[0], -2 * b.limits.brake_damping, 1e-9);
+  EXPECT_EQ(torque[1], 0);
+  b.facts.fresh = false;
+  b.Step();
+  EXPECT_EQ(b.supervisor.Torque({}, b.facts), (Joints{0, 0}));
+  b.facts.fresh = true;
+  b.facts.age = 3 * kCycle;  // an old reading
+  EXPECT_EQ(b.supervisor.Torque({}, b.facts), (Joints{0, 0}));
+}
+
+TEST(Supervisor, BrakingThatAddsEnergyIsAFault) {
+  Bench b;
+  b.Run();
+  b.facts.stop = true;
+  b.facts.energy = 0.5;
+  ASSERT_EQ(b.Move(2, 0), kBraking);
+  b.facts.energy = 1;  // torques of the controller still act
+  EXPECT_EQ(b.Move(2, 0), kBraking);
+  b.facts.energy = 0.3;
+  for (int i = 0; i < 20; ++i) ASSERT_EQ(b.Move(2, 0), kBraking);
+  b.facts.energy = 0.48;
+  EXPECT_EQ(b.Move(2, 0), kBraking);
+  b.facts.energy = 0.5;
+  EXPECT_EQ(b.Move(2, 0), kFault);
+  EXPECT_EQ(b.supervisor.reason(), "braking does not slow the links: 2 rad/s");
+  EXPECT_EQ(b.supervisor.Torque({}, b.facts), (Joints{0, 0}));
+}
+
+TEST(Supervisor, BrakingHasALimitOfVelocity) {
+  Bench b;
+  b.Run();
+  double w = 0;
+  while (w < 24) b.Move(w += 1, 0);
+  b.facts.stop = true;
+  ASSERT_EQ(b.Move(24, 0), kBraking);
+  while (w < 37) ASSERT_EQ(b.Move(w += 1, 0), kBraking);
+  EXPECT_EQ(b.Move(38, 0), kFault);
 }
 
 TEST(Supervisor, BrakesSlowLinksThatStand) {
@@ -162,7 +232,60 @@ TEST(Supervisor, BrakesBeyondLimitsAndThenFaults) {
   expect_brake({2.1, 0, 0, 0}, 0, "angle");
   expect_brake({0, -2.1, 0, 0}, 0, "angle");
   expect_brake({0, 0, 0, 0}, 1.6, "energy");
-  expect_brake({0, 0, kNan, 0}, 0, "velocity");
+}
+
+TEST(Supervisor, AnEstimateThatIsNotFiniteOrFarFromTheReadingIsAFault) {
+  for (const PendulumState& state :
+       {PendulumState{0, 0, kNan, 0}, PendulumState{0, kNan, 0, 0},
+        PendulumState{std::numeric_limits<double>::infinity(), 0, 0, 0},
+        PendulumState{0.3, 0, 0, 0}, PendulumState{0, -0.3, 1, 1}}) {
+    for (const bool brakes : {false, true}) {
+      Bench b;
+      b.Run();
+      b.facts.stop = brakes;
+      if (brakes) b.Step();
+      b.facts.state = b.facts.ahead = state;
+      EXPECT_EQ(b.Step(), kFault);
+      EXPECT_EQ(b.supervisor.Torque({1, 1}, b.facts), (Joints{0, 0}));
+    }
+  }
+}
+
+TEST(Supervisor, AReadingThatNoMotionExplainsIsAFaultAtOnce) {
+  for (const double jump : {2 * std::numbers::pi, -2 * std::numbers::pi, 14.0, 0.05, -0.03}) {
+    for (const size_t joint : {0, 1}) {
+      for (const bool runs : {false, true}) {
+        Bench b({.angle = 100});
+        if (runs) b.Run();
+        if (!runs) b.Step();
+        b.facts.angle[joint] += std::min(jump, kRange - 0.1);
+        EXPECT_EQ(b.Step(), kFault) << jump;
+        EXPECT_NE(b.supervisor.reason().find("jumps by"), std::string::npos);
+        EXPECT_EQ(b.supervisor.Torque({1, 1}, b.facts), (Joints{0, 0}));
+      }
+    }
+  }
+}
+
+TEST(Supervisor, AFastMotionWithLostReadingsIsExplained) {
+  Bench b;
+  b.Run();
+  double w = 0;
+  for (int i = 0; i < 500; ++i) {
+    w += std::clamp(20 * std::sin(0.1 * i) - w, -1.5, 1.5);  // 750 rad/s²
+    b.facts.fresh = i % 5 != 3 && i % 7 != 0;
+    ASSERT_EQ(b.Move(w, -w), kRunning) << i << b.supervisor.reason();
+  }
+}
+
+TEST(Supervisor, TorquesFromOldReadingsAreNotSent) {
+  Bench b;
+  EXPECT_TRUE(b.supervisor.MaySend(9));  // the motors are off
+  b.Run();
+  EXPECT_TRUE(b.supervisor.MaySend(b.limits.age));
+  EXPECT_FALSE(b.supervisor.MaySend(0.7));
+  EXPECT_EQ(b.supervisor.reason(), "the last reading is 0.7 s old, beyond the limit 0.02 s");
+  EXPECT_EQ(b.Step(), kFault);
 }
 
 TEST(Supervisor, ReadingsThatAreNoNumbersAreFaultsInEveryState) {
@@ -183,7 +306,7 @@ TEST(Supervisor, ReadingsThatAreNoNumbersAreFaultsInEveryState) {
   expect_fault(running);
   braking.Run();
   braking.facts.stop = true;
-  ASSERT_EQ(braking.Step({0, 0, 2, 0}), kBraking);
+  ASSERT_EQ(braking.Move(2, 0), kBraking);
   expect_fault(braking);
   Bench torque;
   torque.Run();
@@ -235,11 +358,8 @@ TEST(Supervisor, AnEncoderThatSticksIsAFaultWithinTwoCycles) {
   for (const int joint : {1, 2}) {
     Bench b;
     b.Run();
-    double& angle = b.facts.angle[static_cast<size_t>(joint - 1)];
-    for (int i = 0; i < 100; ++i) {
-      angle += 5 * kCycle;  // 5 rad/s
-      ASSERT_EQ(b.Step(), kRunning);
-    }
+    for (int i = 0; i < 100; ++i)
+      ASSERT_EQ(b.Move(joint == 1 ? 5 : 0, joint == 2 ? 5 : 0), kRunning);
     EXPECT_EQ(b.Step(), kRunning);
     EXPECT_EQ(b.Step(), kFault) << joint;
   }

@@ -39,6 +39,7 @@ struct LoopBench {
   Competitor competitor = Sine(1.5);
   std::unique_ptr<MachineLink> link;
   std::string log_path;
+  bool differences = false;  // whether the estimator goes without the twin
   std::unique_ptr<Estimator> estimator;
   std::unique_ptr<Supervisor> supervisor;
   std::unique_ptr<LoopController> controller;
@@ -46,9 +47,15 @@ struct LoopBench {
   std::unique_ptr<ControlLoop> loop;
 
   void Make() {
-    estimator = std::make_unique<Estimator>(twin, 1.0 / static_cast<double>(config.hz));
-    supervisor = std::make_unique<Supervisor>(limits, PendulumState{}, Joints{5, 0.5},
-                                              twin.sensors.angle_range, twin.sensors.quantum);
+    const double period = 1.0 / static_cast<double>(config.hz);
+    estimator = differences ? std::make_unique<Estimator>(twin.sensors, period)
+                            : std::make_unique<Estimator>(twin, period);
+    supervisor =
+        std::make_unique<Supervisor>(SupervisorConfig{.limits = limits,
+                                                      .motor_limit = {5, 0.5},
+                                                      .angle_range = twin.sensors.angle_range,
+                                                      .quantum = twin.sensors.quantum,
+                                                      .period = period});
     controller = std::make_unique<LoopController>(competitor, config.hz);
     log = std::make_unique<LogWriter>(log_path);
     loop = std::make_unique<ControlLoop>(config, *link, *estimator, *supervisor, *controller, *log);
