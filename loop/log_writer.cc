@@ -1,11 +1,15 @@
 #include "loop/log_writer.h"
 
 #include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <iterator>
+#include <tuple>
 
 #include "core/error.h"
+#include "core/text.h"
 
 namespace upswing {
 namespace {
@@ -38,7 +42,11 @@ bool LogRing::Pop(LoopRow& row) {
 LogWriter::LogWriter(const std::string& path) : ring_(kRows) {
   if (path.empty()) return;
   file_.emplace_back(path);
-  file_.front().CutTo(0);
+  // A log is never replaced: the motion of a machine cannot be had again.
+  const AppendFile& file = file_.front();
+  if (flock(file.descriptor(), LOCK_EX | LOCK_NB) != 0 || file.size() > 0) {
+    throw BadInput(Concat("--log: expected a new file, got ", path, ", which exists"));
+  }
   text_ = kHeader;
   thread_ = std::thread([this] { Work(); });
 }
@@ -60,10 +68,13 @@ void LogWriter::Add(const LoopRow& row, bool waits) {
 }
 
 void LogWriter::Flush() {
+  AppendFile& file = file_.front();
+  const int64_t whole = file.size();  // ends with a whole row
   try {
-    if (error_.empty()) file_.front().Append(text_);
+    if (error_.empty()) file.Append(text_);
   } catch (const Error& error) {
     error_ = error.what();  // the machine goes on; Finish reports it
+    std::ignore = ftruncate(file.descriptor(), whole);
   }
   text_.clear();
 }
@@ -77,7 +88,7 @@ void LogWriter::Work() {
                      r.measured[0], r.measured[1], r.state, r.late);
       if (text_.size() > kFlushBytes) Flush();
     }
-    Flush();
+    if (text_ != kHeader) Flush();  // without a reading the file stays empty
     if (last) return;
     std::this_thread::sleep_for(kPause);
   }

@@ -41,7 +41,8 @@ class LogRing {
 /// during the run, so that a crash leaves what happened before it.
 class LogWriter {
  public:
-  /// Replaces a file that exists. An empty path: rows are dropped. Throws as AppendFile does.
+  /// Expects that the path is new, or an empty file that no other process locks. An empty path:
+  /// rows are dropped. Throws BadInput and changes nothing otherwise, and as AppendFile does.
   explicit LogWriter(const std::string& path);
   /// Ends the thread.
   ~LogWriter();
