@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/error.h"
 #include "core/rng.h"
@@ -23,15 +24,17 @@ std::span<T> ValuesOf(const Array<T>& array) {
   return {array.data(), array.size()};
 }
 
-/// Runs `call`, which needs the interpreter's lock. An exception of Python becomes a Failure with
-/// its message. KeyboardInterrupt and the like pass through.
+/// Runs `call`, which needs the interpreter's lock. An exception of Python becomes an error with
+/// its message: upswing.InputError, the only ValueError that arrives here, BadInput, others a
+/// Failure. KeyboardInterrupt and the like pass through.
 template <typename Call>
 auto CallPython(const Call& call) -> decltype(call()) {
   try {
     return call();
   } catch (const nb::python_error& error) {
     if (!error.matches(PyExc_Exception)) throw;
-    throw Failure(Printable(nb::cast<std::string>(nb::str(error.value()))));
+    const std::string message = Printable(nb::cast<std::string>(nb::str(error.value())));
+    throw error.matches(PyExc_ValueError) ? BadInput(message) : Failure(message);
   }
 }
 
@@ -113,14 +116,15 @@ class CallbackEnv final : public VectorEnv {
  private:
   size_t rows() const { return static_cast<size_t>(spec_.num_envs); }
 
-  /// Throws Failure unless these numbers, the same count for each environment, are finite.
+  /// Throws Failure unless these numbers, the same count for each environment, are finite float32
+  /// numbers.
   template <typename T>
   void CheckFinite(std::span<T> values, const char* what) const {
     for (size_t i = 0; i < values.size(); ++i) {
-      if (std::isfinite(values[i])) continue;
+      if (std::abs(values[i]) <= std::numeric_limits<float>::max()) continue;
       const size_t size = values.size() / rows();
-      throw Failure(Concat("environment ", i / size, ": expected finite numbers, got ", values[i],
-                           " in the ", what,
+      throw Failure(Concat("environment ", i / size, ": expected finite float32 numbers, got ",
+                           values[i], " in the ", what,
                            size > 1 ? Concat(", component ", i % size) : std::string()));
     }
   }

@@ -3,6 +3,7 @@
 bits, files, Ctrl-C, bad input."""
 
 import hashlib
+import itertools
 import json
 import os
 import shutil
@@ -16,7 +17,7 @@ from pathlib import Path
 import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
-from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
 
 import upswing
 from testing import BadInputTest, interrupted
@@ -187,6 +188,105 @@ class Bits(unittest.TestCase):
         self.assertEqual(len(seen), 1)
 
 
+class Answers(Reach):
+    """An environment whose steps return the given parts instead of its own."""
+
+    def __init__(self, **parts):
+        super().__init__()
+        self._parts = parts
+
+    def step(self, action):
+        names = ("obs", "reward", "terminated", "truncated", "info")
+        return tuple((dict(zip(names, super().step(action))) | self._parts).values())
+
+
+class AnswersMany(gym.vector.VectorWrapper):
+    """The same for a vector environment; `change` changes the parts."""
+
+    def __init__(self, env, **change):
+        super().__init__(env)
+        self._change = change
+
+    def step(self, actions):
+        names = ("obs", "reward", "terminated", "truncated", "info")
+        return tuple(self._change.get(name, lambda part: part)(part)
+                     for name, part in zip(names, self.env.step(actions)))
+
+
+class Invariance(unittest.TestCase):
+    """The policy and its returns depend on the environment, not on how it is given or evaluated."""
+
+    OBS = np.linspace(-1, 1, 20).reshape(10, 2)
+
+    def train(self, env, **more):
+        """The policy's actions, and the evaluations' steps and mean returns."""
+        training = upswing.train("sac", env=env, seed=3,
+                                 **SHORT | {"max_episode_steps": 20} | more)
+        returns = {row["step"]: row["mean_return"] for row in training.evaluations}
+        return training.last.act(self.OBS).tolist(), returns
+
+    def test_how_environments_are_given(self):
+        gym.register("test/Reach-v0", Reach, disable_env_checker=True)
+        self.addCleanup(gym.registry.pop, "test/Reach-v0")
+        vector, plain = gym.wrappers.vector, gym.wrappers
+        expected = self.train(Reach, num_envs=3)
+        for env in ("test/Reach-v0", Reach(), plain.RecordEpisodeStatistics(Reach()),
+                    lambda: plain.TimeLimit(Reach(), 1000)):
+            self.assertEqual(self.train(env, num_envs=3), expected)
+        for mode in AutoresetMode:
+            def many(mode=mode):
+                return SyncVectorEnv([Reach] * 3, autoreset_mode=mode)
+
+            for env in (many(), many, vector.RecordEpisodeStatistics(many())):
+                self.assertEqual(self.train(env), expected)
+        self.assertEqual(self.train(gym.make_vec("test/Reach-v0", 3)), expected)
+        wrapped = vector.RescaleObservation(SyncVectorEnv([Bounded] * 3), np.float32(-1),
+                                            np.float32(1))
+        self.assertEqual(self.train(wrapped, eval_env=rescaled), self.train(rescaled, num_envs=3))
+
+    def test_the_double_pendulum_alone_and_as_vector(self):
+        name, settings = "upswing/DoublePendulum-v0", {"physics": "closed-form"}
+        settings |= {"episode_seconds": 0.4}
+        results = []
+        for env, more in ((lambda: gym.make(name, **settings), {"num_envs": 2}),
+                          (gym.make_vec(name, 2, **settings), {})):
+            training = upswing.train("sac", env=env, seed=1, max_episode_steps=20,
+                                     **SHORT | more)
+            results.append([row["mean_return"] for row in training.evaluations])
+        self.assertEqual(*results)
+
+    def test_evaluations_change_nothing(self):
+        for env in (Reach, Reach(), lambda: SyncVectorEnv([Reach] * 2)):
+            act, returns = self.train(env)
+            for more in ({"eval_every": 200}, {"eval_env": Reach}, {"eval_env": Reach()}):
+                again, others = self.train(env, **more)
+                self.assertEqual(again, act)
+                self.assertEqual(others[600], returns[600])
+
+    def test_evaluations_take_functions_in_turn(self):
+        env = SyncVectorEnv([lambda k=k: Answers(reward=k) for k in (1, 2)])
+        self.assertEqual(set(self.train(env)[1].values()), {30})
+
+    def test_numbers_of_other_types(self):
+        expected = self.train(lambda: Answers(reward=1.0))
+        for part in ({"reward": np.array([1.0])}, {"reward": np.array(1)}, {"reward": True},
+                     {"reward": 1, "terminated": np.array([False])},
+                     {"reward": np.float32(1), "terminated": 0, "truncated": np.bool_(False)}):
+            self.assertEqual(self.train(Answers(**part)), self.train(Answers(**part | {
+                "reward": 1.0})), part)
+        self.assertEqual(self.train(AnswersMany(
+            SyncVectorEnv([lambda: Answers(reward=1.0)]), terminated=lambda part: part.astype(int)),
+            eval_env=lambda: Answers(reward=1)), expected)
+
+
+class Bounded(Reach):
+    observation_space = spaces.Box(-20, 20, (2,), np.float32)
+
+
+def rescaled():
+    return gym.wrappers.RescaleObservation(Bounded(), np.float32(-1), np.float32(1))
+
+
 class Closing(unittest.TestCase):
     def test_only_environments_of_the_training_are_closed(self):
         closed = []
@@ -300,7 +400,7 @@ class BadInput(InFolder, BadInputTest):
         """Asserts that nothing is written."""
         out = self.path / "run"
         self.refuse(what, upswing.train, agent, env=env, out=out,
-                    **{"max_episode_steps": 20} | settings)
+                    **{"max_episode_steps": 20, "steps": 200} | settings)
         self.assertFalse(out.exists())
 
     def test_spaces(self):
@@ -342,13 +442,152 @@ class BadInput(InFolder, BadInputTest):
         self.refuse_env("env: expected an environment that copy.deepcopy can copy", locked)
         self.refuse_env("num_envs: expected none with a vector environment of 2, got 3",
                         SyncVectorEnv([Reach] * 2), num_envs=3)
-        self.refuse_env("got CartPoleVectorEnv, whose reset resets every environment",
+        self.refuse_env("got CartPoleVectorEnv, whose reset resets or changes every environment",
                         gym.make_vec("CartPole-v1", 2, vectorization_mode="vector_entry_point"))
         self.refuse_env("env: expected an environment that works, but its step raised ValueError: "
                         "the gear is broken", Broken("raise", at=1))
-        self.refuse_env("env: step: expected finite observations, got nan", Broken("nan", at=1))
-        self.refuse_env("env: step: expected observations of shape (2,)", Broken("shape", at=1))
-        self.refuse_env("env: expected finite rewards, got inf", Broken("reward", at=1))
+        self.refuse_env("expected finite float32 numbers as observations, got nan",
+                        Broken("nan", at=1))
+        self.refuse_env("environment 0: expected observations of shape (2,)", Broken("shape", at=1))
+        self.refuse_env("env: step: expected finite float32 numbers as rewards, got inf",
+                        Broken("reward", at=1))
+
+    def test_shared_environments(self):
+        class Hidden(Reach):
+            """An environment around another one that `unwrapped` does not know."""
+
+            def __init__(self, inner):
+                super().__init__()
+                self.reset, self.step = inner.reset, inner.step
+
+        class Single(Reach):
+            def __deepcopy__(self, memo):
+                return self
+
+        what = ("an environment of its own for each training environment and for evaluations, "
+                "got the")
+        one, other = Reach(), Reach()
+        for n in (None, 1, 4):
+            self.refuse_env(f"env: expected {what} same Reach twice", lambda: one, num_envs=n)
+            self.refuse_env(f"env: expected {what} same Reach twice",
+                            lambda: gym.wrappers.TimeLimit(one, 5), num_envs=n)
+            self.refuse_env("env: expected environments that share no state, got Hidden",
+                            lambda: Hidden(one), num_envs=n)
+        self.refuse_env(f"env: expected {what} same Single twice", Single(), num_envs=2)
+        self.refuse_env(f"env: expected {what} same Reach twice", lambda: one, num_envs=2,
+                        eval_env=other)
+        self.refuse_env("env: expected environments that share no state", lambda: Hidden(one),
+                        num_envs=2, eval_env=other)
+        self.refuse_env("env: expected environments that share no state", one,
+                        eval_env=Hidden(one))
+        for eval_env in (one, lambda: one, gym.wrappers.TimeLimit(one, 5)):
+            for env in (one, gym.wrappers.RecordEpisodeStatistics(one),
+                        SyncVectorEnv([lambda: one])):
+                self.refuse_env(f"eval_env: expected {what}", env, eval_env=eval_env)
+        self.refuse_env(f"eval_env: expected {what}", one, eval_env=lambda: other)
+        for kind in (SyncVectorEnv, AsyncVectorEnv):
+            env = kind([lambda: one] * 2)
+            self.refuse_env(f"env: expected {what}", env)
+            env.close()
+        self.refuse_env(f"env: expected {what}", SyncVectorEnv([lambda: one] * 2), eval_env=Reach)
+        turns = itertools.cycle([Reach(), Reach(), Reach()])
+        self.refuse_env(f"env: expected {what}", lambda: next(turns), num_envs=2)
+
+    def test_vector_wrappers(self):
+        class Own(gym.vector.VectorWrapper):
+            pass
+
+        class OwnSync(SyncVectorEnv):
+            pass
+
+        class OwnStatistics(gym.wrappers.vector.RecordEpisodeStatistics):
+            pass
+
+        wrap, many = gym.wrappers.vector, SyncVectorEnv([Bounded] * 2)
+        wrapped = [
+            wrap.RescaleObservation(many, np.float32(-1), np.float32(1)),
+            wrap.TransformObservation(many, lambda obs: -obs),
+            wrap.TransformReward(many, lambda reward: -reward), wrap.ClipReward(many, -1, 1),
+            wrap.NormalizeReward(many), wrap.NormalizeObservation(many), wrap.ClipAction(many),
+            wrap.TransformAction(many, lambda action: -action), Own(many), OwnStatistics(many),
+            wrap.DtypeObservation(many, np.float64), OwnSync([Bounded] * 2)]
+        for env in wrapped:
+            for outer in (env, wrap.RecordEpisodeStatistics(env)):
+                self.refuse_env("eval_env: expected a single environment or a function that makes "
+                                "one, because evaluations cannot take theirs from "
+                                f"{type(env).__name__}, got none", outer)
+        self.refuse_env("eval_env: expected the spaces of env", wrap.RescaleAction(
+            many, np.float32(-0.5), np.float32(0.5)))
+        self.refuse_env("eval_env: expected the spaces of env", wrapped[0], eval_env=Bounded)
+        self.refuse_env("got ValueError: NormalizeObservation does not support partial resets",
+                        wrap.NormalizeObservation(many),
+                        eval_env=lambda: gym.wrappers.NormalizeObservation(Bounded()))
+
+    def test_statistics_of_wrappers(self):
+        for wrapper in (gym.wrappers.NormalizeObservation, gym.wrappers.NormalizeReward):
+            def make(wrapper=wrapper):
+                return gym.wrappers.TimeLimit(wrapper(Reach()), 9)
+
+            what = ("eval_env: expected a function that makes an environment, because copies of "
+                    f"{wrapper.__name__} do not share its statistics, got ")
+            for env in (make, make(), SyncVectorEnv([make])):
+                self.refuse_env(what + "none", env)
+                self.refuse_env(what + "an environment", env, eval_env=make())
+
+    def test_numbers(self):
+        def both(what, change, single):
+            """A vector environment's and a single environment's part."""
+            env = AnswersMany(SyncVectorEnv([Reach] * 4), **change)
+            self.refuse_env(f"env: {what}", env, eval_env=Reach)
+            for given in (Answers(**single), lambda: Answers(**single)):
+                self.refuse_env(f"environment 0: {what}".replace(
+                    "rewards", "a reward"), given)
+
+        shapes = {"reward": "rewards", "terminated": "terminated", "truncated": "truncated"}
+        for name, what in shapes.items():
+            for wrong in (np.ones(4), [1, 2], None, "1", {}, 1j, np.ones(0)):
+                both(f"expected {what} of ", {name: lambda part, wrong=wrong: (
+                    wrong if np.shape(wrong) != (4,) else wrong[:1])}, {name: wrong})
+            for wrong in (np.ones(1), np.array(1.0), np.ones((4, 1)), np.ones((1, 4))):
+                env = AnswersMany(SyncVectorEnv([Reach] * 4), **{name: lambda _, w=wrong: w})
+                self.refuse_env(f"env: expected {what} of shape (4,), got float64 of shape "
+                                f"{wrong.shape}", env, eval_env=Reach)
+        for name in ("terminated", "truncated"):
+            for wrong in (0.5, 2, np.nan):
+                both(f"expected {name} of True or False", {
+                    name: lambda part, wrong=wrong: np.full(4, wrong)}, {name: wrong})
+        for wrong in (np.ones((1, 2)), np.ones(1), 1.0, None, ["1", "2"], np.ones(2, complex),
+                      np.array([1, None])):
+            both("expected observations of shape ", {"obs": lambda part, wrong=wrong: wrong},
+                 {"obs": wrong})
+        for name, wrong, text in (("reward", 1e39, "rewards, got 1e+39"), ("reward", np.nan, "nan"),
+                                  ("obs", [1e39, 0], "observations, got 1e+39")):
+            self.refuse_env("env: step: expected finite float32 numbers as ",
+                            Answers(**{name: wrong}))
+            self.refuse_env(text, Answers(**{name: wrong}))
+
+    def test_final_observations(self):
+        def spoil(info):
+            if "final_obs" in info:
+                info["final_obs"][0] = np.ones(1)
+            return info
+
+        env = AnswersMany(SyncVectorEnv([Reach] * 2, autoreset_mode=AutoresetMode.SAME_STEP),
+                          info=spoil)
+        with self.assertRaisesRegex(upswing.Failure, r"expected infos\["):
+            upswing.train("sac", env=env, eval_env=Reach, max_episode_steps=20, **SHORT)
+
+    def test_episodes_that_do_not_repeat(self):
+        class Drifting(Reach):
+            drift = 0.0
+
+            def step(self, action):
+                self.drift += 1
+                obs, reward, *others = super().step(action)
+                return obs, reward - self.drift, *others
+
+        with self.assertWarnsRegex(UserWarning, "two episodes after reset"):
+            upswing.train("sac", env=Drifting, max_episode_steps=20, **SHORT)
 
     def test_descriptions(self):
         good = {"name": "A", "observations": 2, "action_limit": [1], "choices": [],
@@ -383,9 +622,9 @@ class BadInput(InFolder, BadInputTest):
 
     def test_faults_stop_a_training_with_its_checkpoint(self):
         for fault, what in (("raise", "step raised ValueError: the gear is broken"),
-                            ("nan", "environment 0: expected finite numbers, got nan in the obs"),
+                            ("nan", "environment 0: expected finite float32 numbers, got nan in the"),
                             ("shape", "environment 0: expected observations of shape (2,)"),
-                            ("reward", "environment 0: expected finite numbers, got inf in the rew")):
+                            ("reward", "environment 0: expected finite float32 numbers, got inf in th")):
             with self.subTest(fault):
                 run = self.path / fault
                 with self.assertRaises(upswing.Failure) as caught:

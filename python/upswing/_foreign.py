@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import copy
+import itertools
 import json
 import re
 import warnings
@@ -13,12 +14,14 @@ from typing import Any, Union
 import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
-from gymnasium.vector import VectorEnv
-from gymnasium.wrappers import RescaleAction
+from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv, VectorEnv, VectorWrapper
+from gymnasium.wrappers import NormalizeObservation, NormalizeReward, RescaleAction
+from gymnasium.wrappers.vector import (DictInfoToList, HumanRendering, RecordEpisodeStatistics,
+                                       RecordVideo)
 from gymnasium.wrappers.vector import RescaleAction as RescaleVectorAction
 
 from . import _upswing
-from ._lanes import Arrays, Lanes, VectorLanes, check_reset
+from ._lanes import Arrays, Lanes, VectorLanes, check_apart, check_reset
 from ._settings import whole_number
 from ._spaces import Spaces, brief, one_line
 
@@ -39,33 +42,45 @@ class Source:
 
     def __init__(self, env: EnvLike, num_envs: int | None, eval_env: EnvLike | None,
                  max_episode_steps: int | None, solved_return: float | None) -> None:
-        first = _make(env, "env")
+        self._bases: dict[int, Any] = {}  # unwrapped environments by identity
+        self._made: list[Any] = []
+        first = self._own(_make(env, "env"), env, "env")
         self._first: Env | VecEnv = first  # the first training environment, or all of them
         self._make_more = _copier(env, first, "env")
-        self._made: list[Any] = [] if first.unwrapped is getattr(env, "unwrapped", None) else [first]
         self.num_envs = _count_of(first, num_envs)
-        trial = _evaluation_env(first, self._make_more, eval_env)
-        if trial.unwrapped is not getattr(eval_env, "unwrapped", None):
-            self._made.append(trial)
-        if isinstance(first, VectorEnv) and eval_env is None:
-            self._make_evaluation: Callable[[], Any] = lambda: _part_of(first)
+        if eval_env is not None:
+            trial = _make(eval_env, "eval_env")
+            self._make_evaluation = _copier(eval_env, trial, "eval_env")
         else:
+            make = _part_maker(first) if isinstance(first, VectorEnv) else self._make_more
+            trial = make()
             # Copies are copies of the trial, which no training changes.
-            self._make_evaluation = (_copier(env, trial, "env") if eval_env is None
-                                     else _copier(eval_env, trial, "eval_env"))
+            self._make_evaluation = (make if isinstance(first, VectorEnv)
+                                     else _copier(env, trial, "env"))
+        self._evaluation_name = "env" if eval_env is None else "eval_env"
+        self._own(trial, eval_env, self._evaluation_name)
+        if isinstance(trial, VectorEnv):
+            raise _upswing.InputError(
+                "eval_env: expected a single environment, got a vector environment")
+        _check_statistics(trial, eval_env)
         self._evaluation: list[Env] = [trial]
         self.space = Spaces(_single(first, "observation_space"), _single(first, "action_space"))
         evaluated = Spaces(trial.observation_space, trial.action_space)
-        if evaluated != self.space:
+        if evaluated != self.space or (
+                eval_env is not None and not evaluated.bounded_as(self.space)):
             raise _upswing.InputError(
                 f"eval_env: expected the spaces of env, {self.space}, got {evaluated}; pass an "
                 "environment with the same spaces")
         self.discrete = bool(self.space.choices)
         self._limit = _limit_of(first, trial, max_episode_steps)
         self.cause: BaseException | None = None
+        self._try(trial)
         if isinstance(first, VectorEnv):
             check_reset(first)
-        self._try(trial)
+            self._try(first)
+        # An environment that is passed itself needs a copy only for a second episode.
+        if not isinstance(eval_env, gym.Env):
+            self._add_evaluation()
         self.description = self._describe(solved_return)
 
     def make(self, seeds: list[int], for_evaluation: bool, arrays: Arrays) -> Callable[[], None]:
@@ -74,22 +89,29 @@ class Source:
             lanes: Lanes | VectorLanes
             if for_evaluation:
                 while len(self._evaluation) < len(seeds):
-                    self._evaluation.append(self._make_evaluation())
-                    self._made.append(self._evaluation[-1])
+                    self._add_evaluation()
                 lanes = Lanes(self._evaluation[:len(seeds)], self, arrays, once=True)
             elif isinstance(self._first, VectorEnv):
+                check_apart(self._evaluation[0], [*self._evaluation[1:], self._first], self.space)
                 lanes = VectorLanes(self._first, self, arrays)
             else:
-                more = [self._make_more() for _ in seeds[1:]]
-                self._made += more
-                envs = [self._first, *more]
-                lanes = Lanes(envs, self, arrays, once=False)
+                more = [self._own(self._make_more(), None, "env") for _ in seeds[1:]]
+                check_apart(self._evaluation[0], [*self._evaluation[1:], self._first], self.space)
+                if more:
+                    check_apart(more[0], [self._first], self.space)
+                lanes = Lanes([self._first, *more], self, arrays, once=False)
             lanes.begin(seeds)
         except _upswing.Error:
             raise
         except Exception as error:
             raise self.failure("reset", error) from error
-        return lanes.step
+
+        def step() -> None:
+            try:
+                lanes.step()
+            except _upswing.InputError as error:
+                raise _upswing.Failure(str(error)) from error
+        return step
 
     @property
     def limit(self) -> int:
@@ -110,24 +132,51 @@ class Source:
                 env.close()
         self._made.clear()
 
-    def _try(self, env: Env) -> None:
+    def _own(self, env: Any, given: Any, name: str) -> Any:
+        """Notes an environment, to be closed unless it was `given`. Returns it. Raises InputError
+        if it has a part in common with an earlier one."""
+        if env.unwrapped is not getattr(given, "unwrapped", None):
+            self._made.append(env)
+        parts = getattr(env.unwrapped, "envs", None) if isinstance(env, VectorEnv) else None
+        bases = [part.unwrapped for part in parts or [] if isinstance(part, gym.Env)]
+        for base in [env.unwrapped, *bases]:
+            if id(base) in self._bases:
+                raise _upswing.InputError(
+                    f"{name}: expected an environment of its own for each training environment and "
+                    f"for evaluations, got the same {type(base).__name__} twice; pass a function "
+                    "that makes a new one in each call")
+            self._bases[id(base)] = base
+        return env
+
+    def _add_evaluation(self) -> None:
+        self._evaluation.append(self._own(self._make_evaluation(), None, self._evaluation_name))
+
+    def _try(self, env: Env | VecEnv) -> None:
         """Makes a reset and a step, before anything is written. Raises InputError."""
-        call = "reset"
-        try:
-            obs, _ = env.reset(seed=0)
-            self.space.check(obs, "env: reset")
-            call = "step"
-            obs, reward, _, _, _ = env.step(self.space.any_action())
-            self.space.check(obs, "env: step")
-            reward = float(reward)
-        except _upswing.Error:
-            raise
-        except Exception as error:
-            raise _upswing.InputError(
-                f"env: expected an environment that works, but its {call} raised "
-                f"{one_line(error)}") from error
-        if not np.isfinite(reward):
-            raise _upswing.InputError(f"env: expected finite rewards, got {reward}")
+        vector, n = isinstance(env, VectorEnv), getattr(env, "num_envs", 1)
+        shape = (n, *self.space.obs_shape)
+        arrays: Arrays = {"obs": np.zeros(shape), "next_obs": np.zeros(shape)}
+        arrays |= {name: np.zeros(n) for name in ("reward", "terminated", "truncated")}
+        arrays["action"] = self.space.any_actions(n)
+        lanes = (VectorLanes(env, self, arrays) if vector  # type: ignore[arg-type]
+                 else Lanes([env], self, arrays, once=True))
+        for call, act in (("reset", lambda: lanes.begin(list(range(n)))), ("step", lanes.step)):
+            try:
+                act()
+            except _upswing.Failure as failure:
+                if failure.__cause__ is None:
+                    raise
+                raise _upswing.InputError(
+                    f"env: expected an environment that works, but its {call} raised "
+                    f"{one_line(failure.__cause__)}") from failure.__cause__
+            for name in ("obs", "next_obs", "reward"):
+                values = arrays[name].ravel()
+                with np.errstate(over="ignore"):
+                    wrong = values[~np.isfinite(values.astype(np.float32))]
+                if wrong.size > 0:
+                    raise _upswing.InputError(
+                        f"env: {call}: expected finite float32 numbers as "
+                        f"{'rewards' if name == 'reward' else 'observations'}, got {wrong[0]}")
 
     def _describe(self, solved_return: float | None) -> str:
         env = self._evaluation[0]
@@ -213,36 +262,53 @@ def _copier(env: EnvLike, made: Any, name: str) -> Callable[[], Any]:
     return duplicate
 
 
-def _evaluation_env(first: Any, more: Callable[[], Any], eval_env: EnvLike | None) -> Env:
-    """The first environment of evaluations."""
-    if eval_env is not None:
-        made = _make(eval_env, "eval_env")
-    elif not isinstance(first, VectorEnv):
-        made = more()
-    else:
-        made = _part_of(first)
-    if isinstance(made, VectorEnv):
+# Vector wrappers without which observations, rewards and ends are the same; scaled actions are
+# compared as spaces.
+_PLAIN = (DictInfoToList, HumanRendering, RecordEpisodeStatistics, RecordVideo, RescaleVectorAction)
+
+
+def _part_maker(env: VecEnv) -> Callable[[], Any]:
+    """A function that makes single environments like those of a vector environment, in turn. Raises
+    InputError if they might not be alike."""
+    base: Any = env
+    while type(base) in _PLAIN:
+        base = base.env
+    functions = base.env_fns if type(base) in (AsyncVectorEnv, SyncVectorEnv) else []
+    if isinstance(base, VectorWrapper) or not (functions or base.spec):
         raise _upswing.InputError(
-            "eval_env: expected a single environment, got a vector environment")
-    env: Env = made
-    return env
+            "eval_env: expected a single environment or a function that makes one, because "
+            f"evaluations cannot take theirs from {type(base).__name__}, got none; pass an "
+            "environment with the same observations and rewards")
+    if not functions:
+        of_vector = ("num_envs", "vectorization_mode", "vector_kwargs", "autoreset_mode")
+        settings = {k: v for k, v in base.spec.kwargs.items() if k not in of_vector}
+        functions = [lambda: gym.make(base.spec.id, **settings)]
+    in_turn = itertools.cycle(functions)
+
+    def make() -> Any:
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                return _symmetric(next(in_turn)())
+        except Exception as error:
+            raise _upswing.InputError(
+                "eval_env: expected an environment or a function that makes one, because making a "
+                f"single environment of {type(base).__name__} raised {one_line(error)}, got none"
+            ) from error
+    return make
 
 
-def _part_of(env: VecEnv) -> Any:
-    """A single environment like those of a vector environment."""
-    functions = getattr(env.unwrapped, "env_fns", None)
-    with contextlib.suppress(Exception), warnings.catch_warnings():  # the error below says what to do
-        warnings.simplefilter("ignore")
-        if functions:
-            return _symmetric(functions[0]())
-        if env.spec is not None:
-            of_vector = ("num_envs", "vectorization_mode", "vector_kwargs", "autoreset_mode")
-            settings = {k: v for k, v in env.spec.kwargs.items() if k not in of_vector}
-            return _symmetric(gym.make(env.spec.id, **settings))
-    raise _upswing.InputError(
-        "eval_env: expected an environment or a function that makes one, because evaluations need "
-        f"single environments and {type(env.unwrapped).__name__} does not say how to make them, "
-        "got none")
+def _check_statistics(env: Env, given: EnvLike | None) -> None:
+    """Raises InputError if copies of an evaluation's environment have statistics of their own."""
+    wrapper: Any = env
+    while isinstance(wrapper, gym.Wrapper):
+        if isinstance(wrapper, (NormalizeObservation, NormalizeReward)) and (
+                given is None or isinstance(given, gym.Env)):
+            raise _upswing.InputError(
+                "eval_env: expected a function that makes an environment, because copies of "
+                f"{type(wrapper).__name__} do not share its statistics, got "
+                f"{'none' if given is None else 'an environment'}")
+        wrapper = wrapper.env
 
 
 def _count_of(first: Any, num_envs: int | None) -> int:

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import random
 import signal
 import threading
+import warnings
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
-from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector import (AsyncVectorEnv, AutoresetMode, SyncVectorEnv, VectorEnv,
+                              VectorWrapper)
 
 from . import _upswing
-from ._spaces import one_line
+from ._spaces import Spaces, flags, numbers, one_line
+from .envs import DoublePendulumVectorEnv
 
 if TYPE_CHECKING:
     from ._foreign import Source
@@ -32,6 +36,7 @@ class Lanes:
         self._arrays = arrays
         self._lengths = [0] * len(envs)
         self._ended = [False] * len(envs)
+        self._wheres = [f"environment {i}: expected " for i in range(len(envs))]
 
     def begin(self, seeds: list[int]) -> None:
         for i, (env, seed) in enumerate(zip(self._envs, seeds)):
@@ -45,13 +50,15 @@ class Lanes:
                 continue
             try:
                 obs, reward, terminated, truncated, _ = env.step(source.space.action_of(a["action"][i]))
-                a["reward"][i] = reward
             except Exception as error:
                 raise source.failure("step", error, i) from error
+            where = self._wheres[i]
             self._store(i, obs, "next_obs")
+            a["reward"][i] = numbers(reward, (), where + "a reward")
             self._lengths[i] += 1
-            done = bool(terminated)
-            out = not done and (bool(truncated) or self._lengths[i] >= limit)
+            done = bool(flags(terminated, (), where + "terminated"))
+            out = bool(flags(truncated, (), where + "truncated"))
+            out = not done and (out or self._lengths[i] >= limit)
             a["terminated"][i], a["truncated"][i] = done, out
             if not (done or out):
                 a["obs"][i] = a["next_obs"][i]
@@ -69,12 +76,8 @@ class Lanes:
         self._lengths[i] = 0
 
     def _store(self, i: int, obs: Any, name: str) -> None:
-        shape = self._source.space.obs_shape
-        if np.shape(obs) != shape:
-            raise _upswing.Failure(
-                f"environment {i}: expected observations of shape {shape}, as the environment's "
-                f"observation_space, got shape {np.shape(obs)}")
-        self._arrays[name][i] = obs
+        self._arrays[name][i] = numbers(obs, self._source.space.obs_shape,
+                                        self._wheres[i] + "observations")
 
 
 WANTED = ("env: expected a vector environment with AutoresetMode.SAME_STEP, or with a reset that knows "
@@ -93,8 +96,8 @@ def check_reset(env: VecEnv) -> None:
     except Exception as error:
         raise _upswing.InputError(f"{WANTED}, got {one_line(error)}") from error
     if not knows:
-        raise _upswing.InputError(f"{WANTED}, got {type(env.unwrapped).__name__}, whose reset "
-                                  "resets every environment")
+        raise _upswing.InputError(f"{WANTED}, got {type(env).__name__}, whose reset resets or "
+                                  "changes every environment")
 
 
 def _resets_itself(env: VecEnv) -> bool:
@@ -113,7 +116,16 @@ class VectorLanes:
         self._lengths = np.zeros(env.num_envs, np.int64)
 
     def begin(self, seeds: list[int]) -> None:
-        obs, _ = self._env.reset(seed=seeds[0])
+        # One seed for each environment, as for single environments, if all parts know such seeds.
+        inner = self._env
+        while isinstance(inner, VectorWrapper) and (
+                type(inner).reset.__module__.startswith("gymnasium.")):
+            inner = inner.env
+        each = isinstance(inner, (SyncVectorEnv, AsyncVectorEnv, DoublePendulumVectorEnv))
+        try:
+            obs, _ = self._env.reset(seed=seeds if each else seeds[0])  # type: ignore[arg-type]
+        except Exception as error:
+            raise self._source.failure("reset", error) from error
         self._store(obs, "obs")
 
     def step(self) -> None:
@@ -125,25 +137,23 @@ class VectorLanes:
             raise self._source.failure("step", error) from error
 
     def _step(self) -> None:
-        a, space = self._arrays, self._source.space
-        if space.choices:
-            actions = a["action"][:, 0].astype(np.int64)
-        else:
-            shape = (self._env.num_envs, *(space.action.shape or ()))
-            actions = a["action"].astype(space.action.dtype).reshape(shape)
+        a, count = self._arrays, (self._env.num_envs,)
+        actions = self._source.space.batch_of(a["action"])
         obs, reward, terminated, truncated, info = self._env.step(actions)
         self._store(obs, "next_obs")
         self._store(obs, "obs")
-        done = np.asarray(terminated, bool) | np.asarray(truncated, bool)
+        a["reward"][:] = numbers(reward, count, "env: expected rewards")
+        dead = flags(terminated, count, "env: expected terminated").copy()
+        done = dead | flags(truncated, count, "env: expected truncated")
         self._lengths += 1
         late = ~done & (self._lengths >= self._source.limit)
-        a["reward"][:] = reward
-        a["terminated"][:] = terminated
-        a["truncated"][:] = (done | late) & ~np.asarray(terminated, bool)
+        a["terminated"][:] = dead
+        a["truncated"][:] = (done | late) & ~dead
         self._lengths[done | late] = 0
         if self._same_step:
             for i in np.flatnonzero(done):
-                a["next_obs"][i] = info["final_obs"][i]
+                a["next_obs"][i] = numbers(info["final_obs"][i], self._source.space.obs_shape,
+                                           f"environment {i}: expected infos[\"final_obs\"]")
         again = late if self._same_step else done | late
         if again.any():
             self._begin_again(again)
@@ -158,10 +168,38 @@ class VectorLanes:
 
     def _store(self, obs: Any, name: str) -> None:
         array = self._arrays[name]
-        if np.shape(obs) != array.shape:
-            raise _upswing.Failure(
-                f"env: expected observations of shape {array.shape}, got {np.shape(obs)}")
-        array[:] = obs
+        array[:] = numbers(obs, array.shape, "env: expected observations")
+
+
+def check_apart(one: Env, others: list[Any], space: Spaces) -> None:
+    """Raises InputError if steps of other environments change what `one` returns. Warns if `one`
+    does not repeat itself."""
+    def returned(disturbed: bool) -> list[npt.NDArray[Any]]:
+        seen = [one.reset(seed=0)[0]]
+        numpy_state, python_state = np.random.get_state(), random.getstate()
+        for other in others if disturbed else []:
+            other.reset(seed=1)
+            actions = space.any_actions(getattr(other, "num_envs", 1))
+            other.step(space.batch_of(actions) if isinstance(other, VectorEnv)
+                       else space.action_of(actions[0]))
+        np.random.set_state(numpy_state)
+        random.setstate(python_state)
+        seen += one.step(space.action_of(space.any_actions(1)[0]))[:3]
+        return [np.array(part, np.float64) for part in seen]
+
+    def same(a: list[npt.NDArray[Any]], b: list[npt.NDArray[Any]]) -> bool:
+        return all(np.array_equal(x, y, equal_nan=True) for x, y in zip(a, b))
+
+    alone = returned(False)
+    if not same(alone, returned(False)):
+        warnings.warn(
+            "env: two episodes after reset(seed=0) differ, so that trainings do not repeat and "
+            "returns depend on eval_every; draw random numbers from self.np_random after "
+            "super().reset(seed=seed), and let reset clear all other state", stacklevel=5)
+    elif not same(alone, returned(True)):
+        raise _upswing.InputError(
+            f"env: expected environments that share no state, got {type(one.unwrapped).__name__}, "
+            "where a step of one changes another; give each its own in __init__")
 
 
 class Interrupts:

@@ -11,6 +11,7 @@ from gymnasium import spaces
 from . import _upswing
 
 MOST_CHOICES = 1001  # discrete actions
+_SCALARS = (float, np.float64, np.float32, int)  # usual types of a reward
 
 
 class Spaces:
@@ -21,7 +22,7 @@ class Spaces:
             raise _upswing.InputError(
                 f"env: expected a Box observation space of one dimension, got {brief(obs)}; "
                 "gymnasium.wrappers.FlattenObservation makes one of others")
-        self.obs_shape = obs.shape
+        self.obs, self.obs_shape = obs, obs.shape
         self.action = action
         self.choices: list[float] = []
         if isinstance(action, spaces.Discrete):
@@ -54,29 +55,54 @@ class Spaces:
             return int(row[0])
         return row.astype(self.action.dtype).reshape(self.action.shape)
 
-    def any_action(self) -> Any:
-        """An action for a trial."""
-        if self.choices:
-            return int(self.choices[0])
-        return np.zeros(self.action.shape or (), self.action.dtype)
+    def any_actions(self, n: int) -> npt.NDArray[np.float64]:
+        """Actions (N, A) for a trial, as the C++ code gives them."""
+        return np.full((n, len(self.limits)), self.choices[0] if self.choices else 0.0)
 
-    def check(self, obs: Any, where: str) -> None:
-        """Raises InputError unless an observation has the space's shape and finite numbers."""
-        array = np.asarray(obs)
-        if array.shape != self.obs_shape or array.dtype.kind not in "fiub":
-            raise _upswing.InputError(
-                f"{where}: expected observations of shape {self.obs_shape}, as the environment's "
-                f"observation_space, got {array.dtype} of shape {array.shape}")
-        if not np.isfinite(array).all():
-            raise _upswing.InputError(
-                f"{where}: expected finite observations, got {array[~np.isfinite(array)][0]}")
+    def batch_of(self, rows: npt.NDArray[np.float64]) -> Any:
+        """A vector environment's actions for rows (N, A) of the C++ code."""
+        if self.choices:
+            return rows[:, 0].astype(np.int64)
+        return rows.astype(self.action.dtype).reshape(len(rows), *(self.action.shape or ()))
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Spaces) and (
             self.obs_shape == other.obs_shape and self.action == other.action)
 
+    def bounded_as(self, other: Spaces) -> bool:
+        """Whether observations have the bounds of the other's."""
+        return (np.array_equal(self.obs.low, other.obs.low)
+                and np.array_equal(self.obs.high, other.obs.high))
+
     def __str__(self) -> str:
-        return f"observations of shape {self.obs_shape} and actions {brief(self.action)}"
+        return f"observations {brief(self.obs)} and actions {brief(self.action)}"
+
+
+def numbers(value: Any, shape: tuple[int, ...], what: str) -> Any:
+    """An environment's numbers as an array of this shape. The shape () accepts any array of one
+    number. Raises InputError, whose message begins with `what`."""
+    if type(value) in _SCALARS and not shape:  # fast, as each step needs it
+        return value
+    wanted = f"{what} of shape {shape}" if shape else f"{what} of one number"
+    try:
+        array = np.asarray(value)
+    except Exception as error:
+        raise _upswing.InputError(f"{wanted}, got no array: {one_line(error)}") from error
+    if shape == () and array.size == 1:
+        array = array.reshape(())
+    if array.shape != shape or array.dtype.kind not in "fiub":
+        raise _upswing.InputError(f"{wanted}, got {array.dtype} of shape {array.shape}")
+    return array
+
+
+def flags(value: Any, shape: tuple[int, ...], what: str) -> Any:
+    """An environment's truth values as an array of this shape. Raises InputError."""
+    if type(value) is bool and not shape:  # fast, as each step needs it
+        return value
+    array = np.asarray(numbers(value, shape, what))
+    if array.dtype.kind != "b" and not ((array == 0) | (array == 1)).all():
+        raise _upswing.InputError(f"{what} of True or False, got others")
+    return array.astype(np.bool_, copy=False)
 
 
 def brief(space: Any) -> str:

@@ -99,10 +99,11 @@ def train(
         agent: named agent, see `upswing.agents` (default "d3qn"; with `env` "fast" for Discrete
             actions and "sac" for a Box)
         env: id of a Gymnasium environment, an environment (copied for more), a vector environment,
-            or a function that makes an environment
+            or a function that makes a new environment in each call
         num_envs: number of parallel environments (default 1, PPO 8; a vector environment has its
             own number)
-        eval_env: environment for evaluations, like `env` (default: a copy of `env`)
+        eval_env: environment for evaluations, or a function that makes it, apart from `env` and with
+            its spaces (default: a copy of `env`)
         max_episode_steps: largest number of steps of an episode (default: of the environment)
         solved_return: mean return of an evaluation that passes; two passed evaluations in a row
             end the training (default: train to the last step)
