@@ -116,12 +116,12 @@ std::optional<Frame> FakeMachine::Answer(const Frame& command, double now) {
   if (!asked) locked_ = false;
   const bool enabled = asked && !locked_;
   if (enabled && enabled_since_ == MachineFaults::kNever) enabled_since_ = now;
-  const MachineReading reading = Measure(now);
   Joints torque{};
   for (size_t j = 0; enabled && j < 2; ++j) {
     torque[j] = std::clamp(command.torque[j], -limit_, limit_);
   }
   Apply(torque);
+  const MachineReading reading = Measure(now);
   ++sequence_;
   if (now - enabled_since_ >= config_.machine.silent_after) return {};
   return Frame{.kind = Frame::Kind::kReading,

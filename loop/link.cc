@@ -40,11 +40,10 @@ void TwinLink::WaitUntil(double time) {
 
 std::optional<LinkReading> TwinLink::Exchange(const Joints& torque, bool enabled,
                                               double /*until*/) {
-  const LinkReading reading{{machine_.Read(), machine_.time()}, machine_.time(), false};
   Joints applied{};
   for (size_t j = 0; enabled && j < 2; ++j) applied[j] = std::clamp(torque[j], -limit_, limit_);
   machine_.Command(applied);
-  return reading;
+  return LinkReading{{machine_.Read(), machine_.time()}, machine_.time(), false};
 }
 
 FrameBytes LinkProtocol::Command(const Joints& torque, bool enabled, double now) {

@@ -45,9 +45,8 @@ Estimator::Estimator(const MachineSensors& sensors, double period)
 }
 
 Estimator::Estimator(const Twin& twin, double period) : Estimator(twin.sensors, period) {
-  const double delay = std::max(twin.actuator.delay, 0.0);
-  model_.emplace(Model{BodyOf(twin), Drive(delay, twin.actuator.lag),
-                       std::max(-twin.actuator.delay, 0.0), delay + twin.actuator.lag, 0});
+  const Actuator& motor = twin.actuator;
+  model_.emplace(Model{BodyOf(twin), Drive(motor.delay, motor.lag), motor.delay + motor.lag, 0});
   model_->hanging = -model_->body.At({}).energy;
   // The drive's memory grows now, not in the loop.
   for (int i = kMostKept; i > 0; --i) model_->drive.Add(-1 - i * 1e-3, {});
@@ -143,9 +142,9 @@ void Estimator::Correct(const Joints& angle, double seconds) {
 bool Estimator::Slow() const { return x_.segment<2>(kVelocity).cwiseAbs().maxCoeff() < kMoving; }
 
 void Estimator::Take(const TimedReading& reading, bool driven) {
-  const double moment = reading.time - model_->age, seconds = moment - time_;
+  const double seconds = reading.time - time_;
   if (!begin_ || std::abs(seconds) > kLongestGap) {
-    Begin(reading.angle, moment);
+    Begin(reading.angle, reading.time);
     return;
   }
   if (seconds <= 0) return;
@@ -157,7 +156,7 @@ void Estimator::Take(const TimedReading& reading, bool driven) {
   // Links may rest for minutes, held off their equilibrium: nothing is learned.
   x_ = x;
   P_ = P;
-  Begin(reading.angle, moment);
+  Begin(reading.angle, reading.time);
 }
 
 void Estimator::Update(double time, const Joints& sent, const TimedReading* reading) {

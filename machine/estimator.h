@@ -62,7 +62,6 @@ class Estimator {
   struct Model {
     Manipulator body;
     Drive drive;
-    double age;      // of the readings, s
     double horizon;  // from sending a torque to its effect, s
     double hanging;  // energy below upright of the links that hang, J
   };

@@ -9,6 +9,7 @@
 
 #include "core/rng.h"
 #include "machine/simulated_machine.h"
+#include "machine/validate.h"
 
 namespace upswing {
 namespace {
@@ -53,8 +54,8 @@ Twin SomeMachine(Rng& rng) {
   return twin;
 }
 
-/// Logs of 10 s with random multi-sine torques on both joints.
-std::vector<MachineLog> LogsOf(const Twin& machine, int count, uint64_t seed) {
+/// Logs with random multi-sine torques on both joints.
+std::vector<MachineLog> LogsOf(const Twin& machine, int count, double seconds, uint64_t seed) {
   std::vector<MachineLog> logs;
   for (int i = 0; i < count; ++i) {
     Rng rng(seed, "log", static_cast<uint64_t>(i));
@@ -76,7 +77,7 @@ std::vector<MachineLog> LogsOf(const Twin& machine, int count, uint64_t seed) {
       return torque;
     };
     logs.push_back(
-        RunLoop(machine, {.seconds = 10, .seed = seed + static_cast<uint64_t>(i)}, torques));
+        RunLoop(machine, {.seconds = seconds, .seed = seed + static_cast<uint64_t>(i)}, torques));
     logs.back().name = "log";
   }
   return logs;
@@ -104,7 +105,7 @@ TEST(Fit, FindsTheMachineBehindItsLogs) {
     Rng rng(7, "machine", static_cast<uint64_t>(draw));
     const Twin machine = SomeMachine(rng);
     const auto logs =
-        LogsOf(machine, given != nullptr ? 12 : 3, 100 + 10 * static_cast<uint64_t>(draw));
+        LogsOf(machine, given != nullptr ? 12 : 3, 10, 100 + 10 * static_cast<uint64_t>(draw));
     const FitResult fit = Fit(logs, FirstGuess(), kValues, {}, &pool);
     const Manipulator truth = BodyOf(machine), found = BodyOf(fit.twin);
     const auto note = [&](const char* name, double got, double true_value) {
@@ -161,7 +162,7 @@ std::vector<double> CovarianceOfZeros(const std::vector<double>& zeros) {
     Twin machine = FirstGuess();
     machine.sensors.zero1 = zero;
     machine.sensors.zero2 = -zero;
-    logs.push_back(LogsOf(machine, 1, 50 + logs.size()).front());
+    logs.push_back(LogsOf(machine, 1, 10, 50 + logs.size()).front());
     logs.back().name = std::string("session ") + "abcd"[logs.size() - 1];
   }
   ThreadPool pool(2);
@@ -178,6 +179,36 @@ TEST(Fit, CountsThePriorAsASessionInTheCovarianceBetweenSessions) {
   EXPECT_NEAR(four[0], (kPrior + kSquares) / 4, 0.2e-3);
   EXPECT_NEAR(four[3], (kPrior + kSquares) / 4, 0.2e-3);
   EXPECT_NEAR(four[1], -kSquares / 4, 0.2e-3);
+}
+
+/// Simulation, prediction and fit give the times of the motors the same meaning and sign.
+TEST(Fit, FindsTheTimesOfTheMotorsAndPredictsWithThemBest) {
+  ThreadPool pool(2);
+  for (const double delay : {-0.004, -0.002, -0.001, 0.0, 0.002, 0.004}) {
+    Twin machine = FirstGuess();
+    machine.loop = {.period = 0.005, .jitter = 0.0002};
+    machine.actuator = {.delay = delay,
+                        .lag = 0.004,
+                        .passive_limit = 6,
+                        .current_delay = 0.001 - delay / 2,
+                        .current_inertia = 0.002};
+    const std::vector<MachineLog> logs = LogsOf(machine, 1, 3, 20);
+    Twin first = machine;
+    first.actuator = {.passive_limit = 6, .current_inertia = 0.002};
+    const Actuator found =
+        Fit(logs, first, {"delay", "lag", "current_delay"}, {}, &pool).twin.actuator;
+    EXPECT_NEAR(found.delay, delay, 1e-4);
+    EXPECT_NEAR(found.lag, machine.actuator.lag, 1e-4);
+    EXPECT_NEAR(found.current_delay, machine.actuator.current_delay, 1e-4);
+    const auto error = [&](double more) {
+      Twin other = machine;
+      other.actuator.delay += more;
+      return Median(WindowErrors(logs.front(), other, 0.5, false));
+    };
+    for (const double more : {-0.002, -0.001, 0.001, 0.002}) {
+      EXPECT_LT(error(0), 0.1 * error(more)) << delay;
+    }
+  }
 }
 
 }  // namespace

@@ -10,11 +10,7 @@ double Rounded(double number, double quantum) {
 }
 
 SimulatedMachine::SimulatedMachine(const Twin& twin, const PendulumState& start)
-    : twin_(twin),
-      body_(BodyOf(twin)),
-      drive_(std::max(twin.actuator.delay, 0.0), twin.actuator.lag),
-      angle_age_(std::max(-twin.actuator.delay, 0.0)),
-      torque_age_(std::max(twin.actuator.current_delay - angle_age_, 0.0)) {
+    : twin_(twin), body_(BodyOf(twin)), drive_(twin.actuator.delay, twin.actuator.lag) {
   moments_.push_back({0, start, body_.Acceleration(start, {})});
 }
 
@@ -24,21 +20,45 @@ void SimulatedMachine::Advance(double time) {
   const double h = (time - begin) / steps;
   if (h <= 0) return;
   for (int i = 0; i < steps; ++i) {
-    Moment next = moments_.back();
-    next.state = StepMotion(body_, drive_, next.state, next.time, h, cursor_, next.acceleration);
-    next.time = i + 1 == steps ? time : begin + (i + 1) * h;
-    moments_.push_back(next);
+    const double end = i + 1 == steps ? time : begin + (i + 1) * h;
+    moments_.push_back(After(moments_.back(), h, end, cursor_));
   }
-  const double oldest = time - std::max(angle_age_, torque_age_);
+  const double oldest = time - std::max({twin_.actuator.current_delay, -twin_.actuator.delay, 0.0});
   while (moments_.size() > 2 && moments_[1].time <= oldest) moments_.pop_front();
   constexpr double kKept = 0.2;  // s
   drive_.Forget(time - kKept);
   cursor_ = 0;
 }
 
-void SimulatedMachine::Command(const Joints& torque) { drive_.Add(time(), torque); }
+SimulatedMachine::Moment SimulatedMachine::After(const Moment& moment, double h, double time,
+                                                 int& cursor) const {
+  Moment next = moment;
+  next.state = StepMotion(body_, drive_, next.state, next.time, h, cursor, next.acceleration);
+  next.time = time;
+  return next;
+}
+
+void SimulatedMachine::Command(const Joints& torque) {
+  const double now = time();
+  drive_.Add(now, torque);
+  // Repeat the motion since a negative delay.
+  while (moments_.size() > 1 && moments_.back().time > now + twin_.actuator.delay) {
+    moments_.pop_back();
+  }
+  cursor_ = 0;
+  Advance(now);
+}
 
 SimulatedMachine::Moment SimulatedMachine::Ago(double age) const {
+  if (age < 0) {
+    Moment moment = moments_.back();
+    int cursor = 0;
+    const int steps = MotionSteps(-age);
+    for (int i = 0; i < steps; ++i) {
+      moment = After(moment, -age / steps, moment.time - age / steps, cursor);
+    }
+    return moment;
+  }
   const double then = time() - age;
   if (then <= moments_.front().time) return moments_.front();
   size_t i = moments_.size() - 1;
@@ -55,11 +75,10 @@ SimulatedMachine::Moment SimulatedMachine::Ago(double age) const {
 
 MachineReading SimulatedMachine::Read() const {
   const MachineSensors& sensors = twin_.sensors;
-  const PendulumState state = Ago(angle_age_).state;
-  const Moment late = Ago(torque_age_);
+  const Moment late = Ago(twin_.actuator.current_delay);
   int cursor = 0;
   const Joints torque = drive_.At(late.time, cursor);
-  MachineReading reading{{state.q1 + sensors.zero1, state.q2 + sensors.zero2}, {}};
+  MachineReading reading{{state().q1 + sensors.zero1, state().q2 + sensors.zero2}, {}};
   for (int j = 0; j < 2; ++j) {
     double& angle = reading.angle[j];
     angle = Rounded(angle, sensors.quantum);
@@ -94,10 +113,10 @@ MachineLog RunLoop(const Twin& twin, const LoopRun& run, const CycleController& 
   double time = 0;
   while (time <= run.seconds) {
     machine.Advance(time);
-    const MachineReading reading = machine.Read();
     Joints torque{};
     for (int j = 0; j < 2; ++j) torque[j] = std::clamp(command[j], -limit[j], limit[j]) + push[j];
     machine.Command(torque);
+    const MachineReading reading = machine.Read();
     const CycleInput input{time, reading.angle, velocity.Update(time, reading.angle)};
     command = controller(input);
     if (run.push) push = run.push(time);

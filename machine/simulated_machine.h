@@ -26,8 +26,8 @@ struct TimedReading : MachineReading {
   double time = 0;
 };
 
-/// Motors, links and encoders. A negative delay of the twin's motors becomes the age of the
-/// readings: only the sum of both can be told from logs.
+/// Motors, links and encoders. Time is that of the encoders: the angles of a reading are those of
+/// its moment. With a negative delay a torque acts before the moment in which it is sent.
 class SimulatedMachine {
  public:
   /// Begins at time 0 in a state, whose angles are true ones, without torque.
@@ -37,7 +37,8 @@ class SimulatedMachine {
   void Advance(double time);
   /// Sends torques (N·m) now. The motors hold them until the next ones.
   void Command(const Joints& torque);
-  /// Reads encoders and drives now.
+  /// Reads encoders and drives now. A loop reads after it sent its torques, because torques with a
+  /// negative delay have an effect on the reading.
   MachineReading Read() const;
 
   double time() const { return moments_.back().time; }
@@ -50,15 +51,18 @@ class SimulatedMachine {
     PendulumState state;
     Joints acceleration;  // rad/s²
   };
-  /// The moment `age` seconds ago, by interpolation.
+  /// The moment at `time` (s), after `h` seconds of motion from another.
+  Moment After(const Moment& moment, double h, double time, int& cursor) const;
+  /// The moment `age` seconds ago, by interpolation. Negative: ahead, under the torques sent so
+  /// far.
   Moment Ago(double age) const;
 
   Twin twin_;
   Manipulator body_;
   Drive drive_;
   int cursor_ = 0;
-  double angle_age_, torque_age_;  // s
-  std::deque<Moment> moments_;     // the newest last; at least as long as the ages
+  std::deque<Moment> moments_;  // the newest last; as long as reported torques are old and
+                                // torques act back
 };
 
 /// The velocities (rad/s) that the control loop computes from measured angles: finite differences,
@@ -97,8 +101,8 @@ struct LoopRun {
   uint64_t seed = 0;       // of the cycles' periods
 };
 
-/// Runs a controller on the twin's machine in the twin's loop, and returns the log. A cycle reads
-/// the angles while it sends the torques of the cycle before.
+/// Runs a controller on the twin's machine in the twin's loop, and returns the log. A cycle sends
+/// the torques of the cycle before and then reads the angles.
 MachineLog RunLoop(const Twin& twin, const LoopRun& run, const CycleController& controller);
 
 }  // namespace upswing

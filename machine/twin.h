@@ -18,10 +18,12 @@ namespace upswing {
 /// The torque that the drive reports is τ - current_inertia · q̈, current_delay old. The motor's
 /// induced voltage disturbs the current in proportion to the acceleration.
 struct Actuator {
-  double delay = 0;            // from reading the angles to the start of the response, s
+  // From reading the angles to the response of the torque sent with them, s. Negative: the torque
+  // acts before the reading.
+  double delay = 0;
   double lag = 0;              // time constant, s
   double passive_limit = 0;    // torque limit of the joint that is not actuated, N·m
-  double current_delay = 0;    // age of the reported torque, s
+  double current_delay = 0;    // time from the reported torque to the angles' reading, s
   double current_inertia = 0;  // kg·m²
 
   /// Declares each setting in `options`: name, range, unit, help.
@@ -41,8 +43,8 @@ struct MachineSensors {
   void Describe(Options& options);
 };
 
-/// Timing of the control loop. A cycle reads the angles and sends the torque that the cycle before
-/// it computed.
+/// Timing of the control loop. A cycle sends the torque that the cycle before it computed, and
+/// reads the angles.
 struct LoopTiming {
   double period = 0.002;  // median time between two cycles, s
   double jitter = 0;      // standard deviation of a period, s
