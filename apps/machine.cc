@@ -70,8 +70,14 @@ int RunCheck(const MachineArguments& a) {
   return std::ranges::any_of(checks, &LogCheck::faulty) ? 1 : 0;
 }
 
-/// Reads logs, and warns of those with faults.
-std::vector<MachineLog> ReadLogs(std::span<const std::string> files, const std::string& columns) {
+/// Reads logs in the order of their names, and warns of those with faults.
+std::vector<MachineLog> ReadLogs(std::span<const std::string> given, const std::string& columns) {
+  std::vector<std::string> files(given.begin(), given.end());
+  std::ranges::sort(files);
+  const auto same = std::ranges::adjacent_find(files);
+  if (same != files.end()) {
+    throw BadInput(Concat("expected different logs, got \"", Printable(*same), "\" twice"));
+  }
   std::vector<MachineLog> logs;
   for (const std::string& file : files) {
     std::vector<MachineLog> pieces = ReadLog(file, columns);

@@ -79,6 +79,11 @@ std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::str
           throw BadInput(
               Concat(place, "expected a column \"", column.name, "\", got \"", line, "\""));
         }
+        const auto times = std::ranges::count(cells, column.name);
+        if (times > 1) {
+          throw BadInput(
+              Concat(place, "expected one column \"", Printable(column.name), "\", got ", times));
+        }
         places.push_back(static_cast<size_t>(found - cells.begin()));
       }
       width = cells.size();

@@ -21,9 +21,9 @@ struct CsvColumn {
 /// stand for one. The reader ignores a byte-order mark, empty lines, lines that begin with #, and
 /// the cells of other columns.
 ///
-/// Throws BadInput if a column is missing, a quote is not closed in its line, or a cell is not a
-/// finite number. Also throws it if a row and the line of names differ in their number of cells.
-/// Messages begin with `where` (a path) and the line.
+/// Throws BadInput if a column is missing or named twice, a quote is not closed in its line, or a
+/// cell is not a finite number. Also throws it if a row and the line of names differ in their number
+/// of cells. Messages begin with `where` (a path) and the line.
 std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::string>& names,
                                const std::string& where);
 

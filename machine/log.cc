@@ -135,6 +135,24 @@ bool SetColumn(LogColumns& columns, std::string_view key, const toml::node& node
   return true;
 }
 
+/// Throws BadInput if a column of the file stands for two keys.
+void CheckOwnColumns(const LogColumns& columns, const std::string& where) {
+  std::map<std::string, std::string> keys{{columns.time.name, "time"}};
+  const auto add = [&](const std::string& name, const std::string& key) {
+    if (name.empty()) return;
+    const auto [found, is_new] = keys.emplace(name, key);
+    if (is_new) return;
+    throw BadInput(Concat(where, ": expected a column for each key, got \"", Printable(name),
+                          "\" for ", found->second, " and ", key));
+  };
+  for (const JointQuantity& q : kJointQuantities) {
+    for (int joint = 0; joint < 2; ++joint) {
+      add((columns.*q.columns)[joint].name, Concat(q.key, joint + 1));
+    }
+  }
+  add(columns.piece, "piece");
+}
+
 std::vector<std::string> KnownKeys() {
   std::vector<std::string> keys{"time", "piece", "hanging", "absolute"};
   for (const JointQuantity& q : kJointQuantities) {
@@ -185,6 +203,10 @@ struct WholeLog {
 };
 
 WholeLog ReadRows(std::string_view csv, const LogColumns& columns, const std::string& where) {
+  if (columns.velocity[0].name.empty() != columns.velocity[1].name.empty()) {
+    throw BadInput(
+        Concat(where, ": expected the velocities of both joints or of neither, got one"));
+  }
   std::vector<std::string> names;
   const auto add = [&](const std::string& name) {
     if (!name.empty() && std::ranges::count(names, name) == 0) names.push_back(name);
@@ -231,6 +253,16 @@ MachineLog PieceOf(const MachineLog& whole, int begin, int end) {
   return piece;
 }
 
+/// Sets a piece's clock to 0 at its first row. Rounds the times to the decimals that the file's
+/// clock resolves (1 µs for seconds since 1970), so that its origin and unit change no bit.
+void StartClock(MachineLog& piece) {
+  const double begin = piece.time.front();
+  const double largest = std::max(std::abs(begin), std::abs(piece.time.back()));
+  const double rounding = 4 * (std::nextafter(largest, 2 * kMostMagnitude) - largest);
+  const double ticks = std::pow(10, std::min(15.0, -std::ceil(std::log10(rounding))));
+  for (double& time : piece.time) time = std::round((time - begin) * ticks) / ticks;
+}
+
 void CheckRows(const MachineLog& log, const std::string& where) {
   if (log.rows() < 2) {
     throw BadInput(
@@ -245,6 +277,10 @@ void CheckRows(const MachineLog& log, const std::string& where) {
 }
 
 }  // namespace
+
+bool HasTorque(const std::vector<Joints>& torque, int joint) {
+  return std::ranges::any_of(torque, [joint](const Joints& u) { return u[joint] != 0; });
+}
 
 LogColumns ParseLogColumns(std::string_view text, const std::string& where) {
   LogColumns columns;
@@ -261,6 +297,7 @@ LogColumns ParseLogColumns(std::string_view text, const std::string& where) {
   expect(columns.time, "time");
   expect(columns.angle[0], "angle1");
   expect(columns.angle[1], "angle2");
+  CheckOwnColumns(columns, where);
   if (columns.absolute && columns.velocity[0].name.empty() != columns.velocity[1].name.empty()) {
     throw BadInput(Concat(where, ": expected velocity1 and velocity2, or neither, with absolute"));
   }
@@ -288,7 +325,10 @@ std::vector<MachineLog> ParseLog(std::string_view csv, const LogColumns* columns
     pieces.back().name = Concat(where, " ", columns->piece, " ", FormatNumber(whole.piece[begin]));
     begin = end;
   }
-  for (const MachineLog& piece : pieces) CheckRows(piece, where);
+  for (MachineLog& piece : pieces) {
+    CheckRows(piece, where);
+    StartClock(piece);
+  }
   return pieces;
 }
 

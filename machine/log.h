@@ -22,7 +22,7 @@ using Joints = std::array<double, 2>;
 struct MachineLog {
   std::string name;               // of the file (and piece), for messages
   int first_row = 1;              // number of the first row in the file, from 1
-  std::vector<double> time;       // clock at the end of the cycle, s; never decreases
+  std::vector<double> time;       // clock at the end of the cycle, s; from 0, never decreases
   std::vector<Joints> angle;      // rad, never empty
   std::vector<Joints> velocity;   // rad/s
   std::vector<Joints> commanded;  // sent to the motors in this cycle, before clipping, N·m
@@ -31,6 +31,9 @@ struct MachineLog {
 
   int rows() const { return static_cast<int>(time.size()); }
 };
+
+/// Whether the torques of a log, which may lack them, are ever other than 0 at a joint (0 or 1).
+bool HasTorque(const std::vector<Joints>& torque, int joint);
 
 /// A column of a file and its unit.
 struct LogColumn {
@@ -51,7 +54,8 @@ struct LogColumns {
 LogColumns ParseLogColumns(std::string_view toml, const std::string& where);
 
 /// Parses a CSV text. Without `columns`, the names must be those of RealAIGym's logs. Returns the
-/// pieces, each with at least two rows; most files have a single piece. Throws BadInput with
+/// pieces, each with at least two rows; most files have a single piece. The clock of each piece
+/// begins at 0. Throws BadInput with
 /// `where` and the line or row.
 std::vector<MachineLog> ParseLog(std::string_view csv, const LogColumns* columns,
                                  const std::string& where);

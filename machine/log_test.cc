@@ -1,10 +1,13 @@
 #include "machine/log.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <numbers>
+#include <utility>
 
 #include "core/error.h"
 #include "core/text.h"
@@ -73,6 +76,71 @@ TEST(MachineLog, AFileNeedsOnlyTimeAndAngles) {
   EXPECT_EQ(log.rows(), 2);
   EXPECT_TRUE(log.velocity.empty());
   EXPECT_TRUE(log.commanded.empty());
+}
+
+/// A log with this clock (text of cycle k), columns and end of lines.
+std::string LogWithClock(const std::function<std::string(int)>& clock,
+                         const std::string& names = "time,pos1,pos2", const char* end = "\n") {
+  std::string csv = names + end;
+  for (int k = 0; k < 500; ++k) {
+    for (const std::string_view name : Split(names, ',')) {
+      csv += name == "time"   ? clock(k)
+             : name == "pos1" ? FormatNumber(std::sin(0.01 * k))
+             : name == "pos2" ? FormatNumber(std::cos(0.01 * k))
+                              : "nothing";
+      csv += ',';
+    }
+    csv.pop_back();
+    csv += end;
+  }
+  return csv;
+}
+
+TEST(MachineLog, OriginAndUnitOfTheClockAndLayoutOfTheFileChangeNoBit) {
+  const auto ms = [](double origin, double scale) {
+    return [origin, scale](int k) { return fmt::format("{:.6f}", scale * (origin + 2.5 * k)); };
+  };
+  const MachineLog log = Parsed(LogWithClock(ms(0, 1e-3)));
+  const auto expect_same = [&](const MachineLog& other) {
+    EXPECT_EQ(log.time, other.time);
+    EXPECT_EQ(log.angle, other.angle);
+  };
+  EXPECT_EQ(log.time[3], 0.0075);
+  for (const double origin : {-5e3, 0.002, 3.6e6, 1.7e12, -1e11}) {
+    expect_same(Parsed(LogWithClock(ms(origin, 1e-3))));
+    for (const auto& [unit, scale] : {std::pair{"ms", 1.0}, {"us", 1e3}}) {
+      const LogColumns columns = ParseLogColumns(
+          Concat("time = {column = 'time', unit = '", unit, "'}\nangle1 = 'pos1'\nangle2 = 'pos2'"),
+          "columns.toml");
+      expect_same(ParseLog(LogWithClock(ms(origin, scale)), &columns, "log.csv").front());
+    }
+  }
+  expect_same(Parsed(LogWithClock(ms(0, 1e-3), "note,pos2,time,x,x,pos1", "\r\n")));
+  // A clock of odd times keeps its digits.
+  EXPECT_NEAR(Parsed("time,pos1,pos2\n0,1,2\n5.075424909591675,1,2\n").time[1], 5.075424909591675,
+              1e-14);
+  // A piece has its own clock; messages cite that of the file.
+  const LogColumns columns =
+      ParseLogColumns("time='t'\nangle1='a'\nangle2='b'\npiece='n'", "columns.toml");
+  EXPECT_EQ(ParseLog("n,t,a,b\n1,0,0,0\n1,1,0,0\n2,1.7e9,0,0\n2,1700000001,0,0\n", &columns, "x")
+                .back()
+                .time,
+            (std::vector<double>{0, 1}));
+}
+
+TEST(MachineLog, AColumnIsThereOnceAndStandsForOneQuantity) {
+  EXPECT_EQ(ComplaintAbout("time,pos1,pos1,pos2\n0,1,2,3\n1,1,2,3\n"),
+            "log.csv:1: expected one column \"pos1\", got 2");
+  const std::string good = "time = 't'\nangle1 = 'q'\nangle2 = 'r'\n";
+  for (const char* key : {"velocity1", "commanded2", "measured1", "push2", "piece"}) {
+    EXPECT_EQ(
+        ComplaintAboutColumns(Concat(good, key, " = 'q'\n")),
+        Concat("columns.toml: expected a column for each key, got \"q\" for angle1 and ", key));
+  }
+  EXPECT_EQ(ComplaintAboutColumns("time = 'q'\nangle1 = {column = 'q'}\nangle2 = 'r'\n"),
+            "columns.toml: expected a column for each key, got \"q\" for time and angle1");
+  EXPECT_EQ(ComplaintAbout("time,pos1,pos2,vel2\n0,1,2,3\n1,1,2,3\n"),
+            "log.csv: expected the velocities of both joints or of neither, got one");
 }
 
 TEST(MachineLog, BadFilesGetOneLineWithThePlace) {
@@ -157,11 +225,11 @@ TEST(MachineLog, APieceBeginsWhereItsColumnChanges) {
 
 TEST(MachineLog, AColumnOfPiecesThatIsAnotherColumn) {
   const LogColumns columns = ParseLogColumns(
-      "time = \"t\"\nangle1 = \"a\"\nangle2 = \"a\"\npiece = \"a\"\n", "columns.toml");
-  std::string csv = "t,a\n";
-  for (int k = 0; k < 10001; ++k) csv += Concat("0,", k, "\n1,", k, "\n");
+      "time = \"t\"\nangle1 = \"a\"\nangle2 = \"b\"\npiece = \"c\"\n", "columns.toml");
+  std::string csv = "t,a,b,c\n";
+  for (int k = 0; k < 10001; ++k) csv += Concat("0,0,0,", k, "\n1,0,0,", k, "\n");
   EXPECT_EQ(Complaint([&] { ParseLog(csv, &columns, "own.csv"); }),
-            "own.csv: row 20001: a: expected at most 10000 pieces, got more");
+            "own.csv: row 20001: c: expected at most 10000 pieces, got more");
 }
 
 TEST(MachineLog, BadColumnFilesGetOneLineWithThePlace) {
