@@ -225,6 +225,31 @@ class Machine(ProgramTest):
         self.assertEqual(numbers[0][3:5], numbers[0][5:7])
         self.assertAlmostEqual(numbers[0][1], numbers[0][3], delta=0.01)
 
+    def test_the_order_of_logs_changes_nothing(self):
+        self.write("plant.toml", "[plant]\nmass1 = 0.5\n")
+        files = [self.write(f"{name}.csv", log(lambda k, row, turn=turn: [*row[:2], turn * row[2], *row[3:]]))
+                 for turn, name in enumerate("abc")]
+        validate = ["machine", "validate", "plant.toml"]
+        self.assertEqual(self.succeed(*validate, *files, "--json"),
+                         self.succeed(*validate, *reversed(files), "--json"))
+        self.refuse([*validate, *files, files[0]], "expected different logs", '"a.csv" twice')
+
+    def test_logs_without_commanded_torques(self):
+        self.write("plant.toml", "[plant]\nmass1 = 0.5\n")
+        no_command = [*NAMES[:5], "x", "y", *NAMES[7:]]
+        measured = self.write("measured.csv", log(names=no_command))
+        self.refuse(["machine", "identify", measured, "--plant", "plant.toml", "--out", "twin.toml",
+                     "--folds", "0"], "measured.csv: expected commanded torques", "got none")
+        rows = json.loads(self.succeed("machine", "validate", "plant.toml", measured, "--json"))
+        self.assertEqual({row["torques"] for row in rows["errors"]}, {"reported"})
+        self.refuse(["realaigym", "--hardware", measured], "expected commanded torques")
+        # Without the torques that move the machine, there is no prediction.
+        only_one = self.write("one.csv", log(scaled(tau_meas2=0)))
+        rows = json.loads(self.succeed("machine", "validate", "plant.toml", only_one, "--json"))
+        self.assertEqual({row["torques"] for row in rows["errors"]}, {"commanded"})
+        self.assertEqual(self.faults(log(scaled(tau_con1=0))),
+                         {"torque 1": "measured torque of 0.9 N·m (rms) without a command"})
+
     def test_models_with_equal_names(self):
         self.write("log.csv", log())
         for folder in ("a", "b"):

@@ -91,7 +91,6 @@ void CheckTorque(Pieces pieces, int joint, Findings& findings) {
   const Response best = BestOf(responses);
   constexpr double kFollows = 0.6, kClear = 0.9, kBetter = 0.02;  // correlations
   const double r = best.pairs.correlation(), gain = best.pairs.gain();
-  if (!(best.pairs.Sxx() > 1e-9 * best.pairs.n)) return;  // no command
   const auto add = [&](Severity severity, const std::string& text) {
     findings.push_back(
         {Aspect::kTorque,
@@ -101,6 +100,16 @@ void CheckTorque(Pieces pieces, int joint, Findings& findings) {
          {},
          {{"delay_rows", best.rows}, {"lag", best.lag}, {"gain", gain}, {"correlation", r}}});
   };
+  if (!(best.pairs.Sxx() > 1e-9 * best.pairs.n)) {
+    // Drives of joints without a command report the torque that accelerates their rotors.
+    constexpr double kActs = 0.2;  // N·m, rms
+    const double rms = std::sqrt(best.pairs.yy / best.pairs.n);
+    if (best.pairs.x == 0 && rms > kActs) {
+      add(Severity::kFault,
+          fmt::format("measured torque of {:.2g} N·m (rms) without a command", rms));
+    }
+    return;
+  }
   if (!(best.pairs.Syy() > 1e-9 * best.pairs.n)) {
     return add(Severity::kWarning, "measured torque never changes");
   }

@@ -122,6 +122,7 @@ class Problem {
           sessions.emplace(SessionOf(log.name), static_cast<int>(sessions_.size()));
       if (is_new) sessions_.push_back(place->first);
       session_of_.push_back(place->second);
+      reported_.push_back({HasTorque(log.measured, 0), HasTorque(log.measured, 1)});
     }
     const Options options = OptionsOf(twin_);
     for (const std::string& name : names) {
@@ -352,6 +353,8 @@ class Problem {
       if (log.measured.empty()) continue;
       const Joints torque = drive.At(log.time[first + k] - model.current_delay, cursor);
       for (int j = 0; j < 2; ++j) {
+        r.torque(k, j) = 0;
+        if (!reported_[shot.window.log][j]) continue;
         r.torque(k, j) = torque[j] - model.current_inertia * motion.acceleration[k][j] -
                          log.measured[first + k][j];
       }
@@ -492,7 +495,8 @@ class Problem {
   Twin twin_;
   ThreadPool* pool_;
   std::vector<std::string> sessions_;
-  std::vector<int> session_of_;  // of each log
+  std::vector<int> session_of_;                // of each log
+  std::vector<std::array<bool, 2>> reported_;  // of each log: whether the joints report torques
   std::vector<Value> values_;
   VectorXd theta_;
   std::vector<Shot> shots_;

@@ -30,9 +30,16 @@ std::vector<int> Folds(std::span<const MachineLog> logs, int folds) {
 
 bool HasMotors(std::span<const MachineLog> logs) {
   return std::ranges::any_of(logs, [](const MachineLog& log) {
-    return std::ranges::any_of(log.commanded,
-                               [](const Joints& u) { return u[0] != 0 || u[1] != 0; });
+    return HasTorque(log.commanded, 0) || HasTorque(log.commanded, 1);
   });
+}
+
+/// Throws BadInput for a log whose only torques are measured ones: they do not drive the model.
+void CheckTorques(const MachineLog& log) {
+  if (!log.commanded.empty() || !(HasTorque(log.measured, 0) || HasTorque(log.measured, 1))) return;
+  throw BadInput(Concat(log.name,
+                        ": expected commanded torques besides the measured ones, got none; "
+                        "--columns can name measured torques as commanded1 and commanded2"));
 }
 
 }  // namespace
@@ -62,6 +69,7 @@ std::vector<Structure> Structures(bool has_motors) {
 
 Identification Identify(std::span<const MachineLog> logs, const Twin& first,
                         const IdentifyConfig& config, ThreadPool* pool, const Progress& progress) {
+  for (const MachineLog& log : logs) CheckTorques(log);
   const std::vector<Structure> structures = Structures(HasMotors(logs));
   Identification result;
   const int n = static_cast<int>(logs.size());

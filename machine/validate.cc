@@ -64,7 +64,21 @@ std::vector<double> ErrorsIn(const MachineLog& log, const Twin& twin,
   return errors;
 }
 
-std::vector<LogWindow> WindowsOf(const MachineLog& log, const Twin& twin, double seconds) {
+/// Whether a log has the reported or commanded torques of all its motors.
+bool HasDrive(const MachineLog& log, bool reported) {
+  if (reported && log.measured.empty()) return false;
+  for (const int joint : {0, 1}) {
+    const bool measured = HasTorque(log.measured, joint);
+    if (reported && !measured && HasTorque(log.commanded, joint)) return false;
+    if (!reported && measured && log.commanded.empty()) return false;
+  }
+  return true;
+}
+
+/// The windows of a log; none if it lacks the torques that drive a prediction.
+std::vector<LogWindow> WindowsOf(const MachineLog& log, const Twin& twin, double seconds,
+                                 bool reported = false) {
+  if (!HasDrive(log, reported)) return {};
   return CutWindows(std::span(&log, 1), RulesOf(seconds), twin.plant.length1, twin.plant.length2);
 }
 
@@ -74,8 +88,7 @@ std::vector<RunErrors> ErrorsOf(std::span<const MachineLog> logs,
                                 ThreadPool* pool) {
   std::vector<RunErrors> errors(predictors.size(), RunErrors(logs.size()));
   ParallelFor(pool, static_cast<int>(logs.size()), [&](int i) {
-    if (reported && logs[i].measured.empty()) return;
-    const auto windows = WindowsOf(logs[i], predictors.front().twins[i], length);
+    const auto windows = WindowsOf(logs[i], predictors.front().twins[i], length, reported);
     for (size_t p = 0; p < predictors.size(); ++p) {
       errors[p][i] = ErrorsIn(logs[i], predictors[p].twins[i], windows, reported);
     }
@@ -157,7 +170,7 @@ Predictor PredictorOf(const std::string& name, const Twin& twin, std::span<const
 
 std::vector<double> WindowErrors(const MachineLog& log, const Twin& twin, double seconds,
                                  bool reported) {
-  return ErrorsIn(log, twin, WindowsOf(log, twin, seconds), reported);
+  return ErrorsIn(log, twin, WindowsOf(log, twin, seconds, reported), reported);
 }
 
 std::vector<ErrorRow> CompareErrors(std::span<const MachineLog> logs,

@@ -87,6 +87,10 @@ BoardOutcome OutcomeOf(const MachineLog& log) {
   o.swing_up_seconds = SwingUpSeconds(log);
   const double end = log.time.back();
   o.above_line = o.swing_up_seconds < end && end >= kHardwareSeconds;
+  if (o.above_line && o.max_torque == 0) {
+    throw BadInput(
+        Concat(log.name, ": expected commanded torques other than 0 of a run that swings up"));
+  }
   if (!o.above_line) o.swing_up_seconds = end;
   return o;
 }

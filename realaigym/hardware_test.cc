@@ -98,6 +98,8 @@ TEST(Hardware, RefusesOtherLogs) {
   bad = good;
   bad.commanded.clear();
   EXPECT_THROW(OutcomeOf(bad), Error);
+  bad.commanded.assign(good.commanded.size(), {});
+  EXPECT_THROW(OutcomeOf(bad), Error);
   bad = good;
   bad.push.resize(1000);
   EXPECT_THROW(ScoreHardware(std::array{good, bad}, {}), Error);  // only one has pushes
