@@ -1,6 +1,10 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <iterator>
 #include <optional>
+#include <span>
 
 #include "apps/commands.h"
 #include "core/csv.h"
@@ -21,13 +25,36 @@ struct SimulateArguments {
   double seconds = -1;  // negative: not given
 };
 
-/// The column `torque` of a CSV file. Throws BadInput with the line number.
-std::vector<double> ReadTorqueFile(const std::string& path) {
-  const std::string where = InputName(path);
-  std::vector<double> torques = ReadCsv(ReadInput(path), {"torque"}, where).front().values;
-  if (torques.empty())
+/// Whether the name of a column begins with the word `t` or `time`, such as `Time [s]` and `t_ms`.
+bool IsTime(std::string_view name) {
+  std::string word;
+  for (const char c : name) {
+    const char small = static_cast<char>(c | 0x20);  // of a letter
+    if (small < 'a' || small > 'z') break;
+    word += small;
+  }
+  return word == "t" || word == "time";
+}
+
+/// The column `torque` of a CSV file with a row per `step` (s). Throws BadInput with the line
+/// number, and if a column of times has other steps.
+std::vector<double> ReadTorqueFile(const std::string& path, double step) {
+  const std::string where = InputName(path), text = ReadInput(path);
+  std::vector<std::string> names{"torque"};
+  std::ranges::copy_if(CsvNames(text, where), std::back_inserter(names), IsTime);
+  const std::vector<CsvColumn> columns = ReadCsv(text, names, where);
+  if (columns.front().values.empty())
     throw BadInput(Concat(where, ": expected at least one row of torques, got none"));
-  return torques;
+  for (const CsvColumn& time : std::span(columns).subspan(1)) {
+    for (size_t k = 0; k < time.values.size(); ++k) {
+      const double expected = time.values.front() + static_cast<double>(k) * step;
+      if (std::abs(time.values[k] - expected) < 1e-3 * step) continue;
+      throw BadInput(Concat(where, ": row ", k + 1, ": ", Printable(time.name), ": expected ",
+                            FormatNumber(expected), " s, because each torque acts for ",
+                            FormatNumber(step), " s, got ", FormatNumber(time.values[k])));
+    }
+  }
+  return columns.front().values;
 }
 
 int RunSimulate(const SimulateArguments& a) {
@@ -37,8 +64,8 @@ int RunSimulate(const SimulateArguments& a) {
   std::optional<LoadedPolicy> loaded;
   if (!a.policy.empty()) loaded.emplace(GetPolicy(a.policy));
   RolloutConfig config = TrialEpisode(a.trial, loaded ? &*loaded : nullptr);
-  if (!a.torque.empty()) config.schedule = ReadTorqueFile(a.torque);
   const EnvSpec spec = SpecOf(config.env);
+  if (!a.torque.empty()) config.schedule = ReadTorqueFile(a.torque, spec.step_seconds);
 
   // The requested number of steps, or one step for each row of the schedule.
   const double scheduled = static_cast<double>(config.schedule.size()) * spec.step_seconds;
@@ -70,7 +97,8 @@ void AddSimulate(CommandLine& line) {
   SimulateArguments& a = line.Runs(RunSimulate);
   AddPolicy(line, a.policy);
   line.Text("--torque", a.torque, "FILE",
-            "CSV file with a column `torque` [N·m], a row per 0.02 s; -: standard input");
+            "CSV file with a column `torque` [N·m], a row per 0.02 s; -: standard input. A column "
+            "`t` or `time` [s] must have these steps");
   AddEpisodeOptions(line, a.trial);
   Options own;
   Option& seconds = own.Add(&a.seconds, "seconds", {0, 1e5}, "s", "length of the rollout");

@@ -217,6 +217,24 @@ class SimulateTest(ProgramTest):
                 (self.folder / "layout.csv").write_bytes(text.encode())
                 self.assertEqual(self.succeed("simulate", "--torque", "layout.csv"), expected)
 
+    def test_times_of_torque_files(self):
+        """Other times than the control steps are refused, because each torque acts for a step."""
+        expected = self.succeed("simulate", "--torque", self.write("n.csv", "torque\n1\n2\n3\n"))
+        for name in ("t", "time", "Time [s]"):
+            for begin in (0, 3, 1.7e9):
+                table = f"{name},torque\n{begin},1\n{begin + .02},2\n{begin + .04},3\n"
+                self.assertEqual(
+                    self.succeed("simulate", "--torque", self.write("n.csv", table)), expected)
+        for times, row, wanted in ((("0", "0.01", "0.02"), 2, "0.02"), ((0, 20, 40), 2, "0.02"),
+                                   ((0, 0.02, 0.02), 3, "0.04"), ((0, 0.02, 0.05), 3, "0.04"),
+                                   ((0.04, 0.02, 0), 2, "0.06"), ((0, 0, 0), 2, "0.02")):
+            for name in ("t", "time", "t_ms"):
+                table = f"{name},torque\n" + "".join(f"{t},1\n" for t in times)
+                self.refuse(["simulate", "--torque", self.write("bad.csv", table)],
+                            f"bad.csv: row {row}: {name}: expected {wanted} s", "0.02 s")
+        self.refuse(["simulate", "--torque", self.write("bad.csv", "torque,torque\n1,2\n")],
+                    'bad.csv:1: expected one column "torque", got 2')
+
     def test_seconds_may_be_shorter_than_the_schedule(self):
         short = self.reference_rollout("--seconds", 1)
         self.assertEqual(short, self.reference_rollout()[:51])
