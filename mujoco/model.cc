@@ -203,10 +203,16 @@ ModelPtr LoadModel(const std::string& mjcf, const std::string& where) {
 }
 
 std::vector<std::string> DifferencesFromBuiltIn(const mjModel& model) {
-  const ModelPtr ours = CompileModel(Mjcf(PlantOf(model)), "built-in model");
+  const Plant plant = PlantOf(model);
+  const ModelPtr ours = CompileModel(Mjcf(plant), "built-in model");
   std::vector<std::string> differences;
   const auto compare = [&](const std::string& what, double a, double b, std::string_view unit) {
     if (a != b) differences.push_back(Concat(what, " ", FormatNumber(a), " ", unit));
+  };
+  // The built-in model's flag constraint switches limits and friction off, too.
+  const auto unit_under = [&](int flag, const std::string& unit) {
+    const bool acts = (model.opt.disableflags & (mjDSBL_CONSTRAINT | flag)) == 0;
+    return acts ? unit : unit + " (switched off by a flag)";
   };
   compare("timestep", model.opt.timestep, ours->opt.timestep, "s");
   if (model.opt.integrator != ours->opt.integrator) {
@@ -214,16 +220,24 @@ std::vector<std::string> DifferencesFromBuiltIn(const mjModel& model) {
     const auto index = static_cast<size_t>(model.opt.integrator);
     differences.push_back(Concat("integrator ", index < kNames.size() ? kNames.at(index) : "new"));
   }
+  if (model.opt.integrator == mjINT_EULER && (model.opt.disableflags & mjDSBL_EULERDAMP) != 0 &&
+      plant.damping1 + plant.damping2 > 0) {
+    differences.emplace_back("eulerdamp off");
+  }
   compare("density", model.opt.density, ours->opt.density, "kg/m³");
   compare("viscosity", model.opt.viscosity, ours->opt.viscosity, "Pa·s");
   for (const int i : {0, 1}) {
     const std::string number = std::to_string(i + 1);
-    compare("radius" + number, model.geom_size[3 * i], ours->geom_size[3 * i], "m");
+    // A link with an own inertia does not depend on its radius.
+    if ((i == 0 ? plant.inertia1 : plant.inertia2) == 0) {
+      compare("radius" + number, model.geom_size[3 * i], ours->geom_size[3 * i], "m");
+    }
     compare("armature" + number, model.dof_armature[i], ours->dof_armature[i], "kg·m²");
-    compare("frictionloss" + number, model.dof_frictionloss[i], ours->dof_frictionloss[i], "N·m");
+    compare("frictionloss" + number, model.dof_frictionloss[i], ours->dof_frictionloss[i],
+            unit_under(mjDSBL_FRICTIONLOSS, "N·m"));
     compare("stiffness" + number, model.jnt_stiffness[i], ours->jnt_stiffness[i], "N·m/rad");
     const double limit = model.jnt_limited[i] != 0 ? model.jnt_range[2 * i + 1] : 0;
-    compare("limit" + number, limit, 0, "rad");
+    compare("limit" + number, limit, 0, unit_under(mjDSBL_LIMIT, "rad"));
   }
   return differences;
 }

@@ -42,7 +42,8 @@ ModelPtr CompileModel(const std::string& mjcf, const std::string& where);
 ModelPtr LoadModel(const std::string& mjcf, const std::string& where);
 
 /// Differences of a loaded model from the built-in one that affect the motion, without the plant's
-/// parameters; such as "armature1 0.02 kg·m²".
+/// parameters; such as "armature1 0.02 kg·m²". A limit or friction that a flag of the model
+/// switches off is one of them, and says so.
 std::vector<std::string> DifferencesFromBuiltIn(const mjModel& model);
 
 /// The plant that a loaded model describes. It has own centres of mass and inertias where the links

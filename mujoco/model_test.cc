@@ -356,5 +356,71 @@ TEST(Model, RefusesWhatThePlantsParametersWouldHide) {
   EXPECT_FALSE(loads("axis=\"0 1 0\"", "axis=\"0 1 0\" limited=\"true\" range=\"-90 80\""));
 }
 
+/// A text with `from` replaced by `to` wherever it occurs.
+std::string With(std::string text, const std::string& from, const std::string& to) {
+  for (size_t at = 0; (at = text.find(from, at)) != text.npos; at += to.size()) {
+    text.replace(at, from.size(), to);
+  }
+  return text;
+}
+
+/// The joint angles of a model that MuJoCo lets fall from 1.5 rad for a second.
+std::array<mjtNum, 2> Fallen(const mjModel& model) {
+  const DataPtr data(mj_makeData(&model));
+  data->qpos[0] = 1.5;
+  while (data->time < 1) mj_step(&model, data.get());
+  return {data->qpos[0], data->qpos[1]};
+}
+
+TEST(Model, DifferencesThatActChangeMuJoCosMotionAndOthersDoNot) {
+  const std::string range = " range=\"-60 60\"", friction = " frictionloss=\"0.3\"";
+  const auto flag = [](const std::string& name) { return " " + name + "=\"disable\""; };
+  struct Change {
+    std::string joint, flags, integrator, geom, differences;
+  };
+  const std::string limits = "limit1 1.0471975511965976 rad|limit2 1.0471975511965976 rad";
+  const std::string losses = "frictionloss1 0.3 N·m|frictionloss2 0.3 N·m";
+  const std::string off = " (switched off by a flag)";
+  const auto both_off = [&](const std::string& both) { return With(both, "|", off + "|") + off; };
+  const std::string inertial =
+      "<inertial pos=\"0 0 -0.2\" mass=\"1\" diaginertia=\"0.03 0.03 0.001\"/><geom size=\"0.04\"";
+  const std::vector<Change> changes{
+      {range, "", "RK4", "", limits},
+      {range, flag("limit"), "RK4", "", both_off(limits)},
+      {range, flag("frictionloss"), "RK4", "", limits},
+      {range, flag("constraint"), "RK4", "", both_off(limits)},
+      {range + " limited=\"false\"", "", "RK4", "", ""},
+      {friction, "", "RK4", "", losses},
+      {friction, flag("limit"), "RK4", "", losses},
+      {friction, flag("frictionloss"), "RK4", "", both_off(losses)},
+      {friction, flag("constraint"), "RK4", "", both_off(losses)},
+      {" damping=\"0\"", flag("eulerdamp"), "Euler", "", "integrator Euler"},
+      {" damping=\"0.2\"", flag("eulerdamp"), "Euler", "", "integrator Euler|eulerdamp off"},
+      {"", flag("eulerdamp"), "RK4", "", ""},
+      {"", flag("warmstart") + flag("midphase"), "RK4", "", ""},
+      {"", "", "RK4", "<geom size=\"0.05\"", "radius1 0.05 m|radius2 0.05 m"},
+      {"", "", "RK4", With(inertial, "0.04", "0.05"), ""}};
+  std::string bare = With(Mjcf(Plant()), " constraint=\"disable\"", "@flags");
+  bare = With(bare, " damping=\"0.2\"", "");
+  bare = With(bare, "<geom type=\"capsule\" size=\"0.04\"", "@geom type=\"capsule\"");
+  const auto model_of = [&](const Change& c) {
+    std::string mjcf = With(bare, "@flags", c.flags);
+    mjcf = With(mjcf, "@geom", c.geom.empty() ? "<geom size=\"0.04\"" : c.geom);
+    mjcf = With(mjcf, "axis=\"0 1 0\"", "axis=\"0 1 0\"" + c.joint);
+    return LoadModel(With(mjcf, "RK4", c.integrator), "m.xml");
+  };
+  for (const Change& change : changes) {
+    const ModelPtr model = model_of(change);
+    const std::string told = Join(DifferencesFromBuiltIn(*model), "|");
+    EXPECT_EQ(told, change.differences);
+    Change plain = change;
+    plain.flags = "";
+    if (plain.joint.find("damping") == std::string::npos) plain.joint = "";
+    plain.geom = change.geom.empty() || told.starts_with("radius") ? "" : inertial;
+    const bool acts = !told.empty() && told != "integrator Euler" && told.find(off) == told.npos;
+    EXPECT_EQ(Fallen(*model) != Fallen(*model_of(plain)), acts) << told << change.flags;
+  }
+}
+
 }  // namespace
 }  // namespace upswing
