@@ -225,10 +225,32 @@ class Machine(ProgramTest):
         self.assertEqual(numbers[0][3:5], numbers[0][5:7])
         self.assertAlmostEqual(numbers[0][1], numbers[0][3], delta=0.01)
 
+    def test_clock_and_layout_of_a_log_change_nothing(self):
+        self.write("plant.toml", "[plant]\nmass1 = 0.5\n")
+
+        def results(text):
+            (self.folder / "log.csv").write_bytes(text.encode())
+            return [self.succeed(*words, "--json") for words in (
+                ("machine", "check", "log.csv"), ("machine", "validate", "plant.toml", "log.csv"),
+                ("realaigym", "--hardware", "log.csv"))]
+
+        expected = results(log())
+        order = [8, 3, 0, 7, 2, 6, 1, 5, 4]
+        for origin in (0, -5, 1.7e9):
+            def moved(k, row, origin=origin):
+                row = [f"{row[0] + origin:.6f}", *row[1:]]
+                return [*(row[i] for i in order), "x"]
+
+            text = log(moved, [*(NAMES[i] for i in order), "note"])
+            self.assertEqual(results(text.replace("\n", "\r\n")), expected)
+
     def test_the_order_of_logs_changes_nothing(self):
         self.write("plant.toml", "[plant]\nmass1 = 0.5\n")
-        files = [self.write(f"{name}.csv", log(lambda k, row, turn=turn: [*row[:2], turn * row[2], *row[3:]]))
-                 for turn, name in enumerate("abc")]
+
+        def turned(angle):
+            return log(lambda k, row: [*row[:2], row[2] + angle, *row[3:]])
+
+        files = [self.write(f"{name}.csv", turned(k / 10)) for k, name in enumerate("abc")]
         validate = ["machine", "validate", "plant.toml"]
         self.assertEqual(self.succeed(*validate, *files, "--json"),
                          self.succeed(*validate, *reversed(files), "--json"))
