@@ -211,5 +211,23 @@ TEST(Fit, FindsTheTimesOfTheMotorsAndPredictsWithThemBest) {
   }
 }
 
+TEST(Fit, AJointThatReportsNoTorqueTellsNothingAboutReports) {
+  ThreadPool pool(2);
+  Twin machine = FirstGuess();
+  machine.actuator = {.delay = 0.002,
+                      .lag = 0.004,
+                      .passive_limit = 6,
+                      .current_delay = 0.002,
+                      .current_inertia = 0.0025};
+  std::vector<MachineLog> logs = LogsOf(machine, 1, 3, 20);
+  for (Joints& torque : logs.front().measured) torque[1] = 0;  // as a log without the column
+  Twin first = machine;
+  first.actuator.current_delay = first.actuator.current_inertia = 0.001;
+  const Actuator found =
+      Fit(logs, first, {"current_delay", "current_inertia"}, {}, &pool).twin.actuator;
+  EXPECT_NEAR(found.current_delay, machine.actuator.current_delay, 1e-4);
+  EXPECT_NEAR(found.current_inertia, machine.actuator.current_inertia, 5e-5);
+}
+
 }  // namespace
 }  // namespace upswing
