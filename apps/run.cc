@@ -27,9 +27,6 @@ struct RunArguments {
   bool differences = false, draw = false;
 };
 
-constexpr std::string_view kBraking =
-    "\nbraking; once more switches the motors off and ends at once\n";
-
 std::unique_ptr<MachineLink> g_link;  // global for signal handlers, which may come until the end
 
 /// Throws BadInput if a serial line is too slow for a frame per cycle in each direction.
@@ -109,7 +106,7 @@ int Drive(const RunArguments& a, const Competitor& competitor, const std::option
     if (!missing.empty()) fmt::print("  not permitted: {}; cycles may be late\n", missing);
   }
   std::fflush(stdout);
-  GuardMotors(kBraking, [] { g_link->SwitchOffAtOnce(); });
+  GuardMotors([] { g_link->SwitchOffAtOnce(); });
   ControlLoop loop(config, link, estimator, supervisor, controller, log);
   loop.Run();
   log.Finish();
@@ -161,7 +158,7 @@ void AddRun(CommandLine& line) {
   line.Text("--robot", a.robot, "ROBOT",
             "pendubot or acrobot: the motor of a controller's design (default: the policy's own)");
   line.Text("--log", a.log, "FILE",
-            "CSV file to write, a row per reading; `machine check` reads it");
+            "new CSV file to write, a row per reading; `machine check` reads it");
   line.Text(
       "--start", a.start, "STATE",
       "state in which the controller takes over: hanging, upright or q1,q2,w1,w2 [rad, rad/s] "
@@ -188,8 +185,9 @@ void AddRun(CommandLine& line) {
   line.Footer(
       "The loop waits for readings (idle), then for the start state (armed), then the\n"
       "controller drives (running). Afterwards, at Ctrl-C and beyond a limit it brakes until\n"
-      "the links hang. A fault switches the motors off at once: no reading for --max-age,\n"
-      "a reading that is no number, an encoder that sticks or saturates.\n"
+      "the links hang; a second Ctrl-C switches the motors off at once. So does a fault: no\n"
+      "reading for --max-age, a reading that is no number, an angle that jumps, an encoder that\n"
+      "sticks or saturates (docs/howto/protection.md).\n"
       "Exit code: 0, or 1 with the reason in a line after a fault or beyond a limit.\n\n"
       "A controller is designed for the twin without dry friction. --made-for changes this\n"
       "plant. Policies of `realaigym --search --twin` need --compensation 0.95.\n"

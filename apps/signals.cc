@@ -13,7 +13,7 @@ namespace {
 std::atomic<int> g_stop_signal{0};
 std::atomic<bool> g_checkpoint_wanted{false};
 std::string_view g_notice;         // set before the handlers are installed
-void (*g_switch_off)() = nullptr;  // so is this
+void (*g_switch_off)() = nullptr;  // set before the handlers are installed
 static_assert(std::atomic<int>::is_always_lock_free);
 
 void Handle(int number, void (*handler)(int), int flags) {
@@ -34,16 +34,16 @@ void Record(int signal) {
 /// Records the first of these signals; a second one ends the program at once.
 void StopAt(int number) { Handle(number, Record, SA_RESETHAND | SA_RESTART); }
 
-/// Switches the motors off and ends the program by a signal. Its handler has been reset.
-void EndByCrash(int signal) {
+/// Switches the motors off and ends the program. SA_RESETHAND has restored the signal's default.
+void EndNow(int signal) {
   g_switch_off();
   raise(signal);
 }
 
 /// Records the first of these signals. A second one switches the motors off and ends the program.
 void BrakeOrEnd(int signal) {
-  Record(signal);
-  Handle(signal, EndByCrash, SA_RESETHAND);
+  g_stop_signal = signal;
+  Handle(signal, EndNow, SA_RESETHAND);
 }
 
 }  // namespace
@@ -60,9 +60,9 @@ void InstallSignalHandlers(std::string_view notice) {
   StopAt(SIGTERM);
 }
 
-void GuardMotors(std::string_view notice, void (*switch_off)()) {
+void GuardMotors(void (*switch_off)()) {
   g_switch_off = switch_off;
-  g_notice = isatty(STDERR_FILENO) == 1 ? notice : "";
+  g_notice = "";  // a terminal that is stopped by Ctrl-S would stop the handler, too
   for (const int number : {SIGINT, SIGTERM, SIGQUIT}) Handle(number, BrakeOrEnd, SA_RESTART);
   // A terminal that closes sends SIGHUP twice.
   for (const int number : {SIGHUP, SIGTSTP, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGPOLL,
@@ -72,12 +72,12 @@ void GuardMotors(std::string_view notice, void (*switch_off)()) {
   for (int number = SIGRTMIN; number <= SIGRTMAX; ++number) Handle(number, Record, SA_RESTART);
   std::signal(SIGTTIN, SIG_IGN);
   std::signal(SIGTTOU, SIG_IGN);
-  // Also when the stack has overflowed.
+  // A handler of its own stack works when the program's stack has overflowed.
   static std::array<char, 1 << 16> stack;
   const stack_t other{stack.data(), 0, stack.size()};
   sigaltstack(&other, nullptr);
   for (const int number : {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGSYS}) {
-    Handle(number, EndByCrash, SA_RESETHAND | SA_NODEFER | SA_ONSTACK);
+    Handle(number, EndNow, SA_RESETHAND | SA_NODEFER | SA_ONSTACK);
   }
 }
 

@@ -24,7 +24,7 @@ void InstallSignalHandlers(std::string_view notice);
 /// Like InstallSignalHandlers, for a program that drives motors. Records every signal that would
 /// end or pause it, so that it can brake. Before a second SIGINT, SIGTERM or SIGQUIT or a crash
 /// ends the program, the handler calls `switch_off`, which must be safe in a signal handler.
-void GuardMotors(std::string_view notice, void (*switch_off)());
+void GuardMotors(void (*switch_off)());
 
 /// Also stops at SIGUSR1 and SIGUSR2, with which clusters announce the end of a job's time.
 void StopAtUserSignals();

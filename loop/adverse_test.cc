@@ -21,7 +21,7 @@ TEST(AdverseMachine, GetsOnlyTorquesThatAreSafe) {
     Rng rng(seed, "adverse machine");
     const Chooser choose = [&](uint32_t n) { return static_cast<uint32_t>(rng.Uniform() * n); };
     const uint32_t rarity = std::array{100U, 1000U, 20000U}[seed % 3];
-    const AdverseRun run = RunAdversely(seed % 4 != 0, rarity, 1500, choose);
+    const AdverseRun run = RunAdversely(seed % 4 != 0, rarity, 4000, choose);
     ASSERT_EQ(run.violation, "") << "seed " << seed << ", cycle " << run.cycles;
     done += run.cycles;
     ++ends[run.reason.substr(run.reason.starts_with("joint") ? 9 : 0, 9)];

@@ -106,8 +106,8 @@ bool ControlLoop::Cycle() {
   summary_.missed += missed;
   cycle_ += missed;
 
-  // The process may have been stopped: torques from old readings are not sent.
-  if (enabled_ && !supervisor_.MaySend(now - last_reading_)) {
+  // After a pause of this process the torques of the cycle before are too old to be sent.
+  if (enabled_ && !supervisor_.CheckAge(now - last_reading_ - period_)) {
     torque_ = {};
     enabled_ = false;
   }

@@ -228,7 +228,7 @@ TEST(Supervisor, TakesTheReadingsOfARealMachineForMotions) {
         estimator.Update(time, log.commanded[k - 1], &reading);
         supervisor.Step({.time = time,
                          .fresh = true,
-                         .read_at = time,
+                         .read_at = log.time[k - 1],
                          .received = time,
                          .angle = log.angle[k],
                          .torque = log.measured[k],

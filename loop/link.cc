@@ -16,13 +16,14 @@
 namespace upswing {
 namespace {
 
-constexpr int64_t kSecond = 1'000'000'000;  // ns
+constexpr int64_t kSecond = 1'000'000'000;    // ns
+constexpr clockid_t kClock = CLOCK_BOOTTIME;  // goes on while the computer sleeps
 
 }  // namespace
 
 int64_t MonotonicNanoseconds() {
   timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
+  clock_gettime(kClock, &now);
   return now.tv_sec * kSecond + now.tv_nsec;
 }
 
@@ -86,7 +87,7 @@ LinkReading LinkProtocol::ReadingOf(const Frame& frame, double now) {
   const uint32_t ago = sequence_ - frame.answers;
   const bool known = ago < sent_at_.size() && ago < sequence_;
   double time = known ? sent_at_[frame.answers % sent_at_.size()] : now;
-  // The answers of a machine may stand still or go back; time does not.
+  // A machine whose `answers` stand still or go back does not tell when it measured.
   if (time <= last_time_) time = now;
   last_time_ = time;
   return {{{frame.angle, frame.torque}, time}, now, (frame.flags & Frame::kLocked) != 0};
@@ -119,7 +120,7 @@ double ChannelLink::Now() const {
 void ChannelLink::WaitUntil(double time) {
   const int64_t at = begin_ + std::llround(time * kSecond);
   const timespec moment{at / kSecond, at % kSecond};
-  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &moment, nullptr) == EINTR) {
+  while (clock_nanosleep(kClock, TIMER_ABSTIME, &moment, nullptr) == EINTR) {
   }
 }
 

@@ -122,7 +122,7 @@ class ChannelLink : public MachineLink {
   int64_t sent_ = 0;
 };
 
-/// Nanoseconds of the monotonic clock.
+/// Nanoseconds of a clock that never goes back, and that goes on while the computer sleeps.
 int64_t MonotonicNanoseconds();
 
 /// Locks the program's memory and gives this thread a real-time priority. Returns what is not

@@ -19,19 +19,20 @@ constexpr int kStuckReadings = 2;     // unchanged readings after a fast one: a 
 constexpr double kLargestReading = 1e6;
 constexpr double kLargestStart = 100;  // rad, rad/s
 
-// What a motion can explain. No joint accelerates as hard as kHardest. The 70,000 readings of a
-// real machine under pushes use at most 66% of the way that CheckMotion permits.
-constexpr double kHardest = 1000;      // rad/s²
-constexpr double kShortest = 1e-4;     // time between two measurements, s
-constexpr double kLeastStep = 0.02;    // rad; coarse encoders without a twin have such steps
-constexpr double kLargestError = 0.2;  // of the estimate at a slow joint, rad
+// What the readings of a machine may show.
+constexpr double kHardest = 1000;       // acceleration that no joint exceeds, rad/s²
+constexpr double kOldest = 0.001;       // age of an angle when its command comes, s
+constexpr double kShortest = 1e-4;      // time between two measurements, s
+constexpr double kLeastError = 0.002;   // of the change between two angles, rad
+constexpr int kErrorSteps = 4;          // of the encoder, in this change
+constexpr double kUnknownStep = 0.006;  // rad; 1024 steps per turn
+constexpr double kLargestError = 0.2;   // of the estimate at a slow joint, rad
 
-// Braking ends where it does not work.
-constexpr double kBrakeShare = 1.5;  // largest velocity and energy, in those of the limits
-// Above the least energy since the last torques of the controller acted: share, and energy.
-constexpr double kEnergyShare = 1.3, kEnergyRise = 0.1;
-constexpr double kLatency = 0.03;     // time after which the torques of the controller are over, s
-constexpr double kBrakeCycles = 2.5;  // age of the reading up to which the motors may brake
+// Braking ends with motors off where it does not work.
+constexpr double kBrakeShare = 1.5;                      // of the limits of velocity and energy
+constexpr double kEnergyShare = 1.3, kEnergyRise = 0.1;  // of and above the least energy
+constexpr double kEnergyTime = 0.1;                      // in which the energy is averaged, s
+constexpr double kBrakeCycles = 2.5;  // age of a reading with which the motors may brake
 
 bool Within(double x, double limit) { return std::abs(x) <= limit; }  // false for NaN
 
@@ -71,6 +72,8 @@ Supervisor::Supervisor(const SupervisorConfig& config) : config_(config) {
     const auto single = static_cast<float>(limit);
     if (single > limit) limit = std::nextafter(single, 0.0F);
   }
+  const double step = config_.quantum > 0 ? config_.quantum : kUnknownStep;
+  for (Joint& joint : joints_) joint.step = step;
   constexpr size_t kLongestReason = 160;
   reason_.reserve(kLongestReason);
 }
@@ -86,37 +89,64 @@ LoopState Supervisor::Fault(const char* text, double first, double second) {
 void Supervisor::Brake(const CycleFacts& facts) {
   state_ = LoopState::kBraking;
   since_ = slow_since_ = facts.time;
-  least_energy_ = facts.energy;
+  energy_ = least_energy_ = facts.energy;
+}
+
+/// Keeps the interval of velocities that a motion with accelerations up to kHardest permits. A
+/// reading that leaves none is wrong. `shortest`, `longest`: time between the measurements, s.
+bool Supervisor::CheckVelocity(Joint& joint, double change, double shortest, double longest) const {
+  const double error = std::max(kErrorSteps * joint.step, kLeastError);
+  const double most = change + error, least = change - error;  // rad
+  // The mean velocity between two measurements differs by half of the acceleration's effect from
+  // the velocity at each of them.
+  const double differs = kHardest * longest / 2;
+  const double fastest = std::min(joint.fastest + differs, most / (most > 0 ? shortest : longest));
+  const double slowest =
+      std::max(joint.slowest - differs, least / (least < 0 ? shortest : longest));
+  joint.fastest = fastest + differs;
+  joint.slowest = slowest - differs;
+  return slowest <= fastest;
+}
+
+/// Whether the angle stays although the joint must have moved since its last change.
+bool Supervisor::IsStuck(Joint& joint, double change, double longest,
+                         const CycleFacts& facts) const {
+  if (change != 0) {
+    if (config_.quantum <= 0) joint.step = std::min(joint.step, std::abs(change));
+    joint.repeats = 0;
+    joint.changed_at = facts.received;
+    joint.least_speed = (std::abs(change) - joint.step) / longest - kHardest * longest / 2;
+    return false;
+  }
+  if (++joint.repeats < kStuckReadings || joint.least_speed <= 0) return false;
+  // The least motion: the joint brakes as hard as it can.
+  const double v = joint.least_speed;
+  const double time = std::clamp(facts.read_at - joint.changed_at, 0.0, v / kHardest);
+  return v * time - kHardest * time * time / 2 > 2 * joint.step;
 }
 
 bool Supervisor::CheckMotion(const CycleFacts& facts) {
-  // Time between the measurements: as the commands were sent, and at most.
-  const double h = facts.read_at - last_time_;
-  const double span = std::max(facts.received - last_time_, kShortest);
+  const double longest = std::max(facts.received - last_read_at_, kShortest);
+  const double shortest = std::max(facts.read_at - kOldest - last_received_, kShortest);
   bool good = true;
-  for (size_t j = 0; j < 2 && has_last_; ++j) {
-    const double change = facts.angle[j] - last_angle_[j];
-    const double way =
-        (2 * speed_[j] + kHardest * span) * span + std::max(2 * config_.quantum, kLeastStep);
-    if (!Within(change, way)) {
-      Fault("joint %.0f: the angle jumps by %.4g rad, which no motion explains",
-            static_cast<double>(j + 1), change);
+  for (size_t j = 0; j < 2; ++j) {
+    Joint& joint = joints_[j];
+    const double change = facts.angle[j] - joint.angle;
+    joint.angle = facts.angle[j];
+    if (!has_reading_) continue;
+    joint.rate = facts.read_at > last_read_at_ ? change / (facts.read_at - last_read_at_) : 0;
+    const auto number = static_cast<double>(j + 1);
+    if (!CheckVelocity(joint, change, shortest, longest + kOldest)) {
+      Fault("joint %.0f: the angle jumps by %.4g rad, which no motion explains", number, change);
       good = false;
-    }
-    speed_[j] = std::max({std::abs(change) / span, speed_[j] - kHardest * span, 0.0});
-    rate_[j] = h > 0 ? change / h : 0;
-    // A joint cannot stop within a cycle: its encoder did.
-    const double stop = kHardest * h + 2 * config_.quantum / h;
-    repeats_[j] = change == 0 ? repeats_[j] + 1 : 0;
-    if (change != 0) moved_[j] = rate_[j];
-    if (repeats_[j] >= kStuckReadings && std::abs(moved_[j]) > stop) {
-      Fault("joint %.0f: the encoder sticks while the joint moves", static_cast<double>(j + 1));
+    } else if (IsStuck(joint, change, longest, facts)) {
+      Fault("joint %.0f: the encoder sticks while the joint moves", number);
       good = false;
     }
   }
-  has_last_ = true;
-  last_time_ = facts.read_at;
-  last_angle_ = facts.angle;
+  has_reading_ = true;
+  last_read_at_ = facts.read_at;
+  last_received_ = facts.received;
   return good;
 }
 
@@ -174,11 +204,12 @@ bool Supervisor::WithinLimits(const CycleFacts& facts) {
 
 LoopState Supervisor::GoOnBraking(const CycleFacts& facts) {
   const double velocity = std::max(std::abs(facts.state.w1), std::abs(facts.state.w2));
-  const bool is_late = facts.time - since_ > kLatency;
-  least_energy_ = is_late ? std::min(least_energy_, facts.energy) : facts.energy;
+  // The energy of an estimate is noisy, and the last torques of the controller still act at first.
+  energy_ += config_.period / kEnergyTime * (facts.energy - energy_);
+  least_energy_ = std::min(least_energy_, energy_);
   if (!Within(velocity, kBrakeShare * config_.limits.velocity) ||
       !Within(facts.energy, kBrakeShare * config_.limits.energy) ||
-      facts.energy > kEnergyShare * least_energy_ + kEnergyRise) {
+      energy_ > kEnergyShare * least_energy_ + kEnergyRise) {
     return Fault("braking does not slow the links: %.4g rad/s", velocity);
   }
   if (!AtRest(facts.state)) slow_since_ = facts.time;
@@ -220,7 +251,7 @@ void Supervisor::Wait(const CycleFacts& facts) {
   }
 }
 
-bool Supervisor::MaySend(double age) {
+bool Supervisor::CheckAge(double age) {
   if (state_ == LoopState::kIdle || Within(age, config_.limits.age)) return true;
   state_ =
       Fault("the last reading is %.4g s old, beyond the limit %.4g s", age, config_.limits.age);
@@ -232,7 +263,7 @@ LoopState Supervisor::Step(const CycleFacts& facts) {
   readings_ = facts.fresh ? readings_ + 1 : readings_;
   if (state_ == LoopState::kIdle && !facts.fresh) readings_ = 0;
   if (facts.fresh && !CheckReading(facts)) return state_ = LoopState::kFault;
-  if (!MaySend(facts.age)) return state_;
+  if (!CheckAge(facts.age)) return state_;
   if (state_ == LoopState::kIdle || state_ == LoopState::kArmed) {
     Wait(facts);
   } else if (!CheckEstimate(facts)) {
@@ -245,14 +276,14 @@ LoopState Supervisor::Step(const CycleFacts& facts) {
   return state_;
 }
 
-/// Damping by the least of the measured and the estimated velocities, where all have the same sign:
-/// a wrong one never drives a joint.
+/// Damping by the least of the measured and the estimated velocities, where all have the same sign.
+/// Near the end of a swing they differ, and a torque would add energy.
 Joints Supervisor::BrakeTorque(const CycleFacts& facts) const {
   if (!facts.fresh || facts.age > kBrakeCycles * config_.period) return {};
   const Joints now{facts.state.w1, facts.state.w2}, ahead{facts.ahead.w1, facts.ahead.w2};
   Joints torque{};
   for (size_t j = 0; j < 2; ++j) {
-    const auto [least, most] = std::minmax({rate_[j], now[j], ahead[j]});
+    const auto [least, most] = std::minmax({joints_[j].rate, now[j], ahead[j]});
     const double velocity = least > 0 ? least : most < 0 ? most : 0;
     torque[j] = -config_.limits.brake_damping * velocity;
   }

@@ -68,9 +68,9 @@ class Supervisor {
  public:
   explicit Supervisor(const SupervisorConfig& config);
 
-  /// Whether the torques of the cycle before may be sent when the last reading is `age` seconds
-  /// old. If not, the run has a fault: the process was stopped, or the machine is silent.
-  bool MaySend(double age);
+  /// Faults if the motors are on and the last reading is older (s) than the limit: the machine is
+  /// silent, or this process was stopped. Returns whether there is no fault.
+  bool CheckAge(double age);
   /// Takes a cycle's facts and returns the state in which the cycle's torques are chosen.
   LoopState Step(const CycleFacts& facts);
   /// The torques (N·m) to send: the controller's within the limits, torques against the motion, or
@@ -106,18 +106,28 @@ class Supervisor {
   LoopState state_ = LoopState::kIdle;
   bool ended_ = false, begun_ = false;
   std::string reason_;
-  int readings_ = 0;                   // in a row
-  double since_ = 0, slow_since_ = 0;  // s
-  double least_energy_ = 0;            // since braking began; see Limits
+  int readings_ = 0;                      // in a row
+  double since_ = 0, slow_since_ = 0;     // s
+  double energy_ = 0, least_energy_ = 0;  // smoothed while braking; see Limits
   int64_t clipped_ = 0;
-  // The last reading.
-  bool has_last_ = false;
-  double last_time_ = 0;  // when its command was sent, s
-  Joints last_angle_{};
-  Joints rate_{};                 // last change over its time, rad/s
-  Joints speed_{};                // upper estimate of the speed, rad/s
-  Joints moved_{};                // rate of the last change that was not 0, rad/s
-  std::array<int, 2> repeats_{};  // readings without a change after it
+
+  static constexpr double kFastest = 100;  // velocity that no joint exceeds at first, rad/s
+  /// What the readings tell of a joint.
+  struct Joint {
+    double angle = 0;  // last reading, rad
+    double rate = 0;   // last change over the time between the commands, rad/s
+    double slowest = -kFastest, fastest = kFastest;  // velocities that the readings permit, rad/s
+    double step;                                     // of the encoder, rad
+    int repeats = 0;                                 // readings since the angle changed
+    double changed_at = 0;                           // when the last change was received, s
+    double least_speed = 0;                          // after it, rad/s
+  };
+  bool CheckVelocity(Joint& joint, double change, double shortest, double longest) const;
+  bool IsStuck(Joint& joint, double change, double longest, const CycleFacts& facts) const;
+
+  std::array<Joint, 2> joints_;
+  bool has_reading_ = false;
+  double last_read_at_ = 0, last_received_ = 0;  // s
 };
 
 /// Parses a start state: hanging, upright, or q1,q2,w1,w2 (rad, rad/s). Throws BadInput that begins
