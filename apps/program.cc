@@ -37,16 +37,6 @@ int EndByPipe() {
   return 128 + SIGPIPE;
 }
 
-/// An error's message as one line for a terminal. It may quote an untrusted file, so it is escaped,
-/// and the middle of a very long message is left out.
-std::string OneLine(std::string_view message) {
-  constexpr size_t kBegin = 1500;  // bytes
-  constexpr size_t kEnd = 500;
-  if (message.size() <= kBegin + kEnd) return Printable(message);
-  return Concat(Printable(message.substr(0, kBegin)), " … ",
-                Printable(message.substr(message.size() - kEnd)));
-}
-
 /// The exit code; another one if the output cannot be written.
 int Finish(int exit_code) {
   std::cout.flush();

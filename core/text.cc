@@ -165,6 +165,13 @@ std::vector<std::string_view> Split(std::string_view text, char separator) {
   }
 }
 
+std::string_view TakeLine(std::string_view& rest) {
+  const size_t end = std::min(rest.find('\n'), rest.size());
+  const std::string_view line = Trim(rest.substr(0, end));
+  rest.remove_prefix(std::min(end + 1, rest.size()));
+  return line;
+}
+
 std::string Join(const std::vector<std::string>& parts, std::string_view separator) {
   std::string joined;
   for (const std::string& part : parts) {
@@ -175,11 +182,13 @@ std::string Join(const std::vector<std::string>& parts, std::string_view separat
 }
 
 std::string Replaced(std::string text, std::string_view from, std::string_view to) {
-  for (size_t at = text.find(from); at != std::string::npos; at = text.find(from, at)) {
-    text.replace(at, from.size(), to);
-    at += to.size();
+  std::string replaced;  // in place, each replacement would move the rest of the text
+  size_t begin = 0;
+  for (size_t at = 0; (at = text.find(from, begin)) != std::string::npos;
+       begin = at + from.size()) {
+    replaced.append(text, begin, at - begin) += to;
   }
-  return text;
+  return replaced.append(text, begin);
 }
 
 std::string HexDigits(uint64_t number, int digits) {
@@ -236,6 +245,14 @@ std::string Printable(std::string_view text) {
   return shown;
 }
 
+std::string OneLine(std::string_view message) {
+  constexpr size_t kBegin = 1500;  // bytes
+  constexpr size_t kEnd = 500;
+  if (message.size() <= kBegin + kEnd) return Printable(message);
+  return Concat(Printable(message.substr(0, kBegin)), " … ",
+                Printable(message.substr(message.size() - kEnd)));
+}
+
 std::string ShellQuoted(std::string_view text) {
   constexpr std::string_view kSafe =
       "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./,:=+@%";
@@ -248,6 +265,8 @@ std::string ShellQuoted(std::string_view text) {
 }
 
 std::string DidYouMean(std::string_view word, const std::vector<std::string>& names) {
+  constexpr size_t kLongest = 64;  // bytes; no name is longer, and distances take long
+  if (word.size() > kLongest) return "";
   const auto nearest =
       std::min_element(names.begin(), names.end(), [&](const std::string& a, const std::string& b) {
         const size_t to_a = EditDistance(word, a), to_b = EditDistance(word, b);

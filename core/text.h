@@ -61,6 +61,9 @@ std::string_view Trim(std::string_view text);
 /// Splits `text` at the separators and trims each piece; "a,,b" has three pieces.
 std::vector<std::string_view> Split(std::string_view text, char separator);
 
+/// Takes the first line off the rest of a text. Returns it trimmed.
+std::string_view TakeLine(std::string_view& rest);
+
 /// Joins `parts` with `separator` between them.
 std::string Join(const std::vector<std::string>& parts, std::string_view separator);
 
@@ -91,6 +94,9 @@ std::string WrapText(std::string_view text, size_t columns, size_t indent = 0);
 /// characters that reorder text or break lines. Everything else stays, including backslashes.
 std::string Printable(std::string_view text);
 
+/// A message as one Printable line. The middle of a very long message is left out.
+std::string OneLine(std::string_view message);
+
 /// `text` as one word of a POSIX shell's command line: unchanged if that is safe, otherwise in
 /// single quotes. Control characters stay, so a command that contains them is not fit for printing.
 std::string ShellQuoted(std::string_view text);
@@ -98,7 +104,8 @@ std::string ShellQuoted(std::string_view text);
 /// " (did you mean NAME?)" for the name nearest to `word` in edit distance. Among equally near
 /// names, it takes the name that shares most letters with `word` at both ends. If no name is near,
 /// it takes a name with these initials (`--lr`: `--learning-rate`), or a name that begins with
-/// `word` or is a beginning of `word`. "" if there is no such name.
+/// `word` or is a beginning of `word`. "" if there is no such name, or if `word` is too long for
+/// one.
 std::string DidYouMean(std::string_view word, const std::vector<std::string>& names);
 
 }  // namespace upswing

@@ -76,6 +76,26 @@ TEST(Text, SuggestsTheNearestNameOnlyIfItIsNear) {
   EXPECT_EQ(DidYouMean("gamma", {}), "");
 }
 
+TEST(Text, NoNameIsMeantByALongWord) {
+  const std::string long_name(100, 'a');
+  EXPECT_EQ(DidYouMean(long_name + "b", {long_name}), "");
+}
+
+TEST(Text, TakesLineAfterLine) {
+  std::string_view rest = "a\r\n\n b";
+  EXPECT_EQ(TakeLine(rest), "a");
+  EXPECT_EQ(TakeLine(rest), "");
+  EXPECT_EQ(TakeLine(rest), "b");
+  EXPECT_TRUE(rest.empty());
+}
+
+TEST(Text, OneLineLeavesOutTheMiddle) {
+  EXPECT_EQ(OneLine("a\nb"), "a\\nb");
+  const std::string line = OneLine("begin" + std::string(100'000, 'x') + "end");
+  EXPECT_LT(line.size(), 2100);
+  EXPECT_TRUE(line.starts_with("begin") && line.ends_with("end"));
+}
+
 TEST(Text, PrintableKeepsTextAndEscapesControlCharacters) {
   EXPECT_EQ(Printable("N·m θ₁ 漢 😀 C:\\x"), "N·m θ₁ 漢 😀 C:\\x");
   EXPECT_EQ(Printable("a\nb\rc\td"), "a\\nb\\rc\\td");

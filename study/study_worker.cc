@@ -156,7 +156,8 @@ void WriteEvaluations(const StudyPlan& plan) {
     const auto result = FinishedRun::Read(run.done());
     if (!result) continue;
     bool is_first = true;
-    for (const std::string_view line : Split(result->evaluations, '\n')) {
+    for (std::string_view rest = result->evaluations; !rest.empty();) {
+      const std::string_view line = TakeLine(rest);
       if (line.empty()) continue;
       if (!is_first) {
         table += Concat(run.variant->name, ',', run.seed, ',', Printable(line), '\n');

@@ -25,6 +25,7 @@ PyObject* MakeClass(nb::module_& m, const char* name, const char* doc, PyObject*
 }
 
 /// The message with Python's names: a flag at its beginning or in its advice becomes an argument.
+/// The message must be short, because std::regex calls itself for each character of a match.
 std::string PythonMessage(std::string message) {
   static const std::regex kFlag("(^|with |another )--(set )?([a-z0-9-]+)");
   for (std::smatch match; std::regex_search(message, match, kFlag);) {
@@ -40,7 +41,7 @@ void Translate(const std::exception_ptr& exception, void* /*unused*/) {
     std::rethrow_exception(exception);
   } catch (const Error& error) {
     PyErr_SetString(error.exit_code() == 2 ? input_error_class : failure_class,
-                    PythonMessage(Printable(error.what())).c_str());
+                    PythonMessage(OneLine(error.what())).c_str());
   }
 }
 
