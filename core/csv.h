@@ -23,19 +23,19 @@ struct CsvColumn {
 ///
 /// Throws BadInput if a column is missing or named twice, a quote is not closed in its line, or a
 /// cell is not a finite number. Also throws it if a row and the line of names differ in their number
-/// of cells. Messages begin with `where` (a path) and the line.
+/// of cells, or have thousands. Messages begin with `where` (a path) and the line.
 std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::string>& names,
                                const std::string& where);
 
-/// The names of the columns: the cells of the first line that ReadCsv does not ignore. Empty without
-/// such a line. Throws BadInput if a quote is not closed.
+/// The names of the columns: the cells of the first line that ReadCsv does not ignore. Empty
+/// without such a line. Throws BadInput if a quote is not closed, or for thousands of columns.
 std::vector<std::string> CsvNames(std::string_view text, const std::string& where);
 
 /// Builder of a CSV text. The cell names of the first row become the first line of the text.
 class CsvTable {
  public:
-  /// Adds a cell to the row. A text is made Printable and put in quotes if necessary. An empty text
-  /// stands for an unknown number.
+  /// Adds a cell to the row. Names and texts are made Printable and put in quotes if necessary. An
+  /// empty text stands for an unknown number.
   void Add(std::string_view name, std::string_view text);
   void Add(std::string_view name, double number) { Add(name, FormatNumber(number)); }
   void Add(std::string_view name, std::integral auto number) { Add(name, Concat(number)); }

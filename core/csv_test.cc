@@ -32,8 +32,7 @@ TEST(Csv, AsSpreadsheetsAndLibrariesWriteIt) {
 
 TEST(Csv, NamesOfTheColumns) {
   using Names = std::vector<std::string>;
-  EXPECT_EQ(CsvNames("\xef\xbb\xbf# by hand\r\n\n \"a\", b\r\n1,2\n", "t.csv"),
-            (Names{"a", "b"}));
+  EXPECT_EQ(CsvNames("\xef\xbb\xbf# by hand\r\n\n \"a\", b\r\n1,2\n", "t.csv"), (Names{"a", "b"}));
   EXPECT_EQ(CsvNames("a,,b", "t.csv"), (Names{"a", "", "b"}));
   EXPECT_EQ(CsvNames("\n# only a comment", "t.csv"), Names());
   EXPECT_EQ(CsvNames("", "t.csv"), Names());
@@ -59,6 +58,24 @@ TEST(Csv, MessagesNameLineAndColumn) {
   EXPECT_EQ(Complaint("a,b\nx,1\n"), "none");
   EXPECT_EQ(Complaint("a,b\n\"x,1\n"), "t.csv:2: expected a closing quote, got \"\"x,1\"");
   EXPECT_EQ(Complaint("a,b\n1,\"\"\n"), "t.csv:2: b: expected a finite number, got \"\"");
+}
+
+TEST(Csv, RefusesMoreColumnsThanAnyTableHas) {
+  EXPECT_EQ(Complaint("b" + std::string(4095, ',') + "\n1" + std::string(4095, ',')), "none");
+  const std::string wide = std::string(4096, ',');
+  EXPECT_EQ(Complaint("b" + wide), "t.csv:1: expected at most 4096 columns, got more");
+  EXPECT_EQ(Complaint("b\n1" + wide), "t.csv:2: expected at most 4096 columns, got more");
+  EXPECT_THROW(CsvNames(wide, "t.csv"), Error);
+}
+
+TEST(Csv, NamesOfATableAreEscapedAsItsTextsAre) {
+  CsvTable table;
+  table.Add("a, \"b\"\nforged", 1);
+  table.Add("\x1b[2J", 2);
+  table.EndRow();
+  EXPECT_EQ(table.text(), "\"a, \"\"b\"\"\\nforged\",\\x1b[2J\n1,2\n");
+  EXPECT_EQ(CsvNames(table.text(), "t.csv"),
+            (std::vector<std::string>{"a, \"b\"\\nforged", "\\x1b[2J"}));
 }
 
 TEST(Csv, ATableHasTheNamesOfItsFirstRowAndQuotesWhatHasToBe) {

@@ -14,7 +14,8 @@ namespace upswing {
 bool IsGzip(std::string_view bytes);
 
 /// Inflates a gzip file, which may have several members. Stops as soon as the text is larger than
-/// `most_bytes`. Throws BadInput, with `where` (a path), for a damaged or a larger file.
+/// `most_bytes`, or than 1 MiB and 100 times the file. Throws BadInput, with `where` (a path), for
+/// a damaged file or a larger text.
 std::string Gunzip(std::string_view bytes, const std::string& where,
                    size_t most_bytes = kMostTextBytes);
 
