@@ -27,14 +27,21 @@ std::optional<int64_t> JsonInteger(const json& value) {
 }
 
 json ParseJsonObject(std::string_view text, int max_depth) {
+  constexpr int kMostParts = 1'000'000;  // a part of 3 bytes can take 80 bytes of memory
   bool too_deep = false;
+  int parts = 0;
   const auto keep = [&](int depth, json::parse_event_t, const json&) {
     too_deep |= depth > max_depth;
-    return !too_deep;  // the parser allocates nothing for a value that is not kept
+    if (parts <= kMostParts) ++parts;
+    // The parser allocates nothing for a value that is not kept.
+    return !too_deep && parts <= kMostParts;
   };
   // The parser's own message could quote bytes that are not text.
   json object = json::parse(text, keep, false);
   if (too_deep) throw BadInput(Concat("expected JSON at most ", max_depth, " levels deep"));
+  if (parts > kMostParts) {
+    throw BadInput(Concat("expected JSON of at most ", kMostParts, " names, values and brackets"));
+  }
   if (!object.is_object()) throw BadInput("expected a JSON object");
   return object;
 }

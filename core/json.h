@@ -15,7 +15,8 @@ namespace upswing {
 /// true.
 std::optional<int64_t> JsonInteger(const nlohmann::json& value);
 
-/// Parses a JSON object whose objects and lists are nested at most `max_depth` levels deep.
+/// Parses a JSON object whose objects and lists are nested at most `max_depth` levels deep, and
+/// which has at most a million names, values and brackets.
 nlohmann::json ParseJsonObject(std::string_view text, int max_depth = 3);
 
 /// Reads a member that must exist in an object. Integers must be in [low, high].

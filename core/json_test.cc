@@ -59,6 +59,13 @@ TEST(Json, OnlyObjectsOfLimitedDepthAreAccepted) {
   }
 }
 
+TEST(Json, AnObjectHasALimitedNumberOfParts) {
+  std::string text = R"({"a": [{})";
+  for (int i = 0; i < 500'000; ++i) text += ",{}";  // each has two parts, its brackets
+  EXPECT_EQ(ErrorOf([&] { ParseJsonObject(text + "]}"); }),
+            "expected JSON of at most 1000000 names, values and brackets");
+}
+
 TEST(Json, PrintedJsonIsAscii) {
   const nlohmann::ordered_json document{{"z", "\x1b° \xff"}, {"a", 0.5}};
   EXPECT_EQ(PrintableJson(document), "{\n  \"z\": \"\\u001b\\u00b0 \\ufffd\",\n  \"a\": 0.5\n}");

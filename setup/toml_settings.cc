@@ -49,9 +49,61 @@ FlagValue ApplyNode(const Options& options, const std::string& section, const st
   return setting;
 }
 
+constexpr size_t kMostBytes = 1 << 20;
+constexpr int kMostDepth = 16;  // levels of lists and tables, and parts of a dotted key
+
+/// The end of the string whose first quote is at `at`; npos if it is not closed.
+size_t EndOfString(std::string_view text, size_t at) {
+  const std::string quote(1, text[at]), three(3, text[at]);
+  const bool is_long = text.substr(at).starts_with(three);
+  for (at += is_long ? 3 : 1; at < text.size(); ++at) {
+    const std::string_view rest = text.substr(at);
+    if (quote == "\"" && rest.starts_with('\\')) {
+      ++at;
+    } else if (is_long && rest.starts_with(three)) {
+      // One or two quotes before the last three belong to the string.
+      return at + std::clamp<size_t>(rest.find_first_not_of(quote), 3, 5);
+    } else if (!is_long && rest.starts_with(quote)) {
+      return at + 1;
+    } else if (!is_long && rest.starts_with('\n')) {
+      break;
+    }
+  }
+  return std::string_view::npos;
+}
+
+/// Throws BadInput if lists, tables or dotted keys of a document are nested deeper than kMostDepth.
+/// The parser and the destructors of its result call themselves for each level, which could
+/// overflow the stack. Ignores what follows a string that is not closed, as the parser does.
+void CheckDepth(std::string_view text, const std::string& where) {
+  int depth = 0, parts = 1;
+  for (size_t at = 0; at < text.size(); ++at) {
+    const char c = text[at];
+    if (c == '"' || c == '\'') {
+      at = EndOfString(text, at) - 1;
+      if (at >= text.size()) return;
+    } else if (c == '#') {
+      at = std::min(text.find('\n', at), text.size());
+    }
+    if (c == '[' || c == '{') ++depth;
+    if (c == ']' || c == '}') --depth;
+    if (c == '.') ++parts;
+    if (std::string_view("[]{},=#\n").find(c) != std::string_view::npos) parts = 1;
+    if (depth <= kMostDepth && parts <= kMostDepth) continue;
+    throw BadInput(Concat(where, ":", 1 + std::ranges::count(text.substr(0, at), '\n'),
+                          ": expected lists, tables and dotted keys of at most ", kMostDepth,
+                          " levels, got more"));
+  }
+}
+
 }  // namespace
 
 toml::table ParseToml(std::string_view text, const std::string& where) {
+  if (text.size() > kMostBytes) {
+    throw BadInput(
+        Concat(where, ": expected TOML of at most ", kMostBytes, " bytes, got ", text.size()));
+  }
+  CheckDepth(text, where);
   try {
     return toml::parse(text);
   } catch (const toml::parse_error& error) {

@@ -12,7 +12,8 @@
 
 namespace upswing {
 
-/// Parses a TOML document. Throws BadInput with `where`, the document's name, and the line.
+/// Parses a TOML document. Throws BadInput with `where`, the document's name, and the line. Also
+/// refuses documents that are too large or too deeply nested to parse safely.
 toml::table ParseToml(std::string_view text, const std::string& where);
 
 /// Place of a node of a document: name and line, such as `FILE:3`.
