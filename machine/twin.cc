@@ -24,19 +24,6 @@ using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowM
 
 constexpr size_t kMostSessions = 1000;
 
-/// Takes the table [covariance] out of a document. Throws BadInput.
-void ReadCovariance(toml::table& document, const std::string& where, Twin& twin) {
-  const Options options = OptionsOf(twin);
-  if (const toml::table* table = document["covariance"].as_table()) {
-    for (const auto& [name, node] : *table) {
-      options.Find(std::string(name.str()), Concat(PlaceOf(node, where), ": [covariance]"));
-    }
-  }
-  Covariance covariance = TakeCovariance(document, where);
-  twin.uncertain = std::move(covariance.names);
-  twin.covariance = std::move(covariance.values);
-}
-
 /// A factor L of the covariance L L'. Throws BadInput if the matrix is not a covariance.
 Matrix Factor(const Twin& twin, const std::string& where) {
   const int n = static_cast<int>(twin.uncertain.size());
@@ -219,7 +206,9 @@ Twin ParseTwin(std::string_view text, const std::string& where) {
     return *node.as_table();
   };
   table.erase("disturbance");  // follows from the other values
-  ReadCovariance(table, where, twin);
+  Covariance covariance = TakeCovariance(table, where);
+  twin.uncertain = std::move(covariance.names);
+  twin.covariance = std::move(covariance.values);
   take("sessions", [&](const toml::node& node, const std::string& place) {
     ReadSessions(table_of(node, place), where, twin);
   });

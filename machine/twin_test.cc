@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "run/plant_file.h"
 
 namespace upswing {
@@ -116,6 +117,18 @@ TEST(Twin, RefusesCovariancesThatAreNone) {
   EXPECT_NE(MessageFor(plant + "mass1 = [1, 0]").find("list of 1"), std::string::npos);
   EXPECT_NE(MessageFor(plant + "mass1 = [nan]").find("finite"), std::string::npos);
   EXPECT_NE(MessageFor(plant + "mas1 = [1]").find("mass1"), std::string::npos);
+  EXPECT_NE(MessageFor(plant + "damping = [1]").find("expected the name of one number"),
+            std::string::npos);
+}
+
+TEST(Twin, EveryNumberCanHaveACovariance) {
+  const Twin twin;
+  const Options options = OptionsOf(twin);
+  for (const Option& option : options.all()) {
+    const bool is_number = option.step == 0;  // the number of a joint is none
+    const std::string text = Concat("[plant]\n[covariance]\n", option.name, " = [0]");
+    EXPECT_EQ(MessageFor(text).empty(), is_number) << option.name;
+  }
 }
 
 TEST(Twin, RefusesUnknownNamesAndRanges) {

@@ -1,6 +1,7 @@
 #include "run/covariance.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -15,6 +16,27 @@ namespace {
 
 constexpr size_t kMostUncertain = 32;
 constexpr double kRounding = 1e-6;
+
+/// The numbers of a twin that are not settings of its plant (machine/twin.h).
+constexpr std::array kOfMachine{
+    "delay",           "lag",     "passive_limit",  "current_delay",
+    "current_inertia", "quantum", "angle_range",    "torque_quantum",
+    "zero1",           "zero2",   "velocity_share", "velocity_dead_zone",
+    "period",          "jitter",  "late_share",     "late"};
+
+/// Throws BadInput unless `name` is one number of a twin. An alias such as `mass` is two.
+void CheckName(const std::string& name, const std::string& place) {
+  const Plant plant;
+  const Options options = OptionsOf(plant);
+  std::vector<std::string> known(kOfMachine.begin(), kOfMachine.end());
+  for (const Option& option : options.all()) {
+    const bool is_number = std::holds_alternative<double*>(option.target) && option.step == 0;
+    if (is_number) known.push_back(option.name);
+  }
+  if (std::ranges::find(known, name) != known.end()) return;
+  throw BadInput(Concat(place, ": expected the name of one number of a machine, got \"",
+                        Printable(name), "\"", DidYouMean(name, known)));
+}
 
 /// Appends the row of a value to the covariance (n × n). Throws BadInput.
 void AddRow(const toml::node& node, size_t n, const std::string& place, Covariance& covariance) {
@@ -37,7 +59,7 @@ bool IsSymmetric(const Covariance& covariance) {
   const auto at = [&](size_t i, size_t j) { return covariance.values[i * n + j]; };
   for (size_t i = 0; i < n; ++i) {
     for (size_t j = 0; j < i; ++j) {
-      const double scale = std::sqrt(std::abs(at(i, i) * at(j, j)));
+      const double scale = std::sqrt(std::abs(at(i, i))) * std::sqrt(std::abs(at(j, j)));
       if (std::abs(at(i, j) - at(j, i)) > kRounding * scale) return false;
     }
   }
@@ -67,6 +89,7 @@ Covariance TakeCovariance(toml::table& document, const std::string& where) {
   std::ranges::sort(order, [](const auto& a, const auto& b) { return a.first < b.first; });
   for (const auto& [position, name] : order) {
     const toml::node& row = *table->get(name);
+    CheckName(name, Concat(PlaceOf(row, where), ": [covariance]"));
     AddRow(row, order.size(), Concat(PlaceOf(row, where), ": ", Printable(name)), covariance);
     covariance.names.push_back(name);
   }
@@ -86,7 +109,7 @@ std::string PosteriorText(const Covariance& covariance) {
   for (size_t i = 0; i < n; ++i) {
     const std::string& name = covariance.names[i];
     if (name == "delay" || name == "lag") latency.push_back(i);
-    if (name == "sensor_latency" || !Posterior::Knows(name)) continue;
+    if (!Posterior::Knows(name)) continue;
     names.push_back(name);
     terms.push_back({i});
   }

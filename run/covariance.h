@@ -15,7 +15,7 @@ struct Covariance {
 
 /// Removes the table [covariance] of a document, and parses it: for each value, a list with its
 /// covariances with all values, in the order of the rows. Without the table, n is 0. Throws
-/// BadInput.
+/// BadInput, also for a name that is not one number of a machine.
 Covariance TakeCovariance(toml::table& document, const std::string& where);
 
 /// The covariance of the values that simulated tasks have, as Posterior::Parse reads it; empty if

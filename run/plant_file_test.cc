@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "run/config_files.h"
 
 namespace upswing {
@@ -90,6 +91,39 @@ TEST(PlantFile, RefusesACovarianceThatIsNone) {
   EXPECT_NE(ErrorOf(plant + "mass1 = [1, 0.5]\nmass2 = [0, 1]").find("symmetric"),
             std::string::npos);
   EXPECT_NE(ErrorOf("covariance = 1\n[plant]").find("expected a table"), std::string::npos);
+  // An alias is two numbers, and a joint is none.
+  for (const char* name : {"damping", "mass", "actuated_joint", "mas1", "sensor_latency"}) {
+    EXPECT_NE(ErrorOf(plant + name + " = [1]")
+                  .find(Concat("m.toml:3: [covariance]: expected the name of one number of a ",
+                               "machine, got \"", name, "\"")),
+              std::string::npos)
+        << name;
+  }
+}
+
+TEST(PlantFile, RefusesDeepAndLargeDocumentsBeforeTheyAreParsed) {
+  const auto repeated = [](std::string_view part, int count) {
+    std::string text;
+    for (int i = 0; i < count; ++i) text += part;
+    return text;
+  };
+  const std::string parts = repeated("a.", 31000) + "a";
+  for (const std::string& text :
+       {"[plant]\n" + parts + " = 1", "[" + parts + "]", "[[" + parts + "]]",
+        repeated("\"a.\\\"\" . 'b#\"'.", 9) + "c = 1", "a = " + repeated("[", 17),
+        "a = " + repeated("{a.b = [\n", 9), "a = \"\"\"\"\"[#\"\"\"\"\"\nb = " + repeated("[", 17),
+        "a = '''#'\n'''''\nb = " + repeated("{c=", 17)}) {
+    EXPECT_NE(ErrorOf(text).find(": expected lists, tables and dotted keys of at most 16 levels"),
+              std::string::npos)
+        << text.substr(0, 100);
+  }
+  EXPECT_EQ(ErrorOf(repeated("#", (1 << 20) + 1)),
+            "m.toml: expected TOML of at most 1048576 bytes, got 1048577");
+  // Brackets and dots in strings and comments, and numbers, have no depth.
+  EXPECT_EQ(ErrorOf("[plant]  # " + repeated("[.{", 99) + "\nmass1 = 1.5\n[sessions.a]\nb = \"" +
+                    repeated(".[{", 99) + "\"\nc = '''\n" + repeated("[.", 99) + "'''\nd = [" +
+                    repeated("1.5, ", 99) + "]\ne = 'x' # \" '''\n"),
+            "");
 }
 
 TEST(PlantFile, ItsCovarianceCanRandomizeATraining) {
