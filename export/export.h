@@ -1,7 +1,9 @@
 #pragma once
 
 #include <filesystem>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "setup/loaded_policy.h"
@@ -22,6 +24,10 @@ std::string TestVectorsJson();
 std::vector<std::string> ExportToPage(const std::vector<std::filesystem::path>& paths,
                                       const std::string& id, int64_t checkpoints,
                                       const std::filesystem::path& folder);
+
+/// Parses a page's agents.json: {"agents": [{"id": …}, …]}. Throws BadInput that begins with
+/// `where`.
+nlohmann::ordered_json ParsePageIndex(std::string_view text, const std::string& where);
 
 /// A learned policy as a file in ONNX's format. Input: `observation` (batch × D). Outputs: `torque`
 /// and, by kind, `q_values`, `mean` and `log_std`, `probabilities`, `value`. Metadata explain them

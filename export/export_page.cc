@@ -2,6 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
+#include "core/json.h"
 #include "core/safetensors.h"
 #include "core/text.h"
 #include "export/c_text.h"
@@ -9,6 +10,7 @@
 #include "io/file.h"
 #include "io/machine.h"
 #include "io/run_folder.h"
+#include "io/tensor_file.h"
 #include "nn/network_policy.h"
 #include "run/find_policy.h"
 #include "run/run_record.h"
@@ -190,7 +192,7 @@ PageAgent ReadAgent(const fs::path& path, const std::string& given_id, int64_t c
     throw BadInput(
         Concat(where, ": expected metadata \"agent\" or --id for the ID in the page, got neither"));
 
-  PageAgent agent{id, path, ReadFile(loaded.path), EntryOf(loaded, id), {}};
+  PageAgent agent{id, path, ReadOwnBytes(loaded.path, kMostPolicyBytes), EntryOf(loaded, id), {}};
   const std::optional<std::string> command = TrainCommand(loaded.policy->info(), where);
   if (command) agent.entry["command"] = *command;
   if (checkpoints > 0) AddCheckpoints(agent, loaded, checkpoints);
@@ -222,18 +224,10 @@ std::vector<PageAgent> ReadAgents(const std::vector<fs::path>& paths, const std:
   return agents;
 }
 
-/// The page's present list. Throws BadInput if it is not a list of agents.
+/// The page's present list. Throws BadInput.
 ordered_json ReadIndex(const fs::path& file) {
   if (!fs::exists(file)) return {{"agents", ordered_json::array()}};
-  try {
-    ordered_json index = ordered_json::parse(ReadOwnFile(file));
-    for (const ordered_json& entry : index.at("agents").get_ref<const ordered_json::array_t&>()) {
-      (void)entry.at("id").get_ref<const std::string&>();
-    }
-    return index;
-  } catch (const ordered_json::exception& error) {
-    throw BadInput(Concat(file.string(), ": expected a list of agents: ", error.what()));
-  }
+  return ParsePageIndex(ReadOwnFile(file), file.string());
 }
 
 void AddEntry(ordered_json& index, const PageAgent& agent) {
@@ -248,6 +242,20 @@ void AddEntry(ordered_json& index, const PageAgent& agent) {
 }
 
 }  // namespace
+
+ordered_json ParsePageIndex(std::string_view text, const std::string& where) {
+  try {
+    constexpr int kMostDepth = 8;
+    (void)ParseJsonObject(text, kMostDepth);  // its limits protect the stack and the memory
+    ordered_json index = ordered_json::parse(text);
+    for (const ordered_json& entry : index.at("agents").get_ref<const ordered_json::array_t&>()) {
+      (void)entry.at("id").get_ref<const std::string&>();
+    }
+    return index;
+  } catch (const std::exception& error) {
+    throw BadInput(Concat(where, ": expected a list of agents: ", error.what()));
+  }
+}
 
 std::vector<std::string> ExportToPage(const std::vector<fs::path>& paths, const std::string& id,
                                       int64_t checkpoints, const fs::path& folder) {

@@ -23,7 +23,7 @@ constexpr size_t kMostBytes = size_t{64} << 20;
 bool Try(const fs::path& file) {
   std::printf("%s\n", file.c_str());
   std::fflush(stdout);  // shows which file ended the process
-  return upswing::TryInput(upswing::ReadTextFile(file));
+  return upswing::TryInput(upswing::ReadOwnFile(file));
 }
 
 /// Tries the files of a folder. Returns how many contradict the folder's name.

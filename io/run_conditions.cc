@@ -44,14 +44,17 @@ void AddFacts(const json& facts, RunConditions& conditions) {
 }  // namespace
 
 RunConditions RunConditions::Of(const fs::path& run) {
-  RunConditions conditions;
-  std::string text;
   try {
-    text = ReadOwnFile(run / RunFolder::kLog, kMostLogBytes);
+    return OfLog(ReadOwnFile(run / RunFolder::kLog, kMostLogBytes));
   } catch (const Error&) {
-    return conditions;
+    return {};
   }
-  for (const std::string_view line : Split(text, '\n')) {
+}
+
+RunConditions RunConditions::OfLog(std::string_view text) {
+  RunConditions conditions;
+  for (std::string_view rest = text; !rest.empty();) {
+    const std::string_view line = TakeLine(rest);
     const size_t begin = line.find('{');
     if (begin == std::string_view::npos) continue;
     try {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 
 namespace upswing {
 
@@ -19,6 +20,8 @@ struct RunConditions {
 
   /// Reads the facts from all lines of a run's log.txt; empty if that fails.
   static RunConditions Of(const std::filesystem::path& run);
+  /// Reads the facts from the text of such a log.
+  static RunConditions OfLog(std::string_view text);
 
   /// AddTo adds the conditions to a result file. From reads them from one and throws BadInput.
   void AddTo(nlohmann::ordered_json& j) const;

@@ -16,7 +16,10 @@ using nlohmann::ordered_json;
 
 constexpr int64_t kMost = int64_t{1} << 62;
 
-FinishedRun Parse(const json& j) {
+}  // namespace
+
+FinishedRun FinishedRun::Parse(std::string_view text) {
+  const json j = ParseJsonObject(text);
   FinishedRun run;
   TrainState& s = run.state;
   s.steps = JsonInteger(j, "steps", 0, kMost);
@@ -36,8 +39,6 @@ FinishedRun Parse(const json& j) {
   run.evaluations = JsonText(j, "evaluations");
   return run;
 }
-
-}  // namespace
 
 void FinishedRun::Write(const fs::path& path) const {
   const TrainState& s = state;
@@ -63,7 +64,7 @@ std::optional<FinishedRun> FinishedRun::Read(const fs::path& path) {
   std::error_code error;
   if (!fs::exists(fs::symlink_status(path, error))) return std::nullopt;
   try {
-    return Parse(ParseJsonObject(ReadOwnFile(path)));
+    return Parse(ReadOwnFile(path));
   } catch (const Error& broken) {
     const std::string_view what = broken.what();
     if (what.starts_with(path.string())) throw;

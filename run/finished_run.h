@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "io/run_conditions.h"
 #include "rl/trainer.h"
@@ -23,6 +24,8 @@ struct FinishedRun {
 
   /// Writes the result to a file.
   void Write(const std::filesystem::path& path) const;
+  /// Parses the text of a result file. Throws BadInput.
+  static FinishedRun Parse(std::string_view text);
   /// Reads a result file; nothing if it does not exist. Throws BadInput if it is broken.
   static std::optional<FinishedRun> Read(const std::filesystem::path& path);
 };

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 
 #include "core/error.h"
 #include "core/text.h"
@@ -60,7 +61,12 @@ std::vector<Variant> ReadVariants(const toml::table& study, const std::string& w
   if (variants == nullptr || variants->empty()) {
     throw BadInput(Concat(where, ": expected at least one variant: a table [variants.NAME]"));
   }
+  if (variants->size() > kMostVariants) {
+    throw BadInput(
+        Concat(where, ": expected at most ", kMostVariants, " variants, got ", variants->size()));
+  }
   std::vector<std::pair<uint32_t, Variant>> placed;
+  std::map<std::string, std::pair<uint32_t, std::string>> known;  // settings → line and name
   for (const auto& [key, node] : *variants) {
     const std::string name(key.str());
     CheckVariantName(name, PlaceOf(node, where));
@@ -69,15 +75,15 @@ std::vector<Variant> ReadVariants(const toml::table& study, const std::string& w
     settings.insert(settings.end(), own.begin(), own.end());
     Variant variant{name, BuildVariant(name, settings, PlaceOf(node, where), where)};
     MakeReadyForMany(variant.config);
-    for (const auto& [line, other] : placed) {
-      if (ConfigToml(other.config, true) == ConfigToml(variant.config, true) &&
-          other.config.mjcf == variant.config.mjcf) {
-        throw BadInput(Concat(PlaceOf(node, where), ": variant \"", name,
-                              "\": expected settings of its own, got those of \"", other.name,
-                              "\" in line ", line));
-      }
+    const uint32_t line = node.source().begin.line;
+    const auto [same, is_new] = known.try_emplace(
+        Concat(ConfigToml(variant.config, true), variant.config.mjcf), line, name);
+    if (!is_new) {
+      throw BadInput(Concat(PlaceOf(node, where), ": variant \"", name,
+                            "\": expected settings of its own, got those of \"",
+                            same->second.second, "\" in line ", same->second.first));
     }
-    placed.emplace_back(node.source().begin.line, std::move(variant));
+    placed.emplace_back(line, std::move(variant));
   }
   std::ranges::stable_sort(placed, {}, [](const auto& entry) { return entry.first; });
   std::vector<Variant> in_order;

@@ -19,7 +19,7 @@ using nlohmann::json;
 using nlohmann::ordered_json;
 
 constexpr std::array kKeeps{"all", "policy", "tables"};  // in the order of Keep
-constexpr size_t kMostVariants = 10'000, kMostPlanBytes = 1 << 24;
+constexpr size_t kMostPlanBytes = 1 << 24;
 
 }  // namespace
 
@@ -116,6 +116,23 @@ void WritePlan(const StudyPlan& plan) {
   WriteIfOther(plan.folder / kPlanName, PrintableJson(j) + "\n");
 }
 
+StudyPlan PlanIn(const json& j, std::vector<std::string>& marks) {
+  StudyPlan plan;
+  plan.keep = ParseKeep(JsonText(j, "keep"), "keep");
+  plan.seeds = ParseSeeds(JsonText(j, "seeds"), "seeds");
+  for (const json& one : JsonList(j, "variants", kMostVariants)) {
+    if (!one.is_object()) throw BadInput("variants: expected a list of objects");
+    const std::string& name = JsonText(one, "name");
+    if (!name.empty()) CheckVariantName(name, "variants");
+    if (std::ranges::find(plan.variants, name, &Variant::name) != plan.variants.end()) {
+      throw BadInput(Concat("variants: expected each name once, got ", name, " twice"));
+    }
+    plan.variants.push_back({name, Config()});
+    marks.push_back(JsonText(one, "settings"));
+  }
+  return plan;
+}
+
 StudyPlan ReadPlan(const fs::path& folder) {
   const fs::path path = folder / kPlanName;
   const std::string where = path.string();
@@ -124,32 +141,24 @@ StudyPlan ReadPlan(const fs::path& folder) {
                           Exists(folder) ? Concat("one without ", kPlanName) : "no such folder"));
   }
   StudyPlan plan;
-  plan.folder = folder;
   try {
     const json j = ParseJsonObject(ReadOwnFile(path, kMostPlanBytes), 4);
     if (JsonText(j, "version") != UPSWING_VERSION) {
       throw BadInput(Concat("expected a study of Upswing ", UPSWING_VERSION, ", got one of ",
                             JsonText(j, "version"), ", which may train differently"));
     }
-    plan.keep = ParseKeep(JsonText(j, "keep"), "keep");
-    plan.seeds = ParseSeeds(JsonText(j, "seeds"), "seeds");
-    for (const json& one : JsonList(j, "variants", kMostVariants)) {
-      if (!one.is_object()) throw BadInput("variants: expected a list of objects");
-      Variant variant;
-      variant.name = JsonText(one, "name");
-      if (!variant.name.empty()) CheckVariantName(variant.name, "variants");
-      if (std::ranges::find(plan.variants, variant.name, &Variant::name) != plan.variants.end()) {
-        throw BadInput(Concat("variants: expected each name once, got ", variant.name, " twice"));
-      }
+    std::vector<std::string> marks;
+    plan = PlanIn(j, marks);
+    plan.folder = folder;
+    for (size_t v = 0; v < marks.size(); ++v) {
+      Variant& variant = plan.variants[v];
       CheckNoLink(folder / variant.name);
       const fs::path settings = folder / variant.name / kSettingsName;
       variant.config = ReadSettings(settings);
       MakeReadyForMany(variant.config);
-      if (SettingsMark(variant.config) != JsonText(one, "settings")) {
-        throw BadInput(Concat(settings.string(), ": expected the settings of ", kPlanName,
-                              ", got others; `upswing study` writes both"));
-      }
-      plan.variants.push_back(std::move(variant));
+      if (SettingsMark(variant.config) == marks[v]) continue;
+      throw BadInput(Concat(settings.string(), ": expected the settings of ", kPlanName,
+                            ", got others; `upswing study` writes both"));
     }
   } catch (const Error& broken) {
     const std::string_view what = broken.what();

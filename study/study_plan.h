@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -25,6 +26,9 @@ enum class Keep {
 };
 /// Parses "all", "policy" or "tables". Throws BadInput that begins with `where`.
 Keep ParseKeep(std::string_view text, const std::string& where);
+
+/// Largest number of variants of a study.
+inline constexpr size_t kMostVariants = 10'000;
 
 /// Many trainings: each variant with each seed, in FOLDER/VARIANT/seedN.
 struct StudyPlan {
@@ -76,6 +80,10 @@ std::vector<SeedRun> RunsOf(const StudyPlan& plan);
 /// Writes plan.json into the plan's folder, and the settings of each variant into
 /// VARIANT/settings.toml. Also writes the model of a variant if it is not built in.
 void WritePlan(const StudyPlan& plan);
+
+/// The plan in plan.json, without its folder and its variants' settings. Adds the SettingsMark of
+/// each variant to `marks`. Throws BadInput.
+StudyPlan PlanIn(const nlohmann::json& plan, std::vector<std::string>& marks);
 
 /// Reads the plan in a folder. Throws BadInput if there is none, if it is from another version, or
 /// if a variant's settings no longer match the plan.
