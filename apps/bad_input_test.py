@@ -2,10 +2,13 @@
 """Tests of bad input: one clear error line, exit code 2 (usage or input) or 1 (failed), and no data
 is lost."""
 
+import gzip
+import math
+import os
 import subprocess
 import unittest
 
-from testing import MODEL, UPSWING, ProgramTest, SmallRunTest, small
+from testing import (MODEL, PATIENCE, UPSWING, ProgramTest, SmallRunTest, limits, small, train_once)
 
 # If one of these is wrongly accepted, the test stays short.
 TRAIN = ["train", "--steps", "8", "--eval-episodes", "1", "--out", "run"]
@@ -311,6 +314,83 @@ class TorqueFileTest(SmallRunTest):
     def test_policy_beside_a_schedule(self):
         self.write("torques.csv", "torque\n1\n")
         self.refuse(["simulate", "run", "--torque", "torques.csv"], "policy", "--torque")
+
+
+class UntrustedFileTest(ProgramTest):
+    """Files from strangers get one line, and take little time and memory."""
+
+    # Commands and the place of the file, marked as FILE.
+    READERS = (["study", "FILE"], [*TRAIN, "--config", "FILE"], [*TRAIN, "--plant", "FILE"],
+               ["simulate", "--torque", "FILE"], ["simulate", "--plant", "FILE"],
+               ["simulate", "--model", "FILE"], ["eval", "FILE"], ["eval", "lqr", "--made-for", "FILE"],
+               ["info", "FILE"], ["machine", "check", "FILE"],
+               ["machine", "check", "log.csv", "--columns", "FILE"],
+               ["machine", "validate", "FILE", "log.csv"], ["run", "lqr", "--link", "FILE"],
+               ["fake", "FILE", "--link", "pty"])
+    OF_TOML = [command for command in READERS
+               if set(command) & {"study", "--config", "--plant", "--columns", "validate", "--link"}]
+
+    def refuse_in_all(self, file, readers, *words):
+        for command in readers:
+            command = [file if word == "FILE" else word for word in command]
+            with self.subTest(command=command):
+                done = self.run_here(*command, preexec_fn=limits, timeout=PATIENCE)
+                self.assert_one_line(done, 2, *words)
+
+    def test_what_is_no_file(self):
+        os.mkfifo(self.folder / "pipe")
+        (self.folder / "folder").mkdir()
+        with open(self.folder / "sparse", "wb") as file:
+            file.truncate(1 << 30)
+        self.refuse_in_all("pipe", self.READERS, "pipe")
+        self.refuse_in_all("/dev/zero", self.READERS, "/dev/zero")
+        self.refuse_in_all("sparse", self.READERS, "sparse: ")
+        self.refuse_in_all("folder", [command for command in self.READERS
+                                      if command[0] not in ("eval", "info", "study")], "folder")
+
+    def test_deep_toml(self):
+        for text in ("[plant]\n" + "a." * 31000 + "a = 1", "[" + "a." * 31000 + "a]",
+                     "a = " + "[" * 31000, "a = " + "{a.b=[\n" * 15000):
+            self.refuse_in_all(self.write("deep.toml", text), self.OF_TOML,
+                               "deep.toml:", "at most 16 levels")
+        self.refuse_in_all(self.write("large.toml", "a" * 8_000_000 + " = 1"), self.OF_TOML,
+                           "large.toml: expected ", "at most 1048576 bytes, got 8000004")
+
+    def test_a_deep_list_of_agents(self):
+        policy = train_once(type(self), steps=8, eval_episodes=1)
+        (self.folder / "page").mkdir()
+        self.write("page/agents.json", '{"agents": ' + "[" * 500_000 + "]" * 500_000 + "}")
+        self.refuse(["export", "--page", "page", policy], "page/agents.json", "at most 8 levels deep",
+                    preexec_fn=limits)
+
+    def test_a_log_that_expands(self):
+        names = b"time,pos_meas1,pos_meas2"
+        for name, text in (("cells", names + b"," * (1 << 26)), ("lines", names + b"\n" * (1 << 26)),
+                           ("rows", names + b"\n0,0,0" * (1 << 23))):
+            (self.folder / "log.csv.gz").write_bytes(gzip.compress(text))
+            (self.folder / "log.csv").write_bytes(text[:1 << 25])
+            with self.subTest(name=name):
+                self.refuse(["machine", "check", "log.csv.gz"], "bytes after decompression, got more",
+                            preexec_fn=limits)
+                done = self.run_here("machine", "check", "log.csv", preexec_fn=limits)
+                self.assertIn(done.returncode, (1, 2))
+                self.assertNotIn("out of memory", done.stderr)
+
+    def test_a_forged_name_of_a_column(self):
+        self.write("log.csv", "time,pos_meas1,pos_meas2\n" +
+                   "".join(f"{k / 500},{math.sin(k / 100)},0\n" for k in range(2000)))
+        self.write("twin.toml", 'name = "a,\\u001b[2J\\nb"\n[plant]\nmass1 = 1\n')
+        self.succeed("machine", "validate", "twin.toml", "log.csv", "--csv", "motion.csv")
+        names = (self.folder / "motion.csv").read_text(encoding="utf-8").splitlines()[0]
+        self.assertEqual(names.split(",", 4)[4], '"a,\\x1b[2J\\nb 1","a,\\x1b[2J\\nb 2"')
+
+    def test_covariance_of_an_alias(self):
+        self.write("twin.toml", "[plant]\nmass1 = 1\n[covariance]\ndamping = [1e-6]\n")
+        for command in (["run", "lqr", "--link", "twin.toml", "--draw"], ["simulate", "--plant", "twin.toml"],
+                        ["fake", "twin.toml", "--link", "pty", "--draw"]):
+            with self.subTest(command=command):
+                self.refuse(command, "twin.toml:4: [covariance]: expected the name of one number",
+                            'got "damping" (did you mean damping1?)')
 
 
 class RunFolderTest(SmallRunTest):

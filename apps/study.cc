@@ -58,7 +58,7 @@ void CheckSameStudy(const StudyPlan& plan, const std::string& title) {
 
 ManyRuns ReadStudy(const StudyArguments& arguments) {
   const fs::path file = arguments.file;
-  const std::string text = ReadTextFile(file);
+  const std::string text = ReadOwnFile(file);
   StudyFile study = ParseStudy(text, file.string());
 
   ManyRuns many;

@@ -9,6 +9,7 @@ import json
 import os
 import pty
 import re
+import resource
 import shutil
 import signal
 import struct
@@ -52,6 +53,13 @@ MODEL = """<mujoco>
   <actuator><motor joint="a" ctrllimited="true" ctrlrange="-5 5"/></actuator>
 </mujoco>
 """
+
+
+def limits():
+    """Limits memory and time, so that expensive work fails."""
+    resource.setrlimit(resource.RLIMIT_CPU, (20, 20))
+    if "UPSWING_SANITIZED" not in os.environ:  # sanitizers reserve the address space
+        resource.setrlimit(resource.RLIMIT_AS, (1 << 30, 1 << 30))
 
 
 def small(**changes):

@@ -28,11 +28,11 @@ TEST(EventFile, CutToRestoresEarlierContents) {
     size = file.size();
     file.Append(2, {{"a", 0.25}, {"b", 1}});
   }
-  const std::string whole = ReadTextFile(path);
+  const std::string whole = ReadOwnFile(path);
   EventFile file(path);
   file.CutTo(size);
   EXPECT_EQ(file.size(), size);
-  EXPECT_EQ(ReadTextFile(path), whole.substr(0, static_cast<size_t>(size)));
+  EXPECT_EQ(ReadOwnFile(path), whole.substr(0, static_cast<size_t>(size)));
 }
 
 }  // namespace

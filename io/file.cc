@@ -11,7 +11,6 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
-#include <optional>
 #include <utility>
 
 #include "core/error.h"
@@ -39,40 +38,6 @@ bool IsOfPath(int error_number) {
                                ENODEV, ENOENT, ENOTDIR, ENXIO,     EPERM, ENOTEMPTY,
                                EROFS,  EBUSY,  EXDEV,   EOPNOTSUPP};
   return std::ranges::find(kOfPath, error_number) != kOfPath.end();
-}
-
-/// Reads everything from an open file. With `most_bytes`, accepts only a regular file of at most
-/// that size. Throws BadInput.
-std::vector<std::byte> ReadAll(const Descriptor& fd, const fs::path& path,
-                               std::optional<size_t> most_bytes) {
-  const auto cannot = [&](std::string_view why) {
-    return BadInput(Concat("cannot read ", path.string(), ": ", why));
-  };
-  struct stat info {};
-  if (fd.get() < 0 || fstat(fd.get(), &info) != 0) throw cannot(std::strerror(errno));
-  if (S_ISDIR(info.st_mode)) throw cannot("expected a file, got a folder");
-  if (most_bytes && !S_ISREG(info.st_mode)) {
-    throw cannot("expected a file, got a pipe or a device");
-  }
-  const auto expect_fits = [&](uintmax_t size) {
-    if (!most_bytes || size <= *most_bytes) return;
-    throw cannot(Concat("expected at most ", *most_bytes, " bytes, got ", size));
-  };
-  expect_fits(static_cast<uintmax_t>(info.st_size));
-  // Read until the end, because a pipe has no size.
-  std::vector<std::byte> bytes(static_cast<size_t>(info.st_size));
-  size_t filled = 0;
-  while (true) {
-    if (filled == bytes.size()) bytes.resize(bytes.size() + 65536);
-    const ssize_t got = read(fd.get(), bytes.data() + filled, bytes.size() - filled);
-    if (got < 0 && errno == EINTR) continue;
-    if (got < 0) throw cannot(std::strerror(errno));
-    if (got == 0) break;
-    filled += static_cast<size_t>(got);
-    expect_fits(filled);
-  }
-  bytes.resize(filled);
-  return bytes;
 }
 
 std::string TextOf(std::span<const std::byte> bytes) {
@@ -110,20 +75,39 @@ bool IsOwnFile(const fs::path& path) {
   return fs::is_regular_file(fs::symlink_status(path, error));
 }
 
-std::vector<std::byte> ReadFile(const fs::path& path) {
-  return ReadAll(Descriptor(open(path.c_str(), O_RDONLY | O_CLOEXEC)), path, std::nullopt);
-}
-
-std::string ReadTextFile(const fs::path& path) { return TextOf(ReadFile(path)); }
-
 std::string ReadOwnFile(const fs::path& path, size_t most_bytes) {
   return TextOf(ReadOwnBytes(path, most_bytes));
 }
 
 std::vector<std::byte> ReadOwnBytes(const fs::path& path, size_t most_bytes) {
   // Use O_NONBLOCK, because opening a pipe would wait for a writer.
-  return ReadAll(Descriptor(open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)), path,
-                 most_bytes);
+  const Descriptor fd(open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
+  const auto cannot = [&](std::string_view why) {
+    return BadInput(Concat("cannot read ", path.string(), ": ", why));
+  };
+  struct stat info {};
+  if (fd.get() < 0 || fstat(fd.get(), &info) != 0) throw cannot(std::strerror(errno));
+  if (S_ISDIR(info.st_mode)) throw cannot("expected a file, got a folder");
+  if (!S_ISREG(info.st_mode)) throw cannot("expected a file, got a pipe or a device");
+  const auto expect_fits = [&](uintmax_t size) {
+    if (size <= most_bytes) return;
+    throw cannot(Concat("expected at most ", most_bytes, " bytes, got ", size));
+  };
+  expect_fits(static_cast<uintmax_t>(info.st_size));
+  // Read until the end, because a system file reports no size.
+  std::vector<std::byte> bytes(static_cast<size_t>(info.st_size));
+  size_t filled = 0;
+  while (true) {
+    if (filled == bytes.size()) bytes.resize(bytes.size() + 65536);
+    const ssize_t got = read(fd.get(), bytes.data() + filled, bytes.size() - filled);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) throw cannot(std::strerror(errno));
+    if (got == 0) break;
+    filled += static_cast<size_t>(got);
+    expect_fits(filled);
+  }
+  bytes.resize(filled);
+  return bytes;
 }
 
 std::string ReadEnd(const fs::path& path, std::streamoff most_bytes) {

@@ -21,12 +21,6 @@ bool Exists(const std::filesystem::path& path);
 bool IsFile(const std::filesystem::path& path);
 bool IsOwnFile(const std::filesystem::path& path);
 
-/// Reads a whole file. Throws BadInput if that fails.
-std::vector<std::byte> ReadFile(const std::filesystem::path& path);
-
-/// Reads a whole file as text. Throws BadInput if that fails.
-std::string ReadTextFile(const std::filesystem::path& path);
-
 /// Error for a system call that failed with `error_number` (errno). `what` describes the failure,
 /// such as "cannot write". Returns BadInput if another path could work, such as for a missing
 /// folder or permission. Returns Failure if the work itself failed, such as on a full disk.
@@ -35,11 +29,11 @@ Error PathError(std::string_view what, const std::filesystem::path& path, int er
 /// Size limit for untrusted text files. No run exceeds it: an evaluation takes about 150 bytes.
 inline constexpr size_t kMostTextBytes = 1 << 26;
 
-/// Reads a whole untrusted file, such as a file of a run folder or a model. It must be a regular
-/// file of at most `most_bytes`. Anything else, such as a pipe that never ends, throws BadInput
-/// without waiting.
+/// Reads a whole file. Every file may come from a stranger, so it must be a regular file of at most
+/// `most_bytes`. Anything else, such as a pipe that never ends, throws BadInput without waiting.
 std::string ReadOwnFile(const std::filesystem::path& path, size_t most_bytes = kMostTextBytes);
-std::vector<std::byte> ReadOwnBytes(const std::filesystem::path& path, size_t most_bytes);
+std::vector<std::byte> ReadOwnBytes(const std::filesystem::path& path,
+                                    size_t most_bytes = kMostTextBytes);
 
 /// Reads the end of an untrusted file, at most `most_bytes`; empty if it is not a regular file.
 std::string ReadEnd(const std::filesystem::path& path, std::streamoff most_bytes);

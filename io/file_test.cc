@@ -25,9 +25,9 @@ TEST_F(FileTest, WrittenTextIsReadBackAndReplaced) {
   const fs::path path = folder_ / "a";
   WriteFileAtomically(path, "one");
   WriteFileAtomically(path, "three");
-  EXPECT_EQ(ReadTextFile(path), "three");
+  EXPECT_EQ(ReadOwnFile(path), "three");
   WriteFileAtomically(path, "");
-  EXPECT_EQ(ReadTextFile(path), "");
+  EXPECT_EQ(ReadOwnFile(path), "");
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1);
 }
 
@@ -78,7 +78,7 @@ TEST_F(FileTest, AWriteThatDoesNotFitLeavesTheOldFileAndNothingElse) {
   setrlimit(RLIMIT_FSIZE, &small);
   EXPECT_THROW(WriteFileAtomically(path, std::string(5000, 'x')), Error);
   setrlimit(RLIMIT_FSIZE, &before);
-  EXPECT_EQ(ReadTextFile(path), "old");
+  EXPECT_EQ(ReadOwnFile(path), "old");
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1);
 }
 
@@ -89,8 +89,8 @@ TEST_F(FileTest, AFileOfAFolderIsWrittenThroughNoLink) {
   WriteFileAtomically(folder_ / "link", "new");
   WriteFileAtomically(folder_ / "twin", "new");
   EXPECT_FALSE(fs::is_symlink(folder_ / "link"));
-  EXPECT_EQ(ReadTextFile(folder_ / "link"), "new");
-  EXPECT_EQ(ReadTextFile(folder_ / "target"), "old");
+  EXPECT_EQ(ReadOwnFile(folder_ / "link"), "new");
+  EXPECT_EQ(ReadOwnFile(folder_ / "target"), "old");
 }
 
 TEST_F(FileTest, AnOutputFollowsTheUsersOwnLinkAndADeviceIsWrittenInPlace) {
@@ -98,7 +98,7 @@ TEST_F(FileTest, AnOutputFollowsTheUsersOwnLinkAndADeviceIsWrittenInPlace) {
   fs::create_symlink("target", folder_ / "link");
   WriteNamedFile(folder_ / "link", "new");
   EXPECT_TRUE(fs::is_symlink(folder_ / "link"));
-  EXPECT_EQ(ReadTextFile(folder_ / "target"), "new");
+  EXPECT_EQ(ReadOwnFile(folder_ / "target"), "new");
   WriteNamedFile("/dev/null", "gone");
   EXPECT_TRUE(fs::is_character_file("/dev/null"));
 }
@@ -120,7 +120,7 @@ TEST_F(FileTest, AnImpossibleOutputIsBadInputAndAFullDiskIsNot) {
     EXPECT_EQ(exit_code(folder_ / name), 2) << name;
   }
   EXPECT_EQ(exit_code("/dev/full"), 1);
-  EXPECT_EQ(ReadTextFile(folder_ / "file"), "mine");
+  EXPECT_EQ(ReadOwnFile(folder_ / "file"), "mine");
 }
 
 TEST_F(FileTest, APipeInAFolderIsNotWaitedFor) {
@@ -148,7 +148,7 @@ TEST_F(FileTest, ANewOrEmptyFolderIsTakenAndNothingElse) {
                                 ": expected a new or empty folder, got one "
                                 "that is not empty (go on with it)");
   }
-  EXPECT_EQ(ReadTextFile(folder_ / "file"), "kept");
+  EXPECT_EQ(ReadOwnFile(folder_ / "file"), "kept");
   EXPECT_NO_THROW(CheckFree(folder_ / "file/below"));
   EXPECT_THROW(MakeNewFolder(folder_ / "file/below"), Error);
 }
@@ -156,7 +156,7 @@ TEST_F(FileTest, ANewOrEmptyFolderIsTakenAndNothingElse) {
 TEST_F(FileTest, MissingFilesAndFoldersAreBadInput) {
   for (const fs::path& path : {folder_ / "missing", folder_}) {
     try {
-      ReadFile(path);
+      ReadOwnBytes(path);
       FAIL();
     } catch (const Error& error) {
       EXPECT_EQ(error.exit_code(), 2);
@@ -188,7 +188,7 @@ TEST_F(FileTest, AppendFileIsCutBackToAGivenSize) {
     file.CutTo(6);
     file.Append("again\n");
   }
-  EXPECT_EQ(ReadTextFile(path), "first\nagain\n");
+  EXPECT_EQ(ReadOwnFile(path), "first\nagain\n");
 }
 
 TEST_F(FileTest, AppendFileIsOpenedThroughNoLink) {
@@ -207,7 +207,7 @@ TEST_F(FileTest, AppendFileIsOpenedThroughNoLink) {
       EXPECT_NE(std::string(error.what()).find(expected), std::string::npos) << error.what();
     }
   }
-  EXPECT_EQ(ReadTextFile(folder_ / "target"), "mine");
+  EXPECT_EQ(ReadOwnFile(folder_ / "target"), "mine");
   EXPECT_FALSE(fs::exists(folder_ / "nowhere"));
 }
 

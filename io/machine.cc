@@ -81,7 +81,7 @@ std::string ThisHost() {
   static const std::string kHost = [] {
     std::string boot;
     try {
-      boot = ReadTextFile("/proc/sys/kernel/random/boot_id");
+      boot = ReadOwnFile("/proc/sys/kernel/random/boot_id");
     } catch (const Error&) {  // NOLINT(bugprone-empty-catch): then the name has to do
     }
     return Concat(HostName(), "/", Trim(boot).substr(0, 8));

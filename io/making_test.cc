@@ -30,7 +30,7 @@ TEST(Making, AFolderAppearsUnderItsNameWhenItIsPublished) {
     EXPECT_TRUE(IsMakingName(folder.path().filename().string()));
     folder.Publish();
   }
-  EXPECT_EQ(ReadTextFile(temp / "run/a"), "text");
+  EXPECT_EQ(ReadOwnFile(temp / "run/a"), "text");
   EXPECT_EQ(CountIn(temp.path()), 1);
 }
 
@@ -98,7 +98,7 @@ TEST(Making, ALinkInItsNameIsReplacedAndOneLeftBehindIsNotFollowed) {
   Making file(temp / "a", Kind::kFile);
   file.Publish();
   EXPECT_FALSE(fs::is_symlink(temp / "a"));
-  EXPECT_EQ(ReadTextFile(temp / "precious/file"), "mine");
+  EXPECT_EQ(ReadOwnFile(temp / "precious/file"), "mine");
 }
 
 TEST(Making, ModesFollowTheUmask) {

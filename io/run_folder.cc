@@ -48,10 +48,11 @@ int64_t KnownSize(const Tensors& checkpoint, std::string_view table, const fs::p
 /// Column names in a table's first line; none if the file is empty.
 std::vector<std::string> ColumnsOf(const AppendFile& file) {
   if (file.size() == 0) return {};
-  std::string line;
-  std::getline(std::ifstream(file.path()), line);
+  std::string begin(std::min<int64_t>(file.size(), 1 << 16), '\0');  // no line of names is longer
+  std::ifstream(file.path()).read(begin.data(), std::ssize(begin));
+  std::string_view rest = begin;
   std::vector<std::string> columns;
-  for (const std::string_view name : Split(line, ',')) columns.emplace_back(name);
+  for (const std::string_view name : Split(TakeLine(rest), ',')) columns.emplace_back(name);
   return columns;
 }
 

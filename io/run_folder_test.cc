@@ -25,9 +25,9 @@ TEST(RunFolder, ATableKeepsItsColumnsWhateverVersionGoesOnWithIt) {
   RunFolder run = reopened();
   run.LogEvaluation({{"step", 20}, {"new", 7}, {"success", 1}});
   run.LogMetrics({{"step", 20}, {"loss", 0.25}});
-  EXPECT_EQ(ReadTextFile(temp / "run" / RunFolder::kEvaluations),
+  EXPECT_EQ(ReadOwnFile(temp / "run" / RunFolder::kEvaluations),
             "step,success,old\n10,0.5,3\n20,1,nan\n");
-  EXPECT_EQ(ReadTextFile(temp / "run" / RunFolder::kMetrics), "step,loss\n20,0.25\n");
+  EXPECT_EQ(ReadOwnFile(temp / "run" / RunFolder::kMetrics), "step,loss\n20,0.25\n");
 }
 
 }  // namespace

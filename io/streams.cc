@@ -20,11 +20,14 @@ std::string InputName(const std::string& path) {
 }
 
 std::string ReadInput(const std::string& path) {
-  if (!IsStandardStream(path)) return ReadTextFile(path);
+  if (!IsStandardStream(path)) return ReadOwnFile(path);
   std::string text;
   std::array<char, 65536> buffer;
   while (const size_t got = std::fread(buffer.data(), 1, buffer.size(), stdin)) {
     text.append(buffer.data(), got);
+    if (text.size() <= kMostTextBytes) continue;
+    throw BadInput(Concat("cannot read standard input: expected at most ", kMostTextBytes,
+                          " bytes, got more"));
   }
   if (std::ferror(stdin) != 0) {
     throw BadInput(Concat("cannot read standard input: ", std::strerror(errno)));

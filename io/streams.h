@@ -12,7 +12,8 @@ inline bool IsStandardStream(std::string_view path) { return path == "-"; }
 /// Name of an input in messages: the path, or `standard input`.
 std::string InputName(const std::string& path);
 
-/// Reads the text of the file, or all of standard input. Throws BadInput if that fails.
+/// Reads the text of the file as ReadOwnFile does, or all of standard input, which may be a pipe.
+/// Throws BadInput if that fails or the text is larger than kMostTextBytes.
 std::string ReadInput(const std::string& path);
 
 /// Throws BadInput that names `flag` if the path is not writable. Call it before long work.

@@ -31,6 +31,8 @@ void SaveTensors(const Tensors& tensors, const std::filesystem::path& path) {
 }
 
 Tensors LoadTensors(const std::filesystem::path& path, size_t most_bytes) {
+  // The header tells whether the file is worth its memory. A sparse file can claim any size.
+  if (IsFile(path)) (void)LoadPartOfTensors(path, "a prefix of no tensor");
   const auto memory = static_cast<size_t>(AvailableMemory());
   return ReadSafetensors(ReadOwnBytes(path, std::min(most_bytes, memory)), path.string());
 }
@@ -56,8 +58,14 @@ Tensors LoadPartOfTensors(const std::filesystem::path& path, std::string_view pr
     const uint64_t data_begin = first.size() + length;
     SafetensorsHeader header = ReadSafetensorsHeader(text, file_size - data_begin);
     part.metadata = std::move(header.metadata);
+    uint64_t total = 0;
     for (auto& [name, entry] : header.entries) {
       if (!name.starts_with(prefix)) continue;
+      total += entry.size;
+      if (total > kMostTextBytes) {
+        throw BadInput(
+            Concat("tensors ", prefix, "…: expected at most ", kMostTextBytes, " bytes, got more"));
+      }
       std::vector<std::byte> bytes(entry.size);
       read(data_begin + entry.begin, bytes);
       entry.tensor.bytes = part.Keep(std::move(bytes));

@@ -22,8 +22,8 @@ Tensors LoadTensors(const std::filesystem::path& path,
                     size_t most_bytes = std::numeric_limits<size_t>::max());
 
 /// Reads only the metadata and the tensors whose names begin with `prefix`, to display a small part
-/// of a large file. Does not verify the checksum, which covers the whole file; use LoadTensors to
-/// work with the file. Throws BadInput.
+/// of a large file. They may have kMostTextBytes. Does not verify the checksum, which covers the
+/// whole file; use LoadTensors to work with the file. Throws BadInput.
 Tensors LoadPartOfTensors(const std::filesystem::path& path, std::string_view prefix);
 
 }  // namespace upswing

@@ -129,7 +129,7 @@ TEST_F(TensorFileTest, WrongNameTypeShapeAndSizeAreNamed) {
 
 TEST_F(TensorFileTest, EveryTruncationIsFound) {
   SaveSample();
-  const std::vector<std::byte> whole = ReadFile(path_);
+  const std::vector<std::byte> whole = ReadOwnBytes(path_);
   for (size_t size = 0; size < whole.size(); ++size) {
     EXPECT_NE(LoadError(std::span(whole).first(size)), "") << size;
   }
@@ -137,10 +137,10 @@ TEST_F(TensorFileTest, EveryTruncationIsFound) {
 
 TEST_F(TensorFileTest, EveryFlippedBitIsFound) {
   SaveSample();
-  const std::vector<std::byte> whole = ReadFile(path_);
+  const std::vector<std::byte> whole = ReadOwnBytes(path_);
   // A flipped bit in the key "checksum" stays unnoticed. The file then has no checksum, and without
   // upswing_version it needs none.
-  const size_t key = ReadTextFile(path_).find("checksum");
+  const size_t key = ReadOwnFile(path_).find("checksum");
   for (size_t at = 0; at < whole.size(); ++at) {
     for (int bit = 0; bit < 8; bit += 3) {
       std::vector<std::byte> broken = whole;
@@ -172,7 +172,7 @@ TEST_F(TensorFileTest, APartHasTheTensorsOfThePrefixWithTheirBytes) {
 
 TEST_F(TensorFileTest, APartOfABrokenFileIsRefusedAsTheWholeIs) {
   SaveSample();
-  const std::vector<std::byte> whole = ReadFile(path_);
+  const std::vector<std::byte> whole = ReadOwnBytes(path_);
   const auto part_error = [](const fs::path& path) -> std::string {
     try {
       LoadPartOfTensors(path, "");
@@ -204,6 +204,16 @@ TEST_F(TensorFileTest, APartOfABrokenFileIsRefusedAsTheWholeIs) {
     EXPECT_EQ(part_error(path), error);
     EXPECT_THROW(LoadTensors(path), Error);
   }
+}
+
+TEST_F(TensorFileTest, APartIsSmall) {
+  constexpr uintmax_t kTooLarge = kMostTextBytes + 1;
+  HeaderError(Concat(R"({"a":{"dtype":"U8","shape":[)", kTooLarge, R"(],"data_offsets":[0,)",
+                     kTooLarge, "]}}"),
+              0);
+  fs::resize_file(path_, fs::file_size(path_) + kTooLarge);  // sparse
+  EXPECT_THROW(LoadPartOfTensors(path_, "a"), Error);
+  EXPECT_NO_THROW(LoadPartOfTensors(path_, "b"));
 }
 
 TEST_F(TensorFileTest, HostileHeadersAreRefused) {

@@ -160,7 +160,7 @@ std::string TwinLog(const std::string& path, uint64_t seed) {
   bench.Make();
   bench.loop->Run();
   bench.log->Finish();
-  return ReadTextFile(path);
+  return ReadOwnFile(path);
 }
 
 TEST(ControlLoop, ATwinGivesEqualBitsForEqualSeeds) {

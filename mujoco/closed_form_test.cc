@@ -132,7 +132,7 @@ TEST(ClosedForm, StepsLikeMuJoCoOverTheWholeRangeOfPlants) {
 
 TEST(ClosedForm, FollowsMuJoCosReferenceTrajectoryFor10Seconds) {
   const auto root = std::filesystem::path(__FILE__).parent_path().parent_path();
-  const std::string csv = ReadTextFile(root / "apps/testdata/mujoco_trajectory.csv");
+  const std::string csv = ReadOwnFile(root / "apps/testdata/mujoco_trajectory.csv");
   std::vector<std::array<double, 6>> rows;  // t, q1, q2, w1, w2, torque
   for (const std::string_view line : Split(Trim(csv), '\n')) {
     const auto cells = Split(line, ',');

@@ -41,7 +41,7 @@ class FigureTest : public ::testing::Test {
  protected:
   std::string Svg(const Figure& figure) {
     Draw(figure, folder_ / "a.svg");
-    return ReadTextFile(folder_ / "a.svg");
+    return ReadOwnFile(folder_ / "a.svg");
   }
   TempFolder folder_;
 };
@@ -112,7 +112,7 @@ TEST_F(FigureTest, PngHasSignatureAndSize) {
   figure.width = 640;
   figure.height = 480;
   Draw(figure, folder_ / "a.png");
-  const std::string png = ReadTextFile(folder_ / "a.png");
+  const std::string png = ReadOwnFile(folder_ / "a.png");
   // PNG specification, 5.2 and 11.2.2: signature, then the header with width and height.
   ASSERT_GT(png.size(), 24U);
   EXPECT_EQ(png.substr(0, 8), "\x89PNG\r\n\x1a\n");
@@ -231,7 +231,7 @@ std::string FailureWithPath(const std::string& path, const fs::path& file) {
     message = error.what();
   }
   setenv("PATH", before.c_str(), 1);
-  EXPECT_EQ(ReadTextFile(file), "old");
+  EXPECT_EQ(ReadOwnFile(file), "old");
   return message;
 }
 

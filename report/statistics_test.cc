@@ -33,7 +33,7 @@ void ExpectSame(const Estimate& got, const nlohmann::json& expected, const char*
 
 TEST(Statistics, AgreeWithRliable) {
   const auto folder = std::filesystem::path(__FILE__).parent_path();
-  const auto file = nlohmann::json::parse(ReadTextFile(folder / "testdata/rliable.json"));
+  const auto file = nlohmann::json::parse(ReadOwnFile(folder / "testdata/rliable.json"));
   ASSERT_EQ(file["cases"].size(), 4U);
   for (const auto& c : file["cases"]) {
     const auto x = c["x"].get<Strata>();

@@ -57,8 +57,8 @@ class TrainingRunTest : public ::testing::Test {
 
   /// Compares everything that does not depend on the clock.
   static void ExpectSame(const fs::path& a, const fs::path& b) {
-    EXPECT_EQ(ReadFile(a / RunFolder::kPolicy), ReadFile(b / RunFolder::kPolicy));
-    EXPECT_EQ(ReadTextFile(a / RunFolder::kEpisodes), ReadTextFile(b / RunFolder::kEpisodes));
+    EXPECT_EQ(ReadOwnBytes(a / RunFolder::kPolicy), ReadOwnBytes(b / RunFolder::kPolicy));
+    EXPECT_EQ(ReadOwnFile(a / RunFolder::kEpisodes), ReadOwnFile(b / RunFolder::kEpisodes));
   }
 
   TempFolder temp_;
@@ -99,7 +99,7 @@ TEST_F(TrainingRunTest, AFailureNamesItsStepAndKeepsTheLastCheckpoint) {
 TEST_F(TrainingRunTest, LogEscapesLineBreaks) {
   const auto run = TrainingRun::Make(temp_ / "run", SmallConfig());
   EXPECT_THROW(FailAt(0, "x\n2026-01-01 finished\x1b[2J", *run), Error);
-  const std::string log = ReadTextFile(temp_ / "run" / RunFolder::kLog);
+  const std::string log = ReadOwnFile(temp_ / "run" / RunFolder::kLog);
   EXPECT_NE(log.find(R"(x\n2026-01-01 finished\x1b[2J)"), std::string::npos) << log;
 }
 
