@@ -54,11 +54,11 @@ void PrintEntry(const BoardEntry& e) {
   fmt::print(
       "  {:<22} {:>6} {:>7} {:>6} {:>7} {:>7} {:>6}  {:>5} {:>5} {:>5} {:>5} {:>5} {:>5} "
       "{:>6}\n",
-      Shortened(Printable(e.name), 22), Cell(e.seconds, 2), Cell(e.energy, 2), Cell(e.torque_cost, 2),
-      Cell(e.smoothness, 4), Cell(e.velocity_cost, 1), Cell(e.performance, 3),
-      Cell(e.rows[0], 1, 100), Cell(e.rows[1], 1, 100), Cell(e.rows[2], 1, 100),
-      Cell(e.rows[3], 1, 100), Cell(e.rows[4], 1, 100), Cell(e.rows[5], 1, 100),
-      Cell(e.robustness, 3));
+      Shortened(Printable(e.name), 22), Cell(e.seconds, 2), Cell(e.energy, 2),
+      Cell(e.torque_cost, 2), Cell(e.smoothness, 4), Cell(e.velocity_cost, 1),
+      Cell(e.performance, 3), Cell(e.rows[0], 1, 100), Cell(e.rows[1], 1, 100),
+      Cell(e.rows[2], 1, 100), Cell(e.rows[3], 1, 100), Cell(e.rows[4], 1, 100),
+      Cell(e.rows[5], 1, 100), Cell(e.robustness, 3));
 }
 
 void PrintReport(const BoardReport& report) {
