@@ -305,6 +305,10 @@ class TorqueFileTest(SmallRunTest):
         self.refuse_torques("", "expected", "torque")
         self.refuse_torques("torque\n", "expected", "got none")
 
+    def test_too_many_rows(self):
+        self.refuse_torques("torque\n" + "0\n" * 1_000_001,
+                            "expected at most 1000000 rows of torques, got 1000001")
+
     def test_shorter_than_the_seconds(self):
         self.write("torques.csv", "torque\n" + "1\n" * 50)
         self.refuse(["simulate", "--torque", "torques.csv", "--seconds", "1.02"], "--seconds",

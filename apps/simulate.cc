@@ -45,6 +45,11 @@ std::vector<double> ReadTorqueFile(const std::string& path, double step) {
   const std::vector<CsvColumn> columns = ReadCsv(text, names, where);
   if (columns.front().values.empty())
     throw BadInput(Concat(where, ": expected at least one row of torques, got none"));
+  constexpr size_t kMostRows = 1'000'000;  // over five hours; a step takes more memory than a row
+  if (columns.front().values.size() > kMostRows) {
+    throw BadInput(Concat(where, ": expected at most ", kMostRows, " rows of torques, got ",
+                          columns.front().values.size()));
+  }
   for (const CsvColumn& time : std::span(columns).subspan(1)) {
     for (size_t k = 0; k < time.values.size(); ++k) {
       const double expected = time.values.front() + static_cast<double>(k) * step;
