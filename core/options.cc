@@ -111,7 +111,8 @@ std::string Option::text() const {
   return std::visit(Overloaded{
                         [](const bool* value) -> std::string { return *value ? "true" : "false"; },
                         [](const int64_t* value) { return std::to_string(*value); },
-                        [](const double* value) { return FormatNumber(*value); },
+                        // The sum turns -0 into 0, which is what TOML reads in "-0".
+                        [](const double* value) { return FormatNumber(*value + 0.0); },
                         [](const std::string* value) { return Quote(*value); },
                         [](const std::vector<int64_t>* value) { return ListText(*value); },
                     },

@@ -74,6 +74,11 @@ TEST_F(OptionsTest, DifferencesAreInTheOrderOfTheSettingsWithBothValues) {
   EXPECT_FALSE(found[2].before);
 }
 
+TEST_F(OptionsTest, MinusZeroIsWrittenAsItIsRead) {
+  options_.Set("the_rate", "-0", "");
+  EXPECT_EQ(options_.Get("the_rate")->text(), "0");
+}
+
 TEST_F(OptionsTest, SetsEveryType) {
   options_.Set("fast", "false", "");
   options_.Set("count", "7", "");
