@@ -50,7 +50,7 @@ void AddRow(const toml::node& node, size_t n, const std::string& place, Covarian
     if (!value || !std::isfinite(*value)) {
       throw BadInput(Concat(place, ": expected finite numbers, got another value"));
     }
-    covariance.values.push_back(*value);
+    covariance.values.push_back(*value + 0.0);  // turns -0 into 0
   }
 }
 
