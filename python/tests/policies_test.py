@@ -155,6 +155,13 @@ class BadInput(BadInputTest):
                 self.refuse(str(file), lambda: upswing.load_policy(file))
             self.refuse(folder, lambda: upswing.load_policy(folder))
 
+    def test_a_long_message(self):
+        name = '{"another --%s": 1}' % ("a" * 1_000_000)
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder, "x.safetensors")
+            file.write_bytes(len(name).to_bytes(8, "little") + name.encode())
+            self.refuse("another aaa", lambda: upswing.load_policy(file))
+
     def test_a_policy_of_another_task(self):
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder, "acrobot.safetensors")
