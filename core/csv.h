@@ -22,8 +22,8 @@ struct CsvColumn {
 /// the cells of other columns.
 ///
 /// Throws BadInput if a column is missing or named twice, a quote is not closed in its line, or a
-/// cell is not a finite number. Also throws it if a row and the line of names differ in their number
-/// of cells, or have thousands. Messages begin with `where` (a path) and the line.
+/// cell is not a finite number. Also throws it if a row and the line of names differ in their
+/// number of cells, or have thousands. Messages begin with `where` (a path) and the line.
 std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::string>& names,
                                const std::string& where);
 
