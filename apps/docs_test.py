@@ -251,7 +251,7 @@ class Documents(ProgramTest):
     def test_one_version(self):
         version = re.search(r"project\(upswing VERSION (\S+)", text_of("CMakeLists.txt"))[1]
         self.assertIn(f"\nversion: {version}\n", text_of("CITATION.cff"))
-        self.assertEqual(re.search(r"^## \[(\S+)\]", text_of("CHANGELOG.md"), re.MULTILINE)[1],
+        self.assertEqual(re.search(r"^## \[(\d\S*)\]", text_of("CHANGELOG.md"), re.MULTILINE)[1],
                          version)
 
     def test_security_names_every_fuzzing_target_and_tests_that_exist(self):
