@@ -102,9 +102,10 @@ class AdverseLink : public MachineLink {
 
   double AnyNumber() {
     constexpr double kInf = std::numeric_limits<double>::infinity();
+    constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
     constexpr double kPi = std::numbers::pi;
     constexpr std::array kNumbers{2 * kPi, -2 * kPi, 14.0, kPi,   -1.0, 0.3,   0.02,
-                                  -0.01,   1e30,     kInf, -kInf, 0.0,  1e-30, std::nan("")};
+                                  -0.01,   1e30,     kInf, -kInf, 0.0,  1e-30, kNan};
     return kNumbers[choose_(kNumbers.size())];
   }
 
