@@ -1,5 +1,6 @@
 #include "core/json.h"
 
+#include <algorithm>
 #include <limits>
 
 #include "core/error.h"
@@ -15,6 +16,31 @@ Error Unexpected(std::string_view name, const std::string& expected, const json&
   return BadInput(Concat("\"", name, "\": expected ", expected, ", got ", text));
 }
 
+/// Throws BadInput for a text that is nested deeper than `max_depth` or has too many parts. The
+/// parser and the destructor of its result take stack for each level and memory for each part.
+void CheckSize(std::string_view text, int max_depth) {
+  constexpr int kMostParts = 1'000'000;  // a part of 3 bytes can take 80 bytes of memory
+  int depth = 0, parts = 0;
+  for (size_t at = 0; at < text.size(); ++at) {
+    const char c = text[at];
+    if (c == ']' || c == '}') --depth;
+    if (std::string_view(" \t\r\n]},:").find(c) != std::string_view::npos) continue;
+    if (depth > max_depth) {
+      throw BadInput(Concat("expected JSON at most ", max_depth, " levels deep"));
+    }
+    if (++parts > kMostParts) {
+      throw BadInput(Concat("expected JSON of at most ", kMostParts, " names, values and lists"));
+    }
+    if (c == '[' || c == '{') {
+      ++depth;
+    } else if (c == '"') {
+      for (++at; at < text.size() && text[at] != '"'; ++at) at += text[at] == '\\' ? 1 : 0;
+    } else {
+      at = std::min(text.find_first_of(" \t\r\n]},:[{\"", at), text.size()) - 1;
+    }
+  }
+}
+
 }  // namespace
 
 std::optional<int64_t> JsonInteger(const json& value) {
@@ -27,21 +53,9 @@ std::optional<int64_t> JsonInteger(const json& value) {
 }
 
 json ParseJsonObject(std::string_view text, int max_depth) {
-  constexpr int kMostParts = 1'000'000;  // a part of 3 bytes can take 80 bytes of memory
-  bool too_deep = false;
-  int parts = 0;
-  const auto keep = [&](int depth, json::parse_event_t, const json&) {
-    too_deep |= depth > max_depth;
-    if (parts <= kMostParts) ++parts;
-    // The parser allocates nothing for a value that is not kept.
-    return !too_deep && parts <= kMostParts;
-  };
+  CheckSize(text, max_depth);
   // The parser's own message could quote bytes that are not text.
-  json object = json::parse(text, keep, false);
-  if (too_deep) throw BadInput(Concat("expected JSON at most ", max_depth, " levels deep"));
-  if (parts > kMostParts) {
-    throw BadInput(Concat("expected JSON of at most ", kMostParts, " names, values and brackets"));
-  }
+  json object = json::parse(text, nullptr, false);
   if (!object.is_object()) throw BadInput("expected a JSON object");
   return object;
 }
