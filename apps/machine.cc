@@ -39,12 +39,6 @@ struct MachineArguments {
   bool as_json = false;
 };
 
-/// What a finding is about, such as `velocity 2`.
-std::string AboutText(const Finding& finding) {
-  const std::string aspect = NameOf(finding.aspect);
-  return finding.joint > 0 ? Concat(aspect, " ", finding.joint) : aspect;
-}
-
 void PrintCheck(const LogCheck& check) {
   fmt::print("{}: {} rows, {:.2f} s{}\n", Printable(check.name), check.rows, check.seconds,
              check.pieces > 1 ? fmt::format(" in {} pieces", check.pieces) : "");
@@ -70,34 +64,21 @@ int RunCheck(const MachineArguments& a) {
   return std::ranges::any_of(checks, &LogCheck::faulty) ? 1 : 0;
 }
 
-/// Reads logs in the order of their names, and warns of those with faults.
-std::vector<MachineLog> ReadLogs(std::span<const std::string> given, const std::string& columns) {
-  std::vector<std::string> files(given.begin(), given.end());
-  std::ranges::sort(files);
-  const auto same = std::ranges::adjacent_find(files);
-  if (same != files.end()) {
-    throw BadInput(Concat("expected different logs, got \"", Printable(*same), "\" twice"));
-  }
-  std::vector<MachineLog> logs;
-  for (const std::string& file : files) {
-    std::vector<MachineLog> pieces = ReadLog(file, columns);
-    const LogCheck check = CheckLog(file, pieces);
-    const auto fault = std::ranges::find(check.findings, Severity::kFault, &Finding::severity);
-    if (fault != check.findings.end()) {
-      SayError(Concat("warning: ", Printable(file), ": ", AboutText(*fault), ": ", fault->text,
-                      "; machine check lists all faults"));
-    }
-    std::ranges::move(pieces, std::back_inserter(logs));
-  }
-  return logs;
-}
-
 std::string ErrorText(const Estimate& e) {
   if (!e.interval) return fmt::format("{:.3f}", e.value);
   return fmt::format("{:.3f} ({:.3f}–{:.3f})", e.value, e.interval->low, e.interval->high);
 }
 
-void PrintErrors(std::span<const ErrorRow> rows, std::span<const Predictor> predictors) {
+/// The torques that drive predictions in place of reported ones.
+const char* CommandedIn(std::span<const MachineLog> logs) {
+  const bool has_commands = std::ranges::any_of(logs, [](const MachineLog& log) {
+    return HasTorque(log.commanded, 0) || HasTorque(log.commanded, 1);
+  });
+  return has_commands ? "commanded" : "no";
+}
+
+void PrintErrors(std::span<const ErrorRow> rows, std::span<const Predictor> predictors,
+                 const char* commanded) {
   size_t width = 8;
   for (const ErrorRow& row : rows) width = std::max(width, Columns(Printable(row.session)));
   const auto pad = [](const std::string& text, size_t columns) {
@@ -109,7 +90,7 @@ void PrintErrors(std::span<const ErrorRow> rows, std::span<const Predictor> pred
   for (const bool reported : {false, true}) {
     if (std::ranges::none_of(rows, [&](const auto& r) { return r.reported == reported; })) continue;
     fmt::print("\nmedian error of the angles, rad (95% over runs), driven by {} torques\n",
-               reported ? "reported" : "commanded");
+               reported ? "reported" : commanded);
     fmt::print("  {}    s runs windows  {}\n", pad("", width), heads);
     for (const ErrorRow& row : rows) {
       if (row.reported != reported) continue;
@@ -132,7 +113,7 @@ void PrintErrors(std::span<const ErrorRow> rows, std::span<const Predictor> pred
     fmt::print(
         "  {}, {} s, {} torques: {:.0f}{}\n",
         row.session.empty() ? "all runs" : Printable(row.session), FormatNumber(row.seconds),
-        row.reported ? "reported" : "commanded", 100 * value,
+        row.reported ? "reported" : commanded, 100 * value,
         interval ? fmt::format(" ({:.0f}–{:.0f})", 100 * interval->low, 100 * interval->high) : "");
   }
 }
@@ -161,7 +142,7 @@ std::vector<Twin> ReadOthers(const MachineArguments& a) {
 }
 
 nlohmann::ordered_json ErrorsJson(std::span<const ErrorRow> rows,
-                                  std::span<const Predictor> predictors) {
+                                  std::span<const Predictor> predictors, const char* commanded) {
   const auto json_of = [](const Estimate& e) {
     nlohmann::ordered_json json{{"value", e.value}};
     if (e.interval) json["interval"] = {e.interval->low, e.interval->high};
@@ -175,7 +156,7 @@ nlohmann::ordered_json ErrorsJson(std::span<const ErrorRow> rows,
     }
     list.push_back({{"session", row.session},
                     {"seconds", row.seconds},
-                    {"torques", row.reported ? "reported" : "commanded"},
+                    {"torques", row.reported ? "reported" : commanded},
                     {"runs", row.runs},
                     {"windows", row.windows},
                     {"median_error_rad", errors},
@@ -197,7 +178,8 @@ int RunValidate(const MachineArguments& a) {
   }
   const Twin twin = ReadTwin(file, "machine validate");
   const std::vector<Twin> others = ReadOthers(a);
-  const std::vector<MachineLog> logs = ReadLogs(std::span(a.logs).subspan(1), a.columns);
+  const std::vector<MachineLog> logs =
+      ReadCheckedLogs(std::span(a.logs).subspan(1), a.columns, SayError);
   std::vector<Predictor> predictors{PredictorOf(twin.name, twin, logs)};
   AddOthers(others, a, logs, predictors);
   ThreadPool pool(ResolveThreads(a.threads));
@@ -209,10 +191,11 @@ int RunValidate(const MachineArguments& a) {
   if (!a.figure.empty()) DrawErrors(logs, predictors, a.figure, &pool);
   if (!a.csv.empty()) WriteNamedFile(a.csv, MotionCsv(logs, predictors));
   if (a.as_json) {
-    fmt::print("{}\n", PrintableJson({{"errors", ErrorsJson(rows, predictors)}}));
+    fmt::print("{}\n",
+               PrintableJson({{"errors", ErrorsJson(rows, predictors, CommandedIn(logs))}}));
     return 0;
   }
-  PrintErrors(rows, predictors);
+  PrintErrors(rows, predictors, CommandedIn(logs));
   for (const std::string& written : {a.figure, a.csv}) {
     if (!written.empty()) fmt::print("written {}\n", Printable(written));
   }
@@ -279,7 +262,7 @@ int RunIdentify(const MachineArguments& a) {
   CheckIdentifyArguments(a);
   const Twin first = ReadTwin(a.plant, "--plant");
   const std::vector<Twin> others = ReadOthers(a);
-  const std::vector<MachineLog> logs = ReadLogs(a.logs, a.columns);
+  const std::vector<MachineLog> logs = ReadCheckedLogs(a.logs, a.columns, SayError);
   IdentifyConfig config;
   config.folds = static_cast<int>(a.folds);
   config.fit.windows.seconds = a.seconds;
@@ -303,12 +286,12 @@ int RunIdentify(const MachineArguments& a) {
   if (!a.figure.empty()) DrawErrors(logs, predictors, a.figure, &pool);
   if (a.as_json) {
     nlohmann::ordered_json json = IdentificationJson(found, a.out);
-    json["errors"] = ErrorsJson(rows, predictors);
+    json["errors"] = ErrorsJson(rows, predictors, CommandedIn(logs));
     fmt::print("{}\n", PrintableJson(json));
     return 0;
   }
   PrintIdentification(found, logs.size());
-  PrintErrors(rows, predictors);
+  PrintErrors(rows, predictors, CommandedIn(logs));
   fmt::print("written {}\n", Printable(a.out));
   if (!a.figure.empty()) fmt::print("written {}\n", Printable(a.figure));
   return 0;

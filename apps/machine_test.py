@@ -254,14 +254,24 @@ class Machine(ProgramTest):
         validate = ["machine", "validate", "plant.toml"]
         self.assertEqual(self.succeed(*validate, *files, "--json"),
                          self.succeed(*validate, *reversed(files), "--json"))
-        self.refuse([*validate, *files, files[0]], "expected different logs", '"a.csv" twice')
+        for again in (files[0], "./a.csv"):
+            self.refuse([*validate, *files, again], "expected each log once", "a.csv twice")
+            self.refuse(["realaigym", "--hardware", *files, again], "expected each log once")
 
     def test_logs_without_commanded_torques(self):
         self.write("plant.toml", "[plant]\nmass1 = 0.5\n")
         no_command = [*NAMES[:5], "x", "y", *NAMES[7:]]
         measured = self.write("measured.csv", log(names=no_command))
         self.refuse(["machine", "identify", measured, "--plant", "plant.toml", "--out", "twin.toml",
-                     "--folds", "0"], "measured.csv: expected commanded torques", "got none")
+                     "--folds", "0"], "measured.csv: joint 1: expected commanded torques", "got none")
+        one_command = self.write("some.csv", log(names=[*NAMES[:5], "x", *NAMES[6:]]))
+        done = self.run_here("machine", "identify", one_command, "--plant", "plant.toml", "--out",
+                             "twin.toml", "--folds", "0")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("joint 1: expected commanded torques", done.stderr)
+        none = self.write("none.csv", log(names=[*NAMES[:5], "x", "y", "z", "u", *NAMES[9:]]))
+        rows = json.loads(self.succeed("machine", "validate", "plant.toml", none, "--json"))
+        self.assertEqual({row["torques"] for row in rows["errors"]}, {"no"})
         rows = json.loads(self.succeed("machine", "validate", "plant.toml", measured, "--json"))
         self.assertEqual({row["torques"] for row in rows["errors"]}, {"reported"})
         self.refuse(["realaigym", "--hardware", measured], "expected commanded torques")

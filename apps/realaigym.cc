@@ -23,6 +23,7 @@
 #include "io/machine.h"
 #include "io/streams.h"
 #include "io/tensor_file.h"
+#include "machine/check.h"
 #include "machine/windows.h"
 #include "realaigym/boards.h"
 #include "realaigym/hardware.h"
@@ -180,10 +181,8 @@ int CompareTvlqr(const RealAiGymArguments& a, std::span<const MachineLog> logs,
     throw BadInput("--law: expected runs without pushes to rebuild the TVLQR from, got none");
   }
   const Twin twin = ReadTwin(a.twin, "--twin");
-  std::vector<MachineLog> of_law;
-  for (const std::string& file : a.law.empty() ? a.hardware : a.law) {
-    for (MachineLog& log : ReadLog(file)) of_law.push_back(std::move(log));
-  }
+  const std::vector<MachineLog> of_law =
+      ReadCheckedLogs(a.law.empty() ? a.hardware : a.law, "", [](const std::string&) {});
   if (!a.law.empty() && ScoreHardware(of_law, {}).robot != real.robot) {
     throw BadInput(Concat("--law: expected runs of the ", NameOf(real.robot), ", got others"));
   }
@@ -245,10 +244,7 @@ int ScoreLogs(const RealAiGymArguments& a) {
   BoardSearchConfig config;  // has --robot
   SetFlags(OptionsOf(config), a.search);
   const std::optional<Robot> robot = a.search.empty() ? std::nullopt : RobotNamed(config.robot);
-  std::vector<MachineLog> logs;
-  for (const std::string& file : a.hardware) {
-    for (MachineLog& log : ReadLog(file)) logs.push_back(std::move(log));
-  }
+  const std::vector<MachineLog> logs = ReadCheckedLogs(a.hardware, "", SayError);
   const HardwareReport report = ScoreHardware(logs, robot);
   if (!a.twin.empty()) return CompareTvlqr(a, logs, report);
   if (a.as_json) {

@@ -4,7 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <set>
+#include <system_error>
 
+#include "core/error.h"
 #include "core/format.h"
 #include "core/json.h"
 #include "core/sample.h"
@@ -173,6 +177,35 @@ LogCheck CheckLog(const std::string& name, Pieces pieces) {
   CheckTorques(pieces, check.findings);
   CheckMotion(pieces, check.findings);
   return check;
+}
+
+std::string AboutText(const Finding& finding) {
+  const std::string aspect = NameOf(finding.aspect);
+  return finding.joint > 0 ? Concat(aspect, " ", finding.joint) : aspect;
+}
+
+std::vector<MachineLog> ReadCheckedLogs(std::span<const std::string> files,
+                                        const std::string& columns,
+                                        const std::function<void(const std::string&)>& warn) {
+  std::vector<std::string> sorted(files.begin(), files.end());
+  std::ranges::sort(sorted);
+  std::set<std::filesystem::path> seen;
+  std::vector<MachineLog> logs;
+  for (const std::string& file : sorted) {
+    std::error_code error;
+    if (!seen.insert(std::filesystem::weakly_canonical(file, error)).second) {
+      throw BadInput(Concat("expected each log once, got ", Printable(file), " twice"));
+    }
+    std::vector<MachineLog> pieces = ReadLog(file, columns);
+    const LogCheck check = CheckLog(file, pieces);
+    const auto fault = std::ranges::find(check.findings, Severity::kFault, &Finding::severity);
+    if (fault != check.findings.end()) {
+      warn(Concat("warning: ", Printable(file), ": ", AboutText(*fault), ": ", fault->text,
+                  "; machine check lists all faults"));
+    }
+    std::ranges::move(pieces, std::back_inserter(logs));
+  }
+  return logs;
 }
 
 std::string RowsText(const LogRows& rows) {

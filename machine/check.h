@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -59,6 +60,15 @@ std::string CheckJson(std::span<const LogCheck> checks);
 void DrawCheck(const LogCheck& check, std::span<const MachineLog> pieces,
                const std::filesystem::path& file);
 
+/// What a finding is about, such as `velocity 2`.
+std::string AboutText(const Finding& finding);
+
+/// Reads logs in the order of their names. Calls `warn` with a line about each one that has faults.
+/// Throws BadInput as ReadLog does, and for a log that is given twice.
+std::vector<MachineLog> ReadCheckedLogs(std::span<const std::string> files,
+                                        const std::string& columns,
+                                        const std::function<void(const std::string&)>& warn);
+
 // The checks, each of which appends its findings.
 using Findings = std::vector<Finding>;
 using Pieces = std::span<const MachineLog>;
@@ -73,6 +83,10 @@ void CheckVelocities(Pieces pieces, Findings& findings);
 void CheckTorques(Pieces pieces, Findings& findings);
 /// Joints that do not move, and motion that grows without torque.
 void CheckMotion(Pieces pieces, Findings& findings);
+
+/// Whether the motor of a joint (0 or 1) reports torques without a command: more than idle motors
+/// do, and motors whose rotors the other joint accelerates.
+bool ActsWithoutCommand(Pieces pieces, int joint);
 
 /// Rows `first` to `last` (indices) of a piece as rows of the file.
 LogRows RangeOf(const MachineLog& piece, int first, int last);

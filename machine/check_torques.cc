@@ -86,6 +86,16 @@ bool CheckTorqueGain(const Response& best, int joint, Findings& findings) {
   return true;
 }
 
+/// Root mean square of a joint's measured torque, N·m.
+double RmsMeasured(Pieces pieces, int joint) {
+  double squares = 0, n = 0;
+  for (const MachineLog& piece : pieces) {
+    for (const Joints& torque : piece.measured) squares += torque[joint] * torque[joint];
+    n += static_cast<double>(piece.measured.size());
+  }
+  return n > 0 ? std::sqrt(squares / n) : 0;
+}
+
 void CheckTorque(Pieces pieces, int joint, Findings& findings) {
   const std::vector<Response> responses = ResponsesOf(pieces, joint, joint);
   const Response best = BestOf(responses);
@@ -101,12 +111,9 @@ void CheckTorque(Pieces pieces, int joint, Findings& findings) {
          {{"delay_rows", best.rows}, {"lag", best.lag}, {"gain", gain}, {"correlation", r}}});
   };
   if (!(best.pairs.Sxx() > 1e-9 * best.pairs.n)) {
-    // Drives of joints without a command report the torque that accelerates their rotors.
-    constexpr double kActs = 0.2;  // N·m, rms
-    const double rms = std::sqrt(best.pairs.yy / best.pairs.n);
-    if (best.pairs.x == 0 && rms > kActs) {
-      add(Severity::kFault,
-          fmt::format("measured torque of {:.2g} N·m (rms) without a command", rms));
+    if (ActsWithoutCommand(pieces, joint)) {
+      add(Severity::kFault, fmt::format("measured torque of {:.2g} N·m (rms) without a command",
+                                        RmsMeasured(pieces, joint)));
     }
     return;
   }
@@ -159,6 +166,15 @@ void CheckTorqueSize(Pieces pieces, int joint, Findings& findings) {
 }
 
 }  // namespace
+
+bool ActsWithoutCommand(Pieces pieces, int joint) {
+  constexpr double kActs = 0.5;   // N·m, rms
+  constexpr double kShare = 0.5;  // of the other joint's
+  const bool has_command = std::ranges::any_of(
+      pieces, [&](const MachineLog& piece) { return HasTorque(piece.commanded, joint); });
+  return !has_command &&
+         RmsMeasured(pieces, joint) > std::max(kActs, kShare * RmsMeasured(pieces, 1 - joint));
+}
 
 void CheckTorques(Pieces pieces, Findings& findings) {
   for (const int joint : {0, 1}) {

@@ -5,6 +5,8 @@
 #include <map>
 
 #include "core/error.h"
+#include "core/text.h"
+#include "machine/check.h"
 
 namespace upswing {
 namespace {
@@ -34,12 +36,18 @@ bool HasMotors(std::span<const MachineLog> logs) {
   });
 }
 
-/// Throws BadInput for a log whose only torques are measured ones: they do not drive the model.
-void CheckTorques(const MachineLog& log) {
-  if (!log.commanded.empty() || !(HasTorque(log.measured, 0) || HasTorque(log.measured, 1))) return;
-  throw BadInput(Concat(log.name,
-                        ": expected commanded torques besides the measured ones, got none; "
-                        "--columns can name measured torques as commanded1 and commanded2"));
+/// Throws BadInput for a log in which a motor acts without commanded torques, which drive the
+/// model.
+void ExpectCommands(const MachineLog& log) {
+  for (const int joint : {0, 1}) {
+    const bool acts = log.commanded.empty() ? HasTorque(log.measured, joint)
+                                            : ActsWithoutCommand(std::span(&log, 1), joint);
+    if (!acts) continue;
+    throw BadInput(Concat(log.name, ": joint ", joint + 1,
+                          ": expected commanded torques besides the measured ones, got none; "
+                          "--columns can name measured torques as commanded",
+                          joint + 1));
+  }
 }
 
 }  // namespace
@@ -69,7 +77,7 @@ std::vector<Structure> Structures(bool has_motors) {
 
 Identification Identify(std::span<const MachineLog> logs, const Twin& first,
                         const IdentifyConfig& config, ThreadPool* pool, const Progress& progress) {
-  for (const MachineLog& log : logs) CheckTorques(log);
+  for (const MachineLog& log : logs) ExpectCommands(log);
   const std::vector<Structure> structures = Structures(HasMotors(logs));
   Identification result;
   const int n = static_cast<int>(logs.size());

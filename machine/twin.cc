@@ -131,7 +131,8 @@ void Actuator::Describe(Options& o) {
   o.Add(&lag, "lag", {0, kLongest}, "s", "time constant of the torque");
   o.Add(&passive_limit, "passive_limit", {0, 1000}, "N·m",
         "largest torque of the joint that is not actuated");
-  o.Add(&current_delay, "current_delay", {-kLongest, kLongest}, "s", "age of the reported torque");
+  o.Add(&current_delay, "current_delay", {-kLongest, kLongest}, "s",
+        "time from the reported torque to the reading of the angles");
   o.Add(&current_inertia, "current_inertia", {0, 1}, "kg·m²",
         "part of the reported torque that opposes the joint's acceleration");
 }
