@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <optional>
@@ -25,15 +26,13 @@ struct SimulateArguments {
   double seconds = -1;  // negative: not given
 };
 
-/// Whether the name of a column begins with the word `t` or `time`, such as `Time [s]` and `t_ms`.
+/// Whether a column has times: `t`, `time`, `timestamp` or `seconds`, also with a unit, such as
+/// `Time [s]`, `t_ms` and `time(s)`.
 bool IsTime(std::string_view name) {
-  std::string word;
-  for (const char c : name) {
-    const char small = static_cast<char>(c | 0x20);  // of a letter
-    if (small < 'a' || small > 'z') break;
-    word += small;
-  }
-  return word == "t" || word == "time";
+  const std::string_view word = Trim(name.substr(0, name.find_first_of("[(_")));
+  constexpr std::array kNames{"t",         "time",      "Time",    "TIME",
+                              "timestamp", "Timestamp", "seconds", "sec"};
+  return std::ranges::find(kNames, word) != kNames.end();
 }
 
 /// The column `torque` of a CSV file with a row per `step` (s). Throws BadInput with the line
@@ -50,10 +49,13 @@ std::vector<double> ReadTorqueFile(const std::string& path, double step) {
     throw BadInput(Concat(where, ": expected at most ", kMostRows, " rows of torques, got ",
                           columns.front().values.size()));
   }
+  constexpr double kLargestTime = 1e10;  // s; the steps of larger ones are lost in rounding
   for (const CsvColumn& time : std::span(columns).subspan(1)) {
     for (size_t k = 0; k < time.values.size(); ++k) {
       const double expected = time.values.front() + static_cast<double>(k) * step;
-      if (std::abs(time.values[k] - expected) < 1e-3 * step) continue;
+      if (std::abs(expected) < kLargestTime && std::abs(time.values[k] - expected) < 1e-3 * step) {
+        continue;
+      }
       throw BadInput(Concat(where, ": row ", k + 1, ": ", Printable(time.name), ": expected ",
                             FormatNumber(expected), " s, because each torque acts for ",
                             FormatNumber(step), " s, got ", FormatNumber(time.values[k])));
@@ -101,9 +103,10 @@ int RunSimulate(const SimulateArguments& a) {
 void AddSimulate(CommandLine& line) {
   SimulateArguments& a = line.Runs(RunSimulate);
   AddPolicy(line, a.policy);
-  line.Text("--torque", a.torque, "FILE",
-            "CSV file with a column `torque` [N·m], a row per 0.02 s; -: standard input. A column "
-            "`t` or `time` [s] must have these steps");
+  line.Text(
+      "--torque", a.torque, "FILE",
+      "CSV file with a column `torque` [N·m], a row per 0.02 s; -: standard input. Times in a "
+      "column `t` or `time` [s] must be 0.02 s apart");
   AddEpisodeOptions(line, a.trial);
   Options own;
   Option& seconds = own.Add(&a.seconds, "seconds", {0, 1e5}, "s", "length of the rollout");

@@ -228,10 +228,14 @@ class SimulateTest(ProgramTest):
         for times, row, wanted in ((("0", "0.01", "0.02"), 2, "0.02"), ((0, 20, 40), 2, "0.02"),
                                    ((0, 0.02, 0.02), 3, "0.04"), ((0, 0.02, 0.05), 3, "0.04"),
                                    ((0.04, 0.02, 0), 2, "0.06"), ((0, 0, 0), 2, "0.02")):
-            for name in ("t", "time", "t_ms"):
+            for name in ("t", "time", "t_ms", "timestamp"):
                 table = f"{name},torque\n" + "".join(f"{t},1\n" for t in times)
                 self.refuse(["simulate", "--torque", self.write("bad.csv", table)],
                             f"bad.csv: row {row}: {name}: expected {wanted} s", "0.02 s")
+        table = "T [degC],Time step,torque\n20,0,1\n21,1,2\n22,2,3\n"
+        self.assertEqual(self.succeed("simulate", "--torque", self.write("n.csv", table)), expected)
+        self.refuse(["simulate", "--torque", self.write("bad.csv", "t,torque\n1e300,1\n1e300,2\n")],
+                    "bad.csv: row 1: t: expected")
         self.refuse(["simulate", "--torque", self.write("bad.csv", "torque,torque\n1,2\n")],
                     'bad.csv:1: expected one column "torque", got 2')
 
