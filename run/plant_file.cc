@@ -13,6 +13,7 @@
 #include "run/covariance.h"
 #include "run/shipped_plants.h"
 #include "setup/toml_settings.h"
+#include "sim/posterior.h"
 
 namespace upswing {
 namespace {
@@ -83,7 +84,9 @@ PlantFile ParsePlantFile(std::string_view toml, const std::string& where) {
     if (of_plant.Get(first) == nullptr) file.conditions.push_back(std::move(flag));
   }
   if (const std::string posterior = PosteriorText(covariance); !posterior.empty()) {
-    file.conditions.push_back({"posterior", posterior, Concat(where, ": [covariance]")});
+    const std::string place = Concat(where, ": [covariance]");
+    Posterior::Parse(posterior, place);  // throws unless the matrix is positive
+    file.conditions.push_back({"posterior", posterior, place});
   }
   file.plant = settings.plant;
   file.name = where;

@@ -91,6 +91,10 @@ TEST(PlantFile, RefusesACovarianceThatIsNone) {
   EXPECT_NE(ErrorOf(plant + "mass1 = [1, 0.5]\nmass2 = [0, 1]").find("symmetric"),
             std::string::npos);
   EXPECT_NE(ErrorOf("covariance = 1\n[plant]").find("expected a table"), std::string::npos);
+  EXPECT_NE(ErrorOf(plant + "mass1 = [-1]").find("m.toml: [covariance]: expected a positive"),
+            std::string::npos);
+  EXPECT_NE(ErrorOf(plant + "mass1 = [1e-4, 1]\nmass2 = [1, 1e-4]").find("positive"),
+            std::string::npos);
   // An alias is two numbers, and a joint is none.
   for (const char* name : {"damping", "mass", "actuated_joint", "mas1", "sensor_latency"}) {
     EXPECT_NE(ErrorOf(plant + name + " = [1]")
