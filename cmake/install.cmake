@@ -10,7 +10,7 @@ foreach(LAYER IN LISTS UPSWING_LAYERS)
   install(TARGETS upswing_${LAYER} EXPORT upswing)
   # Not what tests share, nor what one kernel includes into another.
   install(DIRECTORY ${LAYER} DESTINATION include/upswing FILES_MATCHING PATTERN "*.h"
-          PATTERN "testing.h" EXCLUDE PATTERN "*-inl.h" EXCLUDE PATTERN "testdata" EXCLUDE)
+          PATTERN "*testing.h" EXCLUDE PATTERN "*-inl.h" EXCLUDE PATTERN "testdata" EXCLUDE)
 endforeach()
 set_target_properties(upswing_proto PROPERTIES EXPORT_NAME proto)
 install(TARGETS upswing_proto EXPORT upswing)

@@ -1,7 +1,7 @@
 // Target: the faults of encoders, clock, firmware and line in a run of the control loop. Accepted:
 // a run without a fault.
 #include "fuzz/target.h"
-#include "loop/adverse_link.h"
+#include "loop/adverse_testing.h"
 
 namespace upswing {
 

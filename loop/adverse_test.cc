@@ -7,7 +7,7 @@
 #include <string>
 
 #include "core/rng.h"
-#include "loop/adverse_link.h"
+#include "loop/adverse_testing.h"
 
 namespace upswing {
 namespace {
