@@ -63,29 +63,37 @@ class OutputTest(ProgramTest):
 
 
 class SignalTest(ProgramTest):
-    def test_usr1_and_usr2_do_not_end_a_training_that_has_hardly_begun(self):
-        # The program waits for its settings.
-        os.mkfifo(self.folder / "settings")
-        process = self.start(*small(**TINY | {"out": "run"}), "--config", "settings", wait=False)
-        with open(self.folder / "settings", "w", encoding="utf-8") as settings:
-            for number in (signal.SIGUSR1, signal.SIGUSR2) * 3:
-                process.send_signal(number)
-            settings.write("[train]\nseed = 1\n")
-        self.assertIn("Training", process.stdout.readline())
+    def waiting(self):
+        """A program that waits for the end of its input."""
+        process = subprocess.Popen([UPSWING, "simulate", "--torque", "-"], cwd=self.folder,
+                                   stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                                   stderr=subprocess.STDOUT, encoding="utf-8")
+        self.addCleanup(process.stdin.close)
+        self.addCleanup(self.end, process)
+        # More than a pipe holds: afterwards the program reads.
+        process.stdin.write("torque\n1\n" + "# comment\n" * 20_000)
+        process.stdin.flush()
+        return process
+
+    def test_usr1_and_usr2_do_not_end_a_program_that_has_hardly_begun(self):
+        process = self.waiting()
+        for number in (signal.SIGUSR1, signal.SIGUSR2) * 3:
+            process.send_signal(number)
+        process.stdin.close()
+        self.assertIn("torque", process.stdout.readline())
+        process.stdout.read()
+        self.assertEqual(process.wait(), 0)
+        process = self.start(*small(**TINY | {"out": "run"}))
         process.send_signal(signal.SIGUSR2)
         output = process.stdout.read()
         self.assertEqual(process.wait(), 0, output)
 
-    def test_a_stop_before_anything_is_begun_leaves_nothing(self):
+    def test_a_stop_before_anything_is_begun_ends_the_program(self):
         for number in (signal.SIGINT, signal.SIGTERM):
-            (self.folder / "settings").unlink(missing_ok=True)
-            os.mkfifo(self.folder / "settings")
-            process = self.start(*small(**TINY), "--config", "settings", wait=False)
-            with open(self.folder / "settings", "w", encoding="utf-8"):
-                process.send_signal(number)
-                process.stdout.read()
-                self.assertEqual(process.wait(), -number)
-            self.assertFalse((self.folder / "run").exists())
+            process = self.waiting()
+            process.send_signal(number)
+            process.stdout.read()
+            self.assertEqual(process.wait(), -number)
 
 
 @unittest.skipIf("UPSWING_SANITIZED" in os.environ, "a sanitizer's own start complains of it")
