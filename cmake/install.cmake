@@ -2,18 +2,22 @@
 # which find_package(upswing) finds them. The folder can be moved: nothing in it is an absolute path.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
-set(UPSWING_LAYERS core nn sim rl control io mujoco report setup machine realaigym loop run study judge export view)
+set(UPSWING_LAYERS base nn pendulum rl control os mujoco report agents runs judge)
+set(UPSWING_EXTRAS machine realaigym loop deploy view)
 set(UPSWING_PACKAGE ${CMAKE_INSTALL_LIBDIR}/cmake/upswing)
 set(UPSWING_INSTALLED_MUJOCO ${CMAKE_INSTALL_LIBDIR}/upswing/mujoco)
 
-foreach(LAYER IN LISTS UPSWING_LAYERS)
-  install(TARGETS upswing_${LAYER} EXPORT upswing)
-  # Not what tests share, nor what one kernel includes into another.
-  install(DIRECTORY ${LAYER} DESTINATION include/upswing FILES_MATCHING PATTERN "*.h"
-          PATTERN "*testing.h" EXCLUDE PATTERN "*-inl.h" EXCLUDE PATTERN "testdata" EXCLUDE)
-endforeach()
-set_target_properties(upswing_proto PROPERTIES EXPORT_NAME proto)
-install(TARGETS upswing_proto EXPORT upswing)
+# The libraries of folders in FOLDER, and their headers, which are included from include/upswing.
+function(upswing_install_layers FOLDER DESTINATION)
+  foreach(LAYER IN LISTS ARGN)
+    install(TARGETS upswing_${LAYER} EXPORT upswing)
+    # Not what tests share, nor what one kernel includes into another.
+    install(DIRECTORY ${FOLDER}/${LAYER} DESTINATION ${DESTINATION} FILES_MATCHING PATTERN "*.h"
+            PATTERN "*testing.h" EXCLUDE PATTERN "*-inl.h" EXCLUDE PATTERN "testdata" EXCLUDE)
+  endforeach()
+endfunction()
+upswing_install_layers(src include/upswing ${UPSWING_LAYERS})
+upswing_install_layers(extras include/upswing/extras ${UPSWING_EXTRAS})
 install(EXPORT upswing NAMESPACE upswing:: FILE upswing-targets.cmake DESTINATION ${UPSWING_PACKAGE})
 
 configure_package_config_file(cmake/upswing-config.cmake.in upswing-config.cmake

@@ -2,7 +2,7 @@
 """Tests of the installed library: its package, its headers and the examples, used as your own
 project would use them.
 
-UPSWING names the program; its build folder is used (see apps/testing.py).
+UPSWING names the program; its build folder is used (see src/cli/testing.py).
 """
 
 import csv
@@ -15,11 +15,13 @@ import unittest
 from pathlib import Path
 
 ROOT = Path(os.environ.get("UPSWING_ROOT", Path(__file__).resolve().parent.parent))
-UPSWING = Path(os.environ.get("UPSWING", ROOT / "build/release/apps/upswing"))
+UPSWING = Path(os.environ.get("UPSWING", ROOT / "build/release/bin/upswing"))
 BUILD = UPSWING.parent.parent
 POLICY = ROOT / "web/public/agents/d3qn.safetensors"
-LAYERS = re.search(r"UPSWING_LAYERS ([^)]*)\)",
-                   (ROOT / "cmake/install.cmake").read_text(encoding="utf-8"))[1].split()
+LAYERS, EXTRAS = (re.search(rf"UPSWING_{name} ([^)]*)\)",
+                            (ROOT / "cmake/install.cmake").read_text(encoding="utf-8"))[1].split()
+                  for name in ("LAYERS", "EXTRAS"))
+FOLDERS = [*LAYERS, *(f"extras/{name}" for name in EXTRAS)]  # of headers
 
 
 def run(*command, **more):
@@ -30,7 +32,7 @@ def run(*command, **more):
     return done.stdout
 
 
-PORTABLE = ["core", "nn", "sim", "rl", "control"]
+PORTABLE = ["base", "nn", "pendulum", "rl", "control"]
 EXAMPLES = ["control_loop", "own_task", "train_and_judge"]
 
 # A project that finds the library, with one target for each part to build.
@@ -43,9 +45,9 @@ add_subdirectory(docs)
 add_subdirectory(headers)
 add_subdirectory(wants)
 """
-DOCS = """find_package(upswing REQUIRED COMPONENTS sim rl control)
+DOCS = """find_package(upswing REQUIRED COMPONENTS pendulum rl control)
 add_executable(docs docs.cc)
-target_link_libraries(docs PRIVATE upswing::sim upswing::rl upswing::control)
+target_link_libraries(docs PRIVATE upswing::pendulum upswing::rl upswing::control)
 """
 HEADERS = """find_package(upswing REQUIRED)
 add_library(all_of_them OBJECT all.cc)
@@ -78,7 +80,7 @@ class Library(unittest.TestCase):
         for path, text in (("CMakeLists.txt", PROJECT), ("docs/CMakeLists.txt", DOCS),
                            ("docs/docs.cc", "\n".join([*cls.blocks(), cls.all_headers(PORTABLE)])),
                            ("headers/CMakeLists.txt", HEADERS),
-                           ("headers/all.cc", cls.all_headers(LAYERS)),
+                           ("headers/all.cc", cls.all_headers(FOLDERS)),
                            ("wants/CMakeLists.txt", WANTS)):
             (source / path).parent.mkdir(parents=True, exist_ok=True)
             (source / path).write_text(text, encoding="utf-8")
@@ -150,13 +152,14 @@ class Library(unittest.TestCase):
 
     def test_every_target_and_example_is_documented(self):
         text = (ROOT / "docs/howto/cpp-library.md").read_text(encoding="utf-8")
-        self.assertEqual(re.findall(r"^\| `upswing::(\w+)`", text, re.MULTILINE), LAYERS)
+        self.assertEqual(re.findall(r"^\| `upswing::(\w+)`", text, re.MULTILINE), LAYERS + EXTRAS)
         for path in (ROOT / "examples").glob("*/CMakeLists.txt"):
             name = path.parent.name
             self.assertIn(f"(../../examples/{name}/{name}.cc)", text)
 
     def test_every_header_can_be_included(self):
-        self.assertEqual({path.name for path in self.include.iterdir()}, set(LAYERS))
+        self.assertEqual({path.name for path in self.include.iterdir()}, {*LAYERS, "extras"})
+        self.assertEqual({path.name for path in (self.include / "extras").iterdir()}, set(EXTRAS))
         self.build("docs", "all_of_them")  # docs links only portable layers
 
     def test_package_refuses_what_it_is_not(self):

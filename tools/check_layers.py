@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Checks that folders are layers: includes point only to lower layers, and there is no cycle.
+"""Checks that folders are layers: includes point only to lower layers, and there is no cycle. The
+product, src/, includes nothing of extras/.
 
     tools/check_layers.py [ROOT]
 
@@ -11,47 +12,51 @@ import sys
 from pathlib import Path
 
 # Layers that must not need an operating system.
-PORTABLE = {"core", "nn", "sim", "rl", "control", "setup"}
-BELOW_RUN = PORTABLE | {"io", "mujoco"}
-LIBRARIES = BELOW_RUN | {"report", "machine", "realaigym", "loop", "run", "study", "judge", "export", "view"}
+PORTABLE = {"src/base", "src/nn", "src/pendulum", "src/rl", "src/control", "src/agents"}
+BELOW_RUNS = PORTABLE | {"src/os", "src/mujoco", "src/report"}
+PRODUCT = BELOW_RUNS | {"src/runs", "src/judge"}
+EXTRAS = {"extras/machine", "extras/realaigym", "extras/loop", "extras/deploy", "extras/view"}
 
-# Folders that each folder may include, besides itself.
+# Folders that each folder may include, besides itself. The commands of extras are in no folder of their
+# own: they are the files that COMMAND matches.
 LAYERS = {
-    "core": set(),
-    "nn": {"core"},
-    "sim": {"core"},
-    "rl": {"nn", "core"},
-    "control": {"sim", "core"},
-    "io": {"core"},
-    "mujoco": {"sim", "io", "core"},
-    "report": {"io", "core"},
-    "setup": PORTABLE - {"setup"},
-    "run": BELOW_RUN,
-    "machine": BELOW_RUN | {"run", "report"},
-    "realaigym": BELOW_RUN | {"run", "report", "machine"},
-    "loop": BELOW_RUN | {"run", "report", "machine", "realaigym"},
-    "study": BELOW_RUN | {"run"},
-    "judge": BELOW_RUN | {"run", "study", "report"},
-    "export": BELOW_RUN | {"run", "report"},
-    "view": BELOW_RUN | {"run", "judge"},
-    "apps": LIBRARIES,
-    "bench": LIBRARIES | {"apps"},
-    "python": LIBRARIES,
-    "web": LIBRARIES,
-    "fuzz": LIBRARIES,
-    "examples": LIBRARIES,
+    "src/base": set(),
+    "src/nn": {"src/base"},
+    "src/pendulum": {"src/base"},
+    "src/rl": {"src/nn", "src/base"},
+    "src/control": {"src/pendulum", "src/base"},
+    "src/os": {"src/base"},
+    "src/mujoco": {"src/pendulum", "src/os", "src/base"},
+    "src/report": {"src/os", "src/base"},
+    "src/agents": PORTABLE - {"src/agents"},
+    "src/runs": BELOW_RUNS,
+    "src/judge": BELOW_RUNS | {"src/runs"},
+    "src/cli": PRODUCT,
+    "extras/machine": PRODUCT,
+    "extras/realaigym": PRODUCT | {"extras/machine"},
+    "extras/loop": PRODUCT | {"extras/machine", "extras/realaigym"},
+    "extras/deploy": PRODUCT,
+    "extras/view": PRODUCT,
+    "commands": PRODUCT | EXTRAS | {"src/cli"},
+    "tools/bench": PRODUCT | EXTRAS | {"src/cli"},
+    "tools/fuzz": PRODUCT | EXTRAS,
+    "python": PRODUCT | EXTRAS,
+    "web": PRODUCT | EXTRAS,
+    "examples": PRODUCT | EXTRAS,
 }
+COMMAND = re.compile(r"extras/\w+/\w+_command\.cc$")
 
 # Files that may include each foreign library.
 ALLOWED_FILES = {
-    "mujoco": re.compile(r"mujoco/"),
-    "GLFW": re.compile(r"mujoco/glfw-inl\.h$"),
-    "zlib.h": re.compile(r"io/(png|gzip)\.cc$"),
-    "google": re.compile(r"io/"),
+    "mujoco": re.compile(r"(src/mujoco|extras/view)/"),
+    "GLFW": re.compile(r"extras/view/glfw-inl\.h$"),
+    "zlib.h": re.compile(r"(src/os/gzip|extras/view/png)\.cc$"),
+    "google": re.compile(r"(src/runs|extras/deploy)/"),
     "nanobind": re.compile(r"python/"),
-    "hwy": re.compile(r"(core/simd(_test)?|nn/(linear|product|registers-inl)|bench/roofline|"
-                      r"sim/(closed_form|sine_cosine-inl)|realaigym/swing_net)\.(h|cc)$"),
-    "Eigen": re.compile(r"(control|machine|realaigym)/|nn/[^/]*_test\.cc$|bench/"),
+    "hwy": re.compile(r"(src/(base/simd(_test)?|nn/(linear|product|registers-inl)|"
+                      r"pendulum/(closed_form|sine_cosine-inl))|tools/bench/roofline|"
+                      r"extras/realaigym/swing_net)\.(h|cc)$"),
+    "Eigen": re.compile(r"src/(control/|nn/[^/]*_test\.cc$)|extras/(machine|realaigym)/|tools/bench/"),
 }
 
 # Tests and benchmarks of the portable layers may include headers of the operating system.
@@ -61,6 +66,19 @@ SYSTEM = re.compile(r"(unistd|fcntl|poll|sched|signal|csignal|filesystem|fstream
 
 SOURCE_ENDINGS = (".h", ".cc", ".cc.in")
 INCLUDE = re.compile(r'\s*#\s*include\s*(["<])([^">]+)[">]')
+
+
+def layer_of(path):
+    """The layer of a file, by its path relative to root; None for another file."""
+    if COMMAND.match(path):
+        return "commands"
+    parts = path.split("/")
+    return next((name for name in ("/".join(parts[:2]), parts[0]) if name in LAYERS), None)
+
+
+def place_of(root, included):
+    """The path of an included file relative to root. The folders of src/ are included from there."""
+    return f"src/{included}" if (root / "src" / included.split("/")[0]).is_dir() else included
 
 
 def includes(root):
@@ -78,19 +96,21 @@ def includes(root):
 
 def offence(root, file, quote, included):
     """The problem of one include, or None."""
-    folder = file.split("/")[0]
-    target = included.split("/")[0]
-    foreign = quote == "<" and not (root / included).is_file()
-    if foreign and target in ALLOWED_FILES:
-        files = ALLOWED_FILES[target]
+    folder = layer_of(file)
+    path = place_of(root, included)
+    target = layer_of(path)
+    library = included.split("/")[0]
+    foreign = quote == "<" and not (root / path).is_file()
+    if foreign and library in ALLOWED_FILES:
+        files = ALLOWED_FILES[library]
         return None if files.match(file) else f"{included} is not for this file ({files.pattern})"
     if foreign and folder in PORTABLE and SYSTEM.match(included) and not MAY_ASK_SYSTEM.search(file):
         return f"<{included}>: {folder}/ must not need an operating system"
     if foreign:
         return None  # the standard library, another library or a generated header
-    if target not in LAYERS:
+    if target is None or included.startswith("src/"):
         return f'"{included}": expected "folder/file.h" with one of our folders'
-    if not (root / included).is_file():
+    if not (root / path).is_file():
         return f'"{included}" does not exist'
     if target != folder and target not in LAYERS[folder]:
         allowed = ", ".join(sorted(LAYERS[folder])) or "no other folder"
@@ -122,8 +142,8 @@ def check(root):
     for file, line, quote, included in includes(root):
         if problem := offence(root, file, quote, included):
             problems.append(f"{file}:{line}: {problem}")
-        folder, target = file.split("/")[0], included.split("/")[0]
-        if target in LAYERS and target != folder:
+        folder, target = layer_of(file), layer_of(place_of(root, included))
+        if target is not None and target != folder:
             edges.setdefault(folder, {}).setdefault(target, f"{file}:{line}")
     for cycle in cycles(edges):
         steps = list(zip(cycle, cycle[1:] + cycle[:1]))

@@ -10,20 +10,24 @@ from pathlib import Path
 CHECK = Path(__file__).resolve().parent / "check_layers.py"
 
 GOOD = {
-    "core/rng.h": "#include <vector>\n",
-    "core/simd_test.cc": "#include <hwy/highway.h>\n",
-    "nn/linear.h": '#pragma once\n#include "core/rng.h"\n',
-    "nn/linear.cc": '#include "nn/linear.h"\n#include <hwy/highway.h>\n',
-    "bench/linear_bench.cc": '#include "nn/linear.h"\n#include <Eigen/Core>\n',
-    "nn/adam_test.cc": "#include <Eigen/Core>\n",
-    "sim/task.h": "",
-    "mujoco/model.h": "#include <mujoco/mujoco.h>\n",
-    "mujoco/model_test.cc": '#include "mujoco/model.h"\n#include <mujoco/mjbatch.h>\n',
-    "core/file_test.cc": "#include <filesystem>\n",
-    "rl/dqn.cc": '#include "nn/linear.h"\n#include <event.pb.h>\n// #include "sim/task.h"\n',
-    "control/lqr.cc": '#include "sim/task.h"\n',
-    "apps/main.cc": '#include "rl/dqn.h"\n#include "sim/task.h"\n#include <CLI/CLI.hpp>\n',
-    "rl/dqn.h": "",
+    "src/base/rng.h": "#include <vector>\n",
+    "src/base/simd_test.cc": "#include <hwy/highway.h>\n",
+    "src/nn/linear.h": '#pragma once\n#include "base/rng.h"\n',
+    "src/nn/linear.cc": '#include "nn/linear.h"\n#include <hwy/highway.h>\n',
+    "tools/bench/linear_bench.cc": '#include "nn/linear.h"\n#include <Eigen/Core>\n',
+    "src/nn/adam_test.cc": "#include <Eigen/Core>\n",
+    "src/pendulum/task.h": "",
+    "src/mujoco/model.h": "#include <mujoco/mujoco.h>\n",
+    "src/mujoco/model_test.cc": '#include "mujoco/model.h"\n#include <mujoco/mjbatch.h>\n',
+    "src/base/file_test.cc": "#include <filesystem>\n",
+    "src/rl/dqn.cc": '#include "nn/linear.h"\n#include <event.pb.h>\n// #include "pendulum/task.h"\n',
+    "src/control/lqr.cc": '#include "pendulum/task.h"\n',
+    "src/cli/main.cc": '#include "rl/dqn.h"\n#include "pendulum/task.h"\n#include <CLI/CLI.hpp>\n',
+    "src/rl/dqn.h": "",
+    "src/cli/say.h": "",
+    "extras/machine/log.h": '#include "pendulum/task.h"\n',
+    "extras/machine/log_command.cc": '#include "cli/say.h"\n#include "extras/machine/log.h"\n',
+    "tools/fuzz/log_fuzz.cc": '#include "extras/machine/log.h"\n',
 }
 
 
@@ -52,30 +56,40 @@ class CheckLayers(unittest.TestCase):
 
     def test_upward_include(self):
         self.assert_one_offender(
-            {"core/file.cc": '#include <vector>\n#include "report/seeds.h"\n',
-             "report/seeds.h": ""},
-            "core/file.cc:2", 'core/ may not include "report/seeds.h"')
+            {"src/base/file.cc": '#include <vector>\n#include "report/seeds.h"\n',
+             "src/report/seeds.h": ""},
+            "src/base/file.cc:2", 'src/base/ may not include "report/seeds.h"')
 
     def test_sideways_include(self):
-        self.assert_one_offender({"rl/sac.h": '#include "sim/task.h"\n'},
-                                 "rl/sac.h:1", 'rl/ may not include "sim/task.h"')
+        self.assert_one_offender({"src/rl/sac.h": '#include "pendulum/task.h"\n'},
+                                 "src/rl/sac.h:1", 'src/rl/ may not include "pendulum/task.h"')
+
+    def test_the_product_needs_no_extras(self):
+        self.assert_one_offender({"src/rl/sac.h": '#include "extras/machine/log.h"\n'}, "src/rl/sac.h:1",
+                                 'src/rl/ may not include "extras/machine/log.h"')
+        self.assert_one_offender({"src/cli/say.cc": '#include "extras/machine/log.h"\n'}, "src/cli/say.cc:1",
+                                 'src/cli/ may not include "extras/machine/log.h"')
+
+    def test_only_commands_of_extras_include_the_program(self):
+        self.assert_one_offender({"extras/machine/log.cc": '#include "cli/say.h"\n'},
+                                 "extras/machine/log.cc:1", 'extras/machine/ may not include "cli/say.h"')
 
     def test_angle_brackets_do_not_hide_an_include(self):
-        self.assert_one_offender({"rl/sac.h": "#  include <sim/task.h>\n"},
-                                 "rl/sac.h:1", 'rl/ may not include "sim/task.h"')
+        self.assert_one_offender({"src/rl/sac.h": "#  include <pendulum/task.h>\n"},
+                                 "src/rl/sac.h:1", 'src/rl/ may not include "pendulum/task.h"')
 
     def test_cycle(self):
-        status, lines = self.check({"core/rng.h": '#include "nn/linear.h"\n'})
+        status, lines = self.check({"src/base/rng.h": '#include "nn/linear.h"\n'})
         self.assertEqual(status, 1)
         self.assertEqual(len(lines), 2, lines)
-        self.assertIn('core/ may not include "nn/linear.h"', lines[0])
-        self.assertEqual(lines[1], "core/rng.h:1: a cycle between folders: core -> nn -> core "
-                                   "(and nn/linear.h:2)")
+        self.assertIn('src/base/ may not include "nn/linear.h"', lines[0])
+        self.assertEqual(lines[1], "src/base/rng.h:1: a cycle between folders: src/base -> src/nn -> "
+                                   "src/base (and src/nn/linear.h:2)")
 
     def test_an_operating_system_is_for_upper_layers(self):
-        self.assert_one_offender({"rl/dqn.h": "#include <filesystem>\n"},
-                                 "rl/dqn.h:1", "rl/ must not need an operating system")
-        self.assertEqual(self.check({"io/file.h": "#include <unistd.h>\n"}), (0, []))
+        self.assert_one_offender({"src/rl/dqn.h": "#include <filesystem>\n"},
+                                 "src/rl/dqn.h:1", "src/rl/ must not need an operating system")
+        self.assertEqual(self.check({"src/os/file.h": "#include <unistd.h>\n"}), (0, []))
 
     def test_what_is_allowed_has_no_cycle(self):
         sys.path.insert(0, str(CHECK.parent))
@@ -83,20 +97,22 @@ class CheckLayers(unittest.TestCase):
         self.assertEqual(check_layers.cycles(check_layers.LAYERS), [])
 
     def test_foreign_include(self):
-        self.assert_one_offender({"apps/view.cc": "#include <mujoco/mujoco.h>\n"},
-                                 "apps/view.cc:1", "mujoco/mujoco.h is not for this file")
-        self.assert_one_offender({"nn/adam.cc": "#include <Eigen/Core>\n"},
-                                 "nn/adam.cc:1", "Eigen/Core is not for this file")
-        self.assert_one_offender({"nn/linear_test.cc": "#include <hwy/highway.h>\n"},
-                                 "nn/linear_test.cc:1", "hwy/highway.h is not for this file")
+        self.assert_one_offender({"src/cli/view.cc": "#include <mujoco/mujoco.h>\n"},
+                                 "src/cli/view.cc:1", "mujoco/mujoco.h is not for this file")
+        self.assert_one_offender({"src/nn/adam.cc": "#include <Eigen/Core>\n"},
+                                 "src/nn/adam.cc:1", "Eigen/Core is not for this file")
+        self.assert_one_offender({"src/nn/linear_test.cc": "#include <hwy/highway.h>\n"},
+                                 "src/nn/linear_test.cc:1", "hwy/highway.h is not for this file")
 
     def test_missing_header(self):
-        self.assert_one_offender({"rl/ppo.cc": '#include "rl/ppo.h"\n'},
-                                 "rl/ppo.cc:1", '"rl/ppo.h" does not exist')
+        self.assert_one_offender({"src/rl/ppo.cc": '#include "rl/ppo.h"\n'},
+                                 "src/rl/ppo.cc:1", '"rl/ppo.h" does not exist')
 
     def test_include_without_folder(self):
-        self.assert_one_offender({"rl/ppo.cc": '#include "dqn.h"\n'},
-                                 "rl/ppo.cc:1", 'expected "folder/file.h"')
+        self.assert_one_offender({"src/rl/ppo.cc": '#include "dqn.h"\n'},
+                                 "src/rl/ppo.cc:1", 'expected "folder/file.h"')
+        self.assert_one_offender({"tools/fuzz/ppo.cc": '#include "src/rl/dqn.h"\n'},
+                                 "tools/fuzz/ppo.cc:1", 'expected "folder/file.h"')
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ import urllib.request
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "apps"))
+sys.path.insert(0, str(ROOT / "src/cli"))
 from testing import UPSWING, ProgramTest, small, snapshot  # noqa: E402
 
 PAGE = Path(os.environ["UPSWING_PAGE"])

@@ -33,11 +33,11 @@ ROOT_PAGES = {"CHANGELOG.md": "development/changelog.md",
               "SECURITY.md": "development/security.md"}
 
 LAYERS = {
-    "core": "Contracts and basics", "nn": "Networks", "sim": "Tasks", "rl": "Learning",
-    "control": "Controllers", "io": "Files and processes", "mujoco": "MuJoCo",
-    "report": "Statistics and figures", "setup": "Settings and named agents",
-    "machine": "Logs of machines", "realaigym": "RealAIGym", "run": "Runs on disk", "study": "Studies", "judge": "Evaluation",
-    "export": "Export", "view": "Films and pictures"}
+    "base": "Contracts and basics", "nn": "Networks", "pendulum": "Tasks", "rl": "Learning",
+    "control": "Controllers", "os": "Files and processes", "mujoco": "MuJoCo",
+    "report": "Statistics and figures", "agents": "Settings and named agents", "runs": "Runs on disk",
+    "judge": "Evaluation", "machine": "Logs of machines", "realaigym": "RealAIGym",
+    "loop": "Control of machines", "deploy": "Export", "view": "Films and pictures"}
 
 
 class Stage:
@@ -211,13 +211,16 @@ The package `upswing`. [Python](../howto/python.md) shows how to use it.
 
 def layers():
     text = (ROOT / "cmake/install.cmake").read_text(encoding="utf-8")
-    return re.search(r"set\(UPSWING_LAYERS ([^)]*)\)", text)[1].split()
+    return [name for names in re.findall(r"set\(UPSWING_(?:LAYERS|EXTRAS) ([^)]*)\)", text)
+            for name in names.split()]
 
 
 def headers_of(layer):
-    """The headers that cmake --install installs."""
-    return [path for path in sorted((ROOT / layer).glob("*.h"))
-            if path.name != "testing.h" and not path.name.endswith("-inl.h")]
+    """The headers that cmake --install installs, as they are included, with their paths."""
+    return {path.relative_to(root).as_posix(): path
+            for root, folder in ((ROOT / "src", layer), (ROOT, f"extras/{layer}"))
+            for path in sorted((root / folder).glob("*.h"))
+            if path.name != "testing.h" and not path.name.endswith("-inl.h")}
 
 
 # Parts of a header that its page shows: everything except private parts.
@@ -247,8 +250,7 @@ library](../howto/cpp-library.md) shows how to link it. All names are in the nam
 """)
     for name in names:
         parts = [f"# {LAYERS.get(name, name)}: {name}\n"]
-        for header in headers_of(name):
-            path = f"{name}/{header.name}"
+        for path in headers_of(name):
             parts.append(f"## {path}\n\n```{{doxygenfile}} {path}\n:sections: {SECTIONS}\n```\n")
         stage.write(f"reference/cpp-api/{name}.md", "\n".join(parts))
 
@@ -286,8 +288,8 @@ def run_doxygen():
     """Writes the XML of the headers unless it is up to date."""
     headers = Stage(WORK / "headers")
     for name in layers():
-        for header in headers_of(name):
-            headers.write(f"{name}/{header.name}", for_doxygen(header.read_text(encoding="utf-8")))
+        for header, path in headers_of(name).items():
+            headers.write(header, for_doxygen(path.read_text(encoding="utf-8")))
     headers.remove_others(WORK)
     settings = DOXYFILE + (f"OUTPUT_DIRECTORY = {XML.parent}\nINPUT = {headers.folder}\n"
                            f"STRIP_FROM_PATH = {headers.folder}\n")

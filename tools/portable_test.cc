@@ -1,14 +1,14 @@
-// Trains with only the portable layers (core, nn, sim, rl, control, setup): in memory, in closed
+// Trains with only the portable layers (base, nn, pendulum, rl, control, agents): in memory, in closed
 // form, with a checkpoint in safetensors format. The program links all of these libraries and no
 // others of ours. portable_test.py checks its requirements on the system.
 #include <algorithm>
 #include <cstdio>
 #include <vector>
 
-#include "core/error.h"
-#include "core/safetensors.h"
-#include "core/text.h"
-#include "setup/training.h"
+#include "agents/training.h"
+#include "base/error.h"
+#include "base/safetensors.h"
+#include "base/text.h"
 
 namespace upswing {
 namespace {

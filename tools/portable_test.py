@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Tests that the layers core, nn, sim, rl, control and setup need no operating system. A program
+"""Tests that the layers base, nn, pendulum, rl, control and agents need no operating system. A program
 linked with all of them trains in memory, and uses only the allowed symbols below.
 
-The program is portable_test in the build folder of the program in UPSWING (see apps/testing.py).
+The program is portable_test next to the program in UPSWING (see src/cli/testing.py).
 """
 
 import os
@@ -12,8 +12,8 @@ import unittest
 from pathlib import Path
 
 ROOT = Path(os.environ.get("UPSWING_ROOT", Path(__file__).resolve().parent.parent))
-UPSWING = Path(os.environ.get("UPSWING", ROOT / "build/release/apps/upswing"))
-PROGRAM = UPSWING.parent.parent / "portable_test"
+UPSWING = Path(os.environ.get("UPSWING", ROOT / "build/release/bin/upswing"))
+PROGRAM = UPSWING.parent / "portable_test"
 
 # Symbols that may be undefined, as nm prints them, and why. All others are refused: files (open,
 # fopen, stat, std::filesystem, std::ofstream), processes, sockets, MuJoCo (mj_…), protobuf,

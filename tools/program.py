@@ -12,7 +12,7 @@ import subprocess
 from pathlib import Path
 
 ROOT = Path(os.environ.get("UPSWING_ROOT", Path(__file__).resolve().parent.parent))
-UPSWING = Path(os.environ.get("UPSWING", ROOT / "build/release/apps/upswing"))
+UPSWING = Path(os.environ.get("UPSWING", ROOT / "build/release/bin/upswing"))
 
 # Commands of the launcher; the program only knows their names.
 LAUNCHER_COMMANDS = {"docs", "package", "python", "test"}

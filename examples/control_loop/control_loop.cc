@@ -6,11 +6,11 @@
 #include <iostream>
 #include <memory>
 
-#include "core/error.h"
-#include "core/text.h"
-#include "run/find_policy.h"
-#include "setup/loaded_policy.h"
-#include "sim/double_pendulum.h"
+#include "agents/loaded_policy.h"
+#include "base/error.h"
+#include "base/text.h"
+#include "pendulum/double_pendulum.h"
+#include "runs/find_policy.h"
 
 using namespace upswing;
 

@@ -5,10 +5,10 @@
 #include <cstdio>
 #include <vector>
 
-#include "core/env.h"
-#include "core/error.h"
-#include "core/rng.h"
-#include "core/thread_pool.h"
+#include "base/env.h"
+#include "base/error.h"
+#include "base/rng.h"
+#include "base/thread_pool.h"
 #include "rl/dqn.h"
 #include "rl/evaluate.h"
 #include "rl/trainer.h"

@@ -1,13 +1,13 @@
 // Trains the agent `fast` on the double pendulum, in memory, and evaluates it on 100 new starts.
 #include <cstdio>
 
-#include "core/error.h"
+#include "agents/config.h"
+#include "agents/task.h"
+#include "agents/training.h"
+#include "base/error.h"
 #include "mujoco/engines.h"
-#include "run/config_files.h"
-#include "run/this_host.h"
-#include "setup/config.h"
-#include "setup/task.h"
-#include "setup/training.h"
+#include "runs/config_files.h"
+#include "runs/this_host.h"
 
 using namespace upswing;
 

@@ -15,8 +15,8 @@
 #include <utility>
 #include <vector>
 
+#include "agents/loaded_policy.h"
 #include "judge/trial.h"
-#include "setup/loaded_policy.h"
 
 /// Shared parts of the extension module. Only the package's Python code (python/upswing) uses its
 /// classes and functions.

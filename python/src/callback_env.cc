@@ -6,9 +6,9 @@
 #include <cmath>
 #include <limits>
 
-#include "core/error.h"
-#include "core/rng.h"
-#include "core/text.h"
+#include "base/error.h"
+#include "base/rng.h"
+#include "base/text.h"
 #include "python/src/bindings.h"
 
 namespace upswing {
@@ -39,7 +39,7 @@ auto CallPython(const Call& call) -> decltype(call()) {
 }
 
 /// N environments that a function in Python steps. The function shares numpy arrays with this
-/// object: it reads the actions (N × A) and writes the other arrays. Letters as in core/env.h.
+/// object: it reads the actions (N × A) and writes the other arrays. Letters as in base/env.h.
 class CallbackEnv final : public VectorEnv {
  public:
   /// `make` is the function make(seeds, for_evaluation, arrays) in Python, which resets the

@@ -13,18 +13,18 @@
 #include <mutex>
 #include <optional>
 
-#include "core/error.h"
-#include "core/text.h"
-#include "io/machine.h"
+#include "agents/config_checks.h"
+#include "base/error.h"
+#include "base/text.h"
+#include "extras/view/offscreen.h"
+#include "extras/view/painter.h"
 #include "mujoco/engines.h"
-#include "mujoco/offscreen.h"
-#include "mujoco/painter.h"
+#include "os/machine.h"
+#include "pendulum/pendulum_env.h"
 #include "python/src/bindings.h"
 #include "rl/ppo_config.h"
 #include "rl/torque_levels.h"
-#include "run/config_files.h"
-#include "setup/config_checks.h"
-#include "sim/pendulum_env.h"
+#include "runs/config_files.h"
 
 namespace upswing {
 namespace {
@@ -75,7 +75,7 @@ PendulumEnvConfig EnvConfigOf(const Config& config, ThreadPool& pool) {
 }
 
 /// N environments stepped together. Concurrent calls wait for each other. Results stay at the same
-/// address, so that arrays can view them. Letters as in core/env.h; L torque levels.
+/// address, so that arrays can view them. Letters as in base/env.h; L torque levels.
 class Environments {
  public:
   /// `same_step`: the next episode begins in the step that ends an episode; else the following step

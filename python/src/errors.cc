@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <regex>
 
-#include "core/error.h"
-#include "core/text.h"
+#include "base/error.h"
+#include "base/text.h"
 #include "python/src/bindings.h"
 
 namespace upswing {

@@ -6,14 +6,14 @@
 #include <algorithm>
 #include <functional>
 
-#include "core/error.h"
-#include "core/text.h"
-#include "io/file.h"
-#include "io/machine.h"
+#include "agents/arguments.h"
+#include "base/error.h"
+#include "base/text.h"
 #include "judge/eval_report.h"
 #include "judge/map_command.h"
+#include "os/file.h"
+#include "os/machine.h"
 #include "python/src/bindings.h"
-#include "setup/arguments.h"
 
 namespace upswing {
 namespace {

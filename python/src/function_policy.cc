@@ -5,10 +5,10 @@
 #include <cmath>
 #include <utility>
 
-#include "core/error.h"
-#include "core/text.h"
+#include "base/error.h"
+#include "base/text.h"
+#include "pendulum/double_pendulum.h"
 #include "python/src/bindings.h"
-#include "sim/double_pendulum.h"
 
 namespace upswing {
 namespace {

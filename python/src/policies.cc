@@ -11,14 +11,14 @@
 #include <functional>
 #include <type_traits>
 
-#include "core/error.h"
-#include "core/safetensors.h"
-#include "core/text.h"
-#include "io/tensor_file.h"
+#include "agents/config.h"
+#include "agents/controllers.h"
+#include "base/error.h"
+#include "base/safetensors.h"
+#include "base/text.h"
 #include "python/src/bindings.h"
-#include "run/find_policy.h"
-#include "setup/config.h"
-#include "setup/controllers.h"
+#include "runs/find_policy.h"
+#include "runs/tensor_file.h"
 
 namespace upswing {
 namespace {

@@ -8,11 +8,11 @@
 #include <cmath>
 #include <string_view>
 
-#include "core/text.h"
+#include "agents/config.h"
+#include "agents/config_checks.h"
+#include "base/text.h"
 #include "python/src/bindings.h"
-#include "run/config_files.h"
-#include "setup/config.h"
-#include "setup/config_checks.h"
+#include "runs/config_files.h"
 
 namespace upswing {
 namespace {

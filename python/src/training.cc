@@ -9,16 +9,16 @@
 #include <memory>
 #include <string_view>
 
-#include "core/safetensors.h"
-#include "io/machine.h"
-#include "io/run_folder.h"
+#include "agents/config_checks.h"
+#include "base/safetensors.h"
+#include "os/machine.h"
 #include "python/src/bindings.h"
-#include "run/config_files.h"
-#include "run/find_policy.h"
-#include "run/run_rows.h"
-#include "run/this_host.h"
-#include "run/training_run.h"
-#include "setup/config_checks.h"
+#include "runs/config_files.h"
+#include "runs/find_policy.h"
+#include "runs/run_folder.h"
+#include "runs/run_rows.h"
+#include "runs/this_host.h"
+#include "runs/training_run.h"
 
 namespace upswing {
 namespace {

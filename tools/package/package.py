@@ -191,7 +191,7 @@ class Packager:
         installed = self.work / "manual"
         (installed / "share/upswing").mkdir(parents=True)
         (installed / "bin").mkdir()
-        program = shutil.copy2(TARGETS["x86-64"].build / "apps/upswing", installed / "bin")
+        program = shutil.copy2(TARGETS["x86-64"].build / "bin/upswing", installed / "bin")
         return output("help2man", "--no-info", "--name", "controllers for a double pendulum",
                       "--version-string", f"upswing {self.version}", program, env=self.environment)
 

@@ -2,7 +2,7 @@
 """Tests of the packages: the same bits twice, and a program that runs from a read-only folder with
 spaces, without HOME. Wheels take minutes to compile; the workflow that makes releases tests them.
 
-UPSWING names the program, of which the packages are made (see apps/testing.py). Needs the virtual
+UPSWING names the program, of which the packages are made (see src/cli/testing.py). Needs the virtual
 environment build/package/venv, which ./upswing package and ./upswing test make.
 """
 
@@ -20,7 +20,7 @@ import unittest
 from pathlib import Path
 
 ROOT = Path(os.environ.get("UPSWING_ROOT", Path(__file__).resolve().parent.parent.parent))
-sys.path.insert(0, str(ROOT / "apps"))
+sys.path.insert(0, str(ROOT / "src/cli"))
 from testing import UPSWING, read_tensors, small  # noqa: E402  pylint: disable=wrong-import-position
 
 FOLDER = Path(__file__).resolve().parent

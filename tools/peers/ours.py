@@ -12,7 +12,7 @@ import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-PROGRAM = Path(os.environ.get("UPSWING", ROOT / "build/release/apps/upswing"))
+PROGRAM = Path(os.environ.get("UPSWING", ROOT / "build/release/bin/upswing"))
 
 # Settings of both sides, besides width and batch.
 LEARNING_RATE = 5e-4

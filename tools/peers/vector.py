@@ -24,7 +24,7 @@ import gymnasium as gym
 import upswing  # noqa: F401  # pylint: disable=unused-import
 
 ROOT = Path(__file__).resolve().parents[2]
-PROGRAM = os.environ.get("UPSWING", ROOT / "build/release/apps/upswing")
+PROGRAM = os.environ.get("UPSWING", ROOT / "build/release/bin/upswing")
 ENVS = 1024
 GYMNASIUM = "MuJoCo's Python package, Gymnasium's SyncVectorEnv"
 

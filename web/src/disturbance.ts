@@ -2,7 +2,7 @@ import { CONTROL_PERIOD } from './pendulum';
 import type { Range, State } from './pendulum';
 
 /// Errors of sensors and motor; all zero: none. Those from `sensor_latency` on are as in
-/// sim/sensors.h.
+/// src/pendulum/sensors.h.
 export interface Disturbance {
   sensor_noise: number; // standard deviation, on each measured angle and velocity, rad and rad/s
   delay: number; // from the choice of a torque to its effect, in control periods

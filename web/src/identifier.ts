@@ -10,7 +10,7 @@ function numbers({ q1, q2, w1, w2 }: State): number[] {
 
 const forgotten = new FinalizationRegistry<() => void>((close) => close());
 
-/// The estimate of an unknown plant while it moves, as in sim/identification.h.
+/// The estimate of an unknown plant while it moves, as in src/pendulum/identification.h.
 export class Identifier {
   private readonly at: number;
 

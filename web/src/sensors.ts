@@ -11,7 +11,7 @@ export interface Reading {
 
 const forgotten = new FinalizationRegistry<() => void>((close) => close());
 
-/// Encoders, computed velocities and latency of one pendulum, as in sim/sensors.h.
+/// Encoders, computed velocities and latency of one pendulum, as in src/pendulum/sensors.h.
 export class Sensors {
   private readonly at: number;
 

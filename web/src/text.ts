@@ -18,7 +18,7 @@ export function quoted(text: string): string {
 }
 
 /// Whether `text` is one command line of `./upswing` in which each word is plain or quoted as the
-/// program quotes it (ShellQuoted in core/text.h), so that a shell runs nothing else when somebody
+/// program quotes it (ShellQuoted in src/base/text.h), so that a shell runs nothing else when somebody
 /// pastes it.
 export function isCommand(text: string): boolean {
   const word = /(?:[\w@%+=:,./-]|'[^'\p{C}\p{Zl}\p{Zp}]*'|\\')+/u.source;

@@ -16,7 +16,7 @@ function program(seed) {
   const folder = mkdtempSync(join(tmpdir(), 'upswing-'));
   const began = performance.now();
   const text = execFileSync(
-    process.env.UPSWING ?? '../build/release/apps/upswing',
+    process.env.UPSWING ?? '../build/release/bin/upswing',
     ['train', '--agent', 'fast', '--seed', String(seed), '--threads', '1'].concat([
       '--eval-physics',
       'closed-form',

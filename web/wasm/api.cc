@@ -5,14 +5,14 @@
 #include <limits>
 #include <numeric>
 
-#include "core/safetensors.h"
+#include "agents/controllers.h"
+#include "agents/loaded_policy.h"
+#include "base/safetensors.h"
 #include "nn/gaussian.h"
 #include "nn/network_policy.h"
+#include "pendulum/identification.h"
+#include "pendulum/sensors.h"
 #include "rl/softmax.h"
-#include "setup/controllers.h"
-#include "setup/loaded_policy.h"
-#include "sim/identification.h"
-#include "sim/sensors.h"
 #include "web/wasm/learner.h"
 #include "web/wasm/step.h"
 
@@ -180,7 +180,7 @@ UPSWING_EXPORT(policy_open) Controller* PolicyOpen(const std::byte* file, size_t
   });
 }
 
-/// The controller of this name (setup/controllers.h), made for the nominal plant. Leaves what it
+/// The controller of this name (agents/controllers.h), made for the nominal plant. Leaves what it
 /// is.
 UPSWING_EXPORT(policy_make) Controller* PolicyMake(const char* name, size_t size) {
   return Guarded([&] {

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Compiles core, nn, sim, rl, control and setup to WebAssembly, for the page.
+"""Compiles base, nn, pendulum, rl, control and agents to WebAssembly, for the page.
 
     build.py [MODULE]     writes MODULE, by default core.wasm beside this file, and a record of what it
                           was made of, by default core.txt
@@ -21,6 +21,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
+SOURCE = ROOT / "src"
 DEPS = ROOT / "build/deps"
 WORK = ROOT / "build/wasm"
 
@@ -40,9 +41,9 @@ TARGET = ["-target", "wasm32-wasi", "-mcpu=generic+simd128+exception_handling+bu
 MEMORY = 512 << 20  # bytes at most; see learner.cc
 STACK = 1 << 20
 
-LAYERS = ["core", "nn", "sim", "rl", "control", "setup"]
+LAYERS = ["base", "nn", "pendulum", "rl", "control", "agents"]
 # Where the time of a training goes is made fast, everything else small.
-FAST = ["nn/linear", "nn/product", "sim/closed_form", "control/trajectory", "control/pendulum_model", "rl/replay", "rl/sum_tree", "rl/n_step",
+FAST = ["nn/linear", "nn/product", "pendulum/closed_form", "control/trajectory", "control/pendulum_model", "rl/replay", "rl/sum_tree", "rl/n_step",
         "rl/sac_update"]
 
 # Of LLVM's libraries, what the module asks for.
@@ -64,7 +65,7 @@ def include(*folders):
 
 
 def own_sources():
-    sources = [path for layer in LAYERS for path in sorted((ROOT / layer).glob("*.cc"))
+    sources = [path for layer in LAYERS for path in sorted((SOURCE / layer).glob("*.cc"))
                if not path.stem.endswith(("_test", "_bench")) and path.name != "thread_pool.cc"]
     return sources + sorted(HERE.glob("*.cc"))
 
@@ -73,7 +74,7 @@ def named_agents():
     """What CMake makes of configs/*.toml."""
     entries = "".join(f'    {{"{path.stem}", R"toml({path.read_text(encoding="utf-8")})toml"}},\n'
                       for path in sorted((ROOT / "configs").glob("*.toml")))
-    template = (ROOT / "setup/named_agents.cc.in").read_text(encoding="utf-8")
+    template = (ROOT / "src/agents/named_agents.cc.in").read_text(encoding="utf-8")
     return template.replace("@AGENT_ENTRIES@", entries)
 
 
@@ -108,7 +109,7 @@ def included(sources):
             continue
         found.add(path)
         for name in re.findall(r'^\s*#\s*include "([^"]+)"', path.read_text(encoding="utf-8"), re.M):
-            left += [header for header in (ROOT / name, path.parent / name) if header.is_file()][:1]
+            left += [header for header in (SOURCE / name, ROOT / name, path.parent / name) if header.is_file()][:1]
     return sorted(found)
 
 
@@ -116,7 +117,7 @@ def sources_hash():
     """SHA-256 of all that the module is made of: sources, headers, the named agents, the pinned versions
     and this file, which holds the flags."""
     text = hashlib.sha256()
-    for path in [*included([*own_sources(), ROOT / "setup/named_agents.cc.in"]),
+    for path in [*included([*own_sources(), ROOT / "src/agents/named_agents.cc.in"]),
                  *sorted((ROOT / "configs").glob("*.toml")), Path(__file__).resolve()]:
         data = path.read_bytes()
         text.update(f"{path.relative_to(ROOT)} {len(data)}\n".encode() + data)
@@ -183,7 +184,7 @@ def jobs():
     # is not linked.
     own = ["-std=c++20", "-Wall", "-Wextra", "-Wpedantic", "-ffp-contract=off",
            "-DTOML_FLOAT_CHARCONV=1", f'-DUPSWING_VERSION="{project_version()}"',
-           "-U_LIBCPP_HAS_FILESYSTEM", "-D_LIBCPP_HAS_FILESYSTEM=1", *include(ROOT),
+           "-U_LIBCPP_HAS_FILESYSTEM", "-D_LIBCPP_HAS_FILESYSTEM=1", *include(SOURCE, ROOT),
            *(f"-isystem{folder}" for folder in (headers, HIGHWAY))]
     for source in [*own_sources(), agents]:
         yield source, [*own, "-O3" if f"{source.parent.name}/{source.stem}" in FAST else "-Oz"]

@@ -35,7 +35,7 @@ class Module(unittest.TestCase):
 
     def test_every_source_and_header_counts(self):
         names = {str(path.relative_to(build.ROOT)) for path in build.included(build.own_sources())}
-        self.assertLessEqual({"web/wasm/api.cc", "nn/linear.cc", "nn/linear.h", "rl/agent.h"}, names)
+        self.assertLessEqual({"web/wasm/api.cc", "src/nn/linear.cc", "src/nn/linear.h", "src/rl/agent.h"}, names)
         with tempfile.TemporaryDirectory(prefix="upswing-") as name:
             folder = Path(name)
             (folder / "a.cc").write_text('#include "b.h"\n', encoding="utf-8")

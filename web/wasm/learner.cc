@@ -1,8 +1,8 @@
 #include "web/wasm/learner.h"
 
-#include "core/error.h"
-#include "core/safetensors.h"
-#include "core/text.h"
+#include "base/error.h"
+#include "base/safetensors.h"
+#include "base/text.h"
 
 namespace upswing {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "setup/training.h"
+#include "agents/training.h"
 
 namespace upswing {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "sim/double_pendulum.h"
+#include "pendulum/double_pendulum.h"
 
 namespace upswing {
 

@@ -1,5 +1,5 @@
 // The thread pool where there is one thread: a page's workers share nothing.
-#include "core/thread_pool.h"
+#include "base/thread_pool.h"
 
 namespace upswing {
 

@@ -1,0 +1,61 @@
+/* A network for the double pendulum: pendulum/double_pendulum.h in C. */
+#include "network.c"
+
+/* The observation of these angles and velocities. */
+static inline void policy_observe(policy_state *state, float q1, float q2, float w1, float w2,
+                                  float *observation) {
+  const float *k = policy_energy;
+  const float c1 = cosf(q1), s1 = sinf(q1), c2 = cosf(q2), s2 = sinf(q2);
+  const float c12 = c1 * c2 - s1 * s2; /* cos(q1 + q2) */
+  const float w12 = w1 + w2;
+#ifdef POLICY_MEMORY_SIZE
+  int i;
+#endif
+  observation[0] = c1;
+  observation[1] = s1;
+  observation[2] = w1 / 10.0f;
+  observation[3] = c2;
+  observation[4] = s2;
+  observation[5] = w2 / 20.0f;
+  /* Kinetic and potential energy: 0 hanging at rest, 1 upright at rest. */
+  observation[6] =
+      0.5f + k[0] * w1 * w1 + k[1] * w12 * w12 + k[2] * c2 * w1 * w12 + k[3] * c1 + k[4] * c12;
+  /* Height of the tip over the pivot, -1 to 1. */
+  observation[7] = -k[5] * c1 - k[6] * c12;
+#ifdef POLICY_MEMORY_SIZE
+  /* What the past steps did, the latest first. */
+  if (state->running) {
+    for (i = POLICY_MEMORY_SIZE - 1; i >= 3; i--) state->memory[i] = state->memory[i - 3];
+    state->memory[0] = (w1 - state->w1) / 1.0f;
+    state->memory[1] = (w2 - state->w2) / 1.0f;
+    state->memory[2] = state->torque / 5.0f;
+  }
+  for (i = 0; i < POLICY_MEMORY_SIZE; i++) observation[8 + i] = state->memory[i];
+  state->running = 1;
+  state->w1 = w1;
+  state->w2 = w2;
+#else
+  (void)state;
+#endif
+}
+
+static inline void policy_observe_sample(policy_state *state, const float *x, float *observation) {
+  policy_observe(state, x[0], x[1], x[2], x[3], observation);
+}
+
+/* The torque for these angles and velocities, to be called every POLICY_PERIOD seconds. */
+static inline policy_status policy_control(policy_state *state, float q1, float q2, float w1,
+                                           float w2, float *torque) {
+  float observation[POLICY_OBSERVATION_SIZE];
+  policy_status status;
+  if (!torque) return POLICY_NULL_POINTER;
+  *torque = 0.0f;
+  if (!state) return POLICY_NULL_POINTER;
+  policy_observe(state, q1, q2, w1, w2, observation);
+  status = policy_control_observation(observation, torque);
+  state->torque = *torque;
+  if (status != POLICY_OK) policy_init(state);
+  return status;
+}
+
+#include "network_test.c"

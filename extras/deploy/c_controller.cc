@@ -1,0 +1,232 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "agents/controllers.h"
+#include "base/error.h"
+#include "base/rng.h"
+#include "base/text.h"
+#include "control/tvlqr.h"
+#include "extras/deploy/c_header.h"
+#include "extras/deploy/c_text.h"
+#include "pendulum/closed_form.h"
+
+namespace upswing {
+namespace {
+
+constexpr int kLawSamples = 16;
+constexpr int kDrawsOfEach = 1000;     // per kind of state
+constexpr double kTorqueShare = 5e-4;  // tolerance of a sample's torque, as a share of the limit
+constexpr double kNearby = 1e-3;       // rad, rad/s: no jump of the torque this close to a sample
+const StateVector kRange(3.14, 3.14, 4, 4);  // ± range of samples, rad, rad/s
+constexpr double kUprightShare = 0.005;      // largest share of kRange about upright
+
+/// The settings that the controller was made with.
+ControllerConfig ConfigOf(const LoadedPolicy& loaded) {
+  ControllerConfig config;
+  config.plant = loaded.plant;
+  ApplyToml(OptionsOf(config), loaded.policy->info().config, loaded.name);
+  return config;
+}
+
+std::vector<float> Floats(const auto& numbers) {
+  std::vector<float> floats;
+  floats.reserve(static_cast<size_t>(numbers.size()));
+  for (const double number : numbers) floats.push_back(static_cast<float>(number));
+  return floats;
+}
+
+/// The upper triangle of P, row by row.
+std::vector<double> Triangle(const Eigen::Matrix4d& P) {
+  std::vector<double> numbers;
+  for (int i = 0; i < 4; ++i) {
+    for (int k = i; k < 4; ++k) numbers.push_back(P(i, k));
+  }
+  return numbers;
+}
+
+/// The first torque of an episode that begins in a state.
+double TorqueAt(const LoadedPolicy& loaded, const StateVector& x) {
+  const auto seen = Observe(loaded.plant, {x[0], x[1], x[2], x[3]});
+  const std::vector<float> obs(seen.begin(), seen.end());
+  double torque = 0;
+  loaded.policy->Act({obs.data(), 1, static_cast<int>(obs.size())}, {&torque, 1, 1},
+                     *loaded.policy->Start(1));
+  return torque;
+}
+
+/// Whether the torque jumps by `least` or more around a state; rounding would decide there.
+bool Jumps(const LoadedPolicy& loaded, const StateVector& x, double least) {
+  const double here = TorqueAt(loaded, x);
+  for (int k = 0; k < 4; ++k) {
+    const StateVector step = kNearby * StateVector::Unit(k);
+    // The second difference, which is 0 for any linear law, however steep.
+    const double bend = TorqueAt(loaded, x - step) - 2 * here + TorqueAt(loaded, x + step);
+    if (std::abs(bend) >= least) return true;
+  }
+  return false;
+}
+
+/// A random state of floats: anywhere, or so close to upright that the torque stays within its
+/// limit.
+StateVector DrawState(const LoadedPolicy& loaded, Rng& rng, bool upright) {
+  StateVector x;
+  for (int k = 0; k < 4; ++k) x[k] = rng.Uniform(-1, 1) * kRange[k];
+  const auto rounded = [](const StateVector& exact) {
+    return StateVector(exact.cast<float>().cast<double>());
+  };
+  if (!upright) return rounded(x);
+  StateVector lean = kUprightShare * x;
+  while (std::abs(TorqueAt(loaded, FromUpright(lean))) >= loaded.plant.torque_limit) lean /= 2;
+  return rounded(FromUpright(lean));
+}
+
+/// Draws states, every other one near upright, and their torques. No state is near a jump.
+void DrawSamples(const LoadedPolicy& loaded, double tolerance, std::vector<float>& states,
+                 std::vector<float>& torques) {
+  Rng rng(0, "samples of a controller's C header");
+  for (int i = 0; i < kLawSamples; ++i) {
+    const bool upright = i % 2 == 0;
+    StateVector x = DrawState(loaded, rng, upright);
+    for (int draw = 1; Jumps(loaded, x, tolerance / 2); ++draw) {
+      if (draw == kDrawsOfEach) {
+        throw BadInput(Concat(loaded.name,
+                              ": found no states for the header's self-test where the ",
+                              "torque is smooth enough"));
+      }
+      x = DrawState(loaded, rng, upright);
+    }
+    for (const double number : x) states.push_back(static_cast<float>(number));
+    torques.push_back(static_cast<float>(TorqueAt(loaded, x)));
+  }
+}
+
+/// The deviations from upright one control period after the samples.
+std::vector<float> StepsFrom(const std::vector<float>& states, const std::vector<float>& torques,
+                             const Plant& plant) {
+  PendulumModel model(plant);
+  std::vector<float> steps;
+  for (size_t i = 0; i < torques.size(); ++i) {
+    const float* s = states.data() + 4 * i;
+    const StateVector x(s[0], s[1], s[2], s[3]);
+    StateVector next = x;
+    const double torque = torques[i];
+    model.Step({&next, 1}, {&torque, 1});
+    for (const double number : StateVector(UprightDeviation(x) + next - x)) {
+      steps.push_back(static_cast<float>(number));
+    }
+  }
+  return steps;
+}
+
+/// Adds the tables with which extras/deploy/c/catch.c simulates.
+void AddCatch(const LoadedPolicy& loaded, const LqrCatch& upright, CParts& parts) {
+  const Plant& plant = loaded.plant;
+  if (plant.coulomb1 != 0 || plant.coulomb2 != 0) {
+    throw BadInput(Concat(loaded.name,
+                          ": expected a plant without dry friction (coulomb1 and coulomb2 ",
+                          "0), which the C code does not model"));
+  }
+  ClosedFormBatch batch(1);
+  batch.SetPlant(0, plant);
+  parts.constants.push_back(
+      {"plant", "of the equations of motion",
+       Floats(std::array{batch.J1[0], batch.J2[0], batch.b[0], batch.G1[0], batch.G2[0],
+                         batch.d1[0], batch.d2[0], batch.a[0]})});
+  parts.constants.push_back(
+      {"upright_cost", "of a deviation from upright", Floats(Triangle(upright.lqr().P))});
+  parts.constants.push_back({"region", "of attraction", Floats(std::array{upright.region()})});
+  parts.macros.emplace_back("LOOK_AHEAD", Concat(upright.steps(), " /* control periods */"));
+  parts.macros.emplace_back("ACTUATED_JOINT", Concat(plant.actuated_joint));
+}
+
+void AddPlan(const SwingUp& plan, CParts& parts) {
+  const int steps = plan.trajectory.steps();
+  std::vector<double> places, gains, costs;
+  for (size_t t = 0; t < static_cast<size_t>(steps); ++t) {
+    const StateVector d = UprightDeviation(plan.trajectory.x[t]);
+    places.insert(places.end(), d.begin(), d.end());
+    gains.insert(gains.end(), plan.K[t].begin(), plan.K[t].end());
+    const std::vector<double> cost = Triangle(plan.P[t]);
+    costs.insert(costs.end(), cost.begin(), cost.end());
+  }
+  parts.constants.push_back({"plan", "deviations from upright", Floats(places)});
+  parts.constants.push_back({"plan_torque", "N m", Floats(plan.trajectory.u)});
+  parts.constants.push_back({"plan_gain", "N m/rad, N m s/rad", Floats(gains)});
+  parts.constants.push_back({"plan_cost", "of leaving the plan", Floats(costs)});
+  parts.macros.emplace_back("PLAN_STEPS", Concat(steps, " /* control periods */"));
+  parts.work += Concat(", and ", 2 * steps, " quadratic forms");
+}
+
+}  // namespace
+
+CHeader ControllerHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
+  const std::string kind = loaded.policy->kind();
+  for (const auto& [refused, what] :
+       {std::pair{"mpc",
+                  "a controller that optimises a trajectory at each decision; tvlqr follows one "
+                  "that is planned once"},
+        {"hybrid", "two of them; export the policy that swings up, and lqr, each by itself"}}) {
+    if (kind != refused) continue;
+    throw BadInput(
+        Concat(kind, ": expected lqr, energy, pfl, tvlqr or a learned policy for C, got ", what));
+  }
+  const ControllerConfig config = ConfigOf(loaded);
+  const double limit = config.plant.torque_limit, tolerance = kTorqueShare * limit;
+  const bool simulates = kind != "lqr";
+  CHeader header;
+  header.prefix = prefix;
+  header.state_bytes = kind == "tvlqr" ? 12 : 4;
+  // The deviation; a simulating controller also copies it, and needs five arrays for a step.
+  header.stack_bytes = 4 * sizeof(float) * (simulates ? 7 : 1);
+  CParts parts;
+  parts.task = PendulumTask(config.plant.actuated_joint, 0);
+  parts.task.file = kind == "lqr" || kind == "tvlqr" ? kind + ".c" : "swing_up.c";
+  if (!simulates) parts.task.goal = "holds a double pendulum with one motor upright";
+  parts.origin =
+      Concat("It is ", CommentText(loaded.name), ": ", CommentText(loaded.policy->description()));
+  parts.limit = limit;
+  parts.period = kControlPeriod;
+  parts.plant = "of which it knows all";
+  parts.made_for = config.plant;
+  parts.work = "a product of four numbers.";
+  const auto gain = [&](const Lqr& lqr) {
+    parts.constants.push_back({"gain", "N m/rad, N m s/rad", Floats(lqr.K)});
+  };
+  if (simulates) {
+    const LqrCatch upright(config.lqr, config.plant);
+    gain(upright.lqr());
+    AddCatch(loaded, upright, parts);
+    parts.work = Concat("up to ", upright.steps(),
+                        " control periods of simulation near upright, of 16 derivatives each");
+    if (kind == "tvlqr") {
+      AddPlan(dynamic_cast<const TvlqrPolicy&>(*loaded.policy).plan(), parts);
+    } else {
+      const bool energy = kind == "energy";
+      const std::vector<double> gains =
+          energy ? std::vector{config.energy.kP, config.energy.kD, config.energy.kE}
+                 : std::vector{config.pfl.kP, config.pfl.kD, config.pfl.kE};
+      parts.constants.push_back({"law_gains", "of angle, velocity and energy", Floats(gains)});
+      parts.macros.emplace_back(
+          "LAW", energy ? "'e' /* energy shaping */" : "'p' /* partial feedback linearisation */");
+    }
+    parts.work += "; away from upright none of the simulation.";
+  } else {
+    gain(SolveLqr(config.lqr, config.plant));
+  }
+
+  std::vector<float> states, torques;
+  DrawSamples(loaded, tolerance, states, torques);
+  parts.samples = {{"sample_states", "q1, q2, w1, w2", states}, {"sample_torques", "N m", torques}};
+  if (simulates) {
+    parts.samples.push_back({"sample_steps", "deviations a control period later",
+                             StepsFrom(states, torques, config.plant)});
+  }
+  parts.macros.emplace_back("SAMPLES", Concat(kLawSamples));
+  parts.macros.emplace_back("TORQUE_TOLERANCE", CLiteral(static_cast<float>(tolerance)));
+  WriteHeader(parts, header);
+  return header;
+}
+
+}  // namespace upswing

@@ -1,0 +1,161 @@
+#include "extras/deploy/c_header.h"
+
+#include <algorithm>
+#include <bit>
+
+#include "base/text.h"
+#include "extras/deploy/c_text.h"
+
+namespace upswing {
+namespace {
+
+std::string_view FileNamed(std::string_view name) {
+  const auto files = EmbeddedCFiles();
+  return std::ranges::find(files, name, &CFile::name)->text;
+}
+
+/// The text of a file with its includes inserted. Leaves out tables.h, which stands for the
+/// header's beginning.
+std::string Expanded(std::string_view name) {
+  constexpr std::string_view kInclude = "#include \"";
+  std::string text;
+  for (std::string_view line : Split(FileNamed(name), '\n')) {
+    if (!line.starts_with(kInclude)) {
+      text += Concat(line, '\n');
+      continue;
+    }
+    line.remove_prefix(kInclude.size());
+    line.remove_suffix(1);
+    if (line != "tables.h") text += Expanded(line);
+  }
+  return text.substr(0, text.find_last_not_of('\n') + 1) + '\n';
+}
+
+std::string ArrayText(const CArray& array, const std::string& prefix) {
+  std::vector<std::string> words;
+  for (const float value : array.values) words.push_back(CLiteral(value) + ",");
+  words.back().back() = '}';
+  words.back() += ';';
+  const std::string comment = array.comment.empty() ? "" : Concat(" /* ", array.comment, " */");
+  return Concat("static const float ", prefix, '_', array.name, '[', array.values.size(), "] = {",
+                comment, "\n  ", Wrapped(words, "  ", 2), "\n");
+}
+
+/// The C text of the constant arrays, in order, with the list that the checksum uses.
+std::string TablesText(const std::vector<CArray>& arrays, const std::string& prefix) {
+  std::string text = "static const struct {\n  const float *values;\n  long count;\n} ";
+  text += Concat(prefix, "_tables[", arrays.size(), "] = {\n");
+  for (const CArray& array : arrays) {
+    text += Concat("  {", prefix, '_', array.name, ", ", array.values.size(), "L},\n");
+  }
+  return text + "};\n";
+}
+
+/// The checksum (FNV-1a) of these arrays, as checksum_of_all in extras/deploy/c/numbers.c computes
+/// it.
+uint32_t ChecksumOf(const std::vector<CArray>& arrays) {
+  uint32_t sum = 2166136261U;
+  for (const CArray& array : arrays) {
+    for (const float value : array.values) {
+      sum = (sum ^ std::bit_cast<uint32_t>(value)) * 16777619U;
+    }
+  }
+  return sum;
+}
+
+std::string PlantParagraph(const CParts& parts) {
+  if (parts.plant.empty()) return "";
+  std::vector<std::string> values;
+  for (const auto& [name, value] : PlantValues(parts.made_for)) {
+    values.push_back(Concat(name, ' ', FormatNumber(value)));
+  }
+  return Paragraph(Concat("Made for this plant (kg, m, N m s/rad, m/s2, N m), ", parts.plant, ": ",
+                          Join(values, ", "), '.')) +
+         "\n *\n";
+}
+
+/// What goes in and out of a policy of a foreign task.
+std::string ForeignInputs(const CParts& parts, const std::string& caps) {
+  return Concat(" * In: the observation (", caps,
+                "_OBSERVATION_SIZE), as the environment gives it.\n",
+                " * Out: the action, within +-", FormatNumber(parts.limit), ".\n *\n");
+}
+
+/// What goes in and out of a policy of a pendulum. `states` are the lines of its state.
+std::string PendulumInputs(const CParts& parts, const std::string& states) {
+  return Concat(" * In, in this order; an angle may have made any number of turns:\n", states,
+                " * Out: the torque ", parts.task.motor, ", N m, within +-",
+                FormatNumber(parts.limit), ", to be held for ", FormatNumber(parts.period),
+                R"c( s. A positive one
+ * pushes the joint's angle up. Which way round counts as positive does not matter, as long as it is
+ * the same for all of these.
+ *
+)c");
+}
+
+std::string HeadComment(const CParts& parts, const CHeader& header) {
+  const std::string &name = header.prefix, caps = UpperCase(name);
+  const std::string period = FormatNumber(parts.period);
+  const bool foreign = parts.task.state.empty();
+  std::string states;
+  std::vector<std::string> names;
+  for (const NamedInput& input : parts.task.state) {
+    names.push_back(input.name);
+    states +=
+        Concat(" *   ", input.name, std::string(8 - input.name.size(), ' '), input.meaning, '\n');
+  }
+  const std::string comment = Concat(
+      "/* A policy that ", foreign ? CommentText(parts.task.goal) : parts.task.goal,
+      ", as one C99 header.\n *\n",
+      Paragraph(Concat(parts.origin, ". Written by Upswing ", UPSWING_VERSION, '.')),
+      "\n *\n *   static ", name, "_state state;\n *   float torque;\n *   if (", name,
+      "_selftest() != ", caps, "_OK) stop();\n *   ", name,
+      "_init(&state);   before the first step, and after any pause\n *   for (;;) {   every ",
+      foreign ? "step" : period + " s", "\n *     ", name, "_control(&state, ",
+      foreign ? "observation" : Join(names, ", "), ", &torque);\n *     ",
+      foreign ? "act" : "set_motor", "(torque);\n *   }\n *\n",
+      foreign ? ForeignInputs(parts, caps) : PendulumInputs(parts, states), PlantParagraph(parts),
+      R"c( * What is not finite, and null pointers, the status tells: the torque is then 0, and what was
+ * remembered is forgotten, as after )c",
+      name, "_init.\n *\n",
+      Paragraph(Concat("Flash: ", header.constant_bytes,
+                       " bytes of constants, 1 to 3 KB of code, and up to 1 KB of samples where "
+                       "the self test is used. RAM: ",
+                       header.state_bytes, " bytes of state, and arrays of ", header.stack_bytes,
+                       " bytes on the stack in a call. Work of a call: ", parts.work)),
+      "\n *\n * All arithmetic is in float. Nothing is allocated, and nothing is static but "
+      "constants. */\n");
+  return foreign ? Replaced(comment, "torque", "action") : comment;
+}
+
+}  // namespace
+
+void WriteHeader(const CParts& parts, CHeader& header) {
+  for (const CArray& array : parts.constants) header.constant_bytes += 4 * array.values.size();
+  const std::string &name = header.prefix, caps = UpperCase(name);
+  std::string& text = header.text;
+  text = Concat(HeadComment(parts, header), "#ifndef UPSWING_", caps, "_H\n#define UPSWING_", caps,
+                "_H\n\n#include <math.h>\n#include <stdint.h>\n\n");
+  const auto define = [&](const std::string& macro, const std::string& value) {
+    text += Concat("#define ", caps, '_', macro, ' ', value, '\n');
+  };
+  const auto number = [](double value) { return CLiteral(static_cast<float>(value)); };
+  define("PERIOD", number(parts.period) + " /* s, between two calls */");
+  define("TORQUE_LIMIT",
+         number(parts.limit) + (parts.task.state.empty() ? " /* no action is beyond it */"
+                                                         : " /* N m, no torque is beyond it */"));
+  define("CONSTANT_BYTES", Concat(header.constant_bytes, 'L'));
+  for (const auto& [macro, value] : parts.macros) define(macro, value);
+  define("TABLES", Concat(parts.constants.size()));
+  define("CHECKSUM", Concat(ChecksumOf(parts.constants), "u /* of the tables */"));
+  text += '\n';
+  for (const CArray& array : parts.constants) text += ArrayText(array, name);
+  text += parts.layers + TablesText(parts.constants, name);
+  text += "/* Samples: states, one after the other, and what Upswing makes of them. */\n";
+  for (const CArray& array : parts.samples) text += ArrayText(array, name);
+  // Files in extras/deploy/c use the prefix "policy".
+  const std::string code = Replaced(Expanded(parts.task.file), "policy_", name + "_");
+  text += Concat('\n', Replaced(code, "POLICY_", caps + "_"), "\n#endif\n");
+}
+
+}  // namespace upswing

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "extras/deploy/export.h"
+#include "extras/deploy/exported_policy.h"
+
+/// C headers: a comment, macros and tables, and a file of extras/deploy/c with the files that it
+/// includes.
+namespace upswing {
+
+/// A file of extras/deploy/c, embedded by CMake.
+struct CFile {
+  std::string_view name, text;
+};
+std::span<const CFile> EmbeddedCFiles();
+
+/// An array of constants.
+struct CArray {
+  std::string name, comment;
+  std::vector<float> values;
+};
+
+/// The parts of a C header. Names of macros and arrays lack the prefix.
+struct CParts {
+  ExportedTask task;   // its state gives the arguments of the control function
+  std::string origin;  // origin of the policy
+  double limit = 0;    // N m
+  double period = 0;   // s
+  std::string plant;   // what the policy takes from `made_for`; empty: nothing
+  Plant made_for;
+  std::string work;  // work of a call
+  /// Name, and value with a comment.
+  std::vector<std::pair<std::string, std::string>> macros;
+  std::vector<CArray> constants;  // covered by the checksum
+  std::string layers;             // definition of the table of layers, if there is one
+  std::vector<CArray> samples;    // for the self-test
+};
+
+/// Samples for a C header's self-test: states one control period apart, with the policy's results.
+/// S state variables, O outputs of the network.
+struct CSamples {
+  int count = 0;
+  std::vector<float> states, outputs, torques;       // (count × S), (count × O), (count)
+  float output_tolerance = 0, torque_tolerance = 0;  // for other rounding
+};
+
+/// Draws the samples, the same in every call. `layers` are the layers of the header's network.
+CSamples DrawSamples(const ExportedPolicy& policy, const std::vector<LayerView>& layers);
+
+/// The C header of a controller: lqr, energy, pfl or tvlqr. CHeaderOf checks the prefix. Throws
+/// BadInput for other policies.
+CHeader ControllerHeaderOf(const LoadedPolicy& loaded, const std::string& prefix);
+
+/// Writes `text` and the number of constants. `header` already has the sizes in RAM and the prefix.
+void WriteHeader(const CParts& parts, CHeader& header);
+
+}  // namespace upswing

@@ -1,0 +1,137 @@
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <numbers>
+
+#include "base/error.h"
+#include "base/rng.h"
+#include "base/text.h"
+#include "extras/deploy/c_header.h"
+
+namespace upswing {
+namespace {
+
+constexpr int kSamples = 16;
+constexpr int kMostDraws = 200;      // of all samples
+constexpr double kTolerance = 1e-4;  // relative to the largest output
+constexpr double kMostFloat = std::numeric_limits<float>::max();
+
+/// The layers' output for an observation, in double precision.
+std::vector<double> Evaluate(const std::vector<LayerView>& layers, std::span<const float> obs) {
+  std::vector<double> x(obs.begin(), obs.end());
+  for (const LayerView& layer : layers) {
+    std::vector<double> y(layer.b.begin(), layer.b.end());
+    for (int i = 0; i < layer.out(); ++i) {
+      for (int j = 0; j < layer.in(); ++j) y[i] += double{layer.W(j, i)} * x[j];
+    }
+    if (layer.layer_norm()) {
+      double mean = 0, square = 0;
+      for (const double value : y) mean += value / layer.out();
+      for (const double value : y) square += (value - mean) * (value - mean) / layer.out();
+      for (size_t i = 0; i < y.size(); ++i) {
+        y[i] = (y[i] - mean) / std::sqrt(square + double{kLayerNormEpsilon}) * layer.gain[i] +
+               layer.norm_bias[i];
+      }
+    }
+    for (double& value : y) {
+      if (layer.activation == Activation::kRelu) value = std::max(value, 0.0);
+      if (layer.activation == Activation::kTanh) value = std::tanh(value);
+    }
+    x = std::move(y);
+  }
+  return x;
+}
+
+/// Observations of the samples' states, each with a memory of the earlier ones.
+class Observer {
+ public:
+  explicit Observer(const ExportedPolicy& policy) : policy_(policy) {
+    if (policy.is_foreign()) return;
+    EnvConfig config;
+    config.task = policy.loaded->task;
+    config.plants = {policy.loaded->plant};
+    env_ = MakeEnv(config);
+  }
+
+  /// The observation of a state (S) that consists of floats.
+  std::vector<float> Observe(std::span<const double> s) const {
+    if (policy_.is_foreign()) return {s.begin(), s.end()};
+    env_->SetState(0, s);
+    const auto now = env_->obs().row(0);
+    std::vector<float> obs(now.begin(), now.end());
+    obs.resize(static_cast<size_t>(policy_.obs_size()));
+    const int steps = policy_.loaded->memory();
+    if (steps > 0 && !before_.empty()) upswing::Remember(before_, torque_, steps, obs);
+    return obs;
+  }
+
+  /// Records the torque that the policy chose at this observation.
+  void Remember(std::span<const float> obs, double torque) {
+    before_.assign(obs.begin(), obs.end());
+    torque_ = torque;
+  }
+
+ private:
+  const ExportedPolicy& policy_;
+  std::unique_ptr<VectorEnv> env_;  // without memory; none for a foreign task
+  std::vector<float> before_;       // (D) previous observation; empty: none
+  double torque_ = 0;               // torque chosen at it
+};
+
+/// Whether rounding cannot change which output is the largest.
+bool IsClear(std::vector<double> outputs) {
+  std::ranges::sort(outputs, std::greater());
+  return outputs.size() == 1 || outputs[0] - outputs[1] > 10 * kTolerance * LargestSize(outputs);
+}
+
+}  // namespace
+
+CSamples DrawSamples(const ExportedPolicy& policy, const std::vector<LayerView>& layers) {
+  constexpr double kPi = std::numbers::pi, kVelocity = 4;  // rad/s
+  CSamples samples;
+  samples.count = kSamples;
+  Observer observer(policy);
+  Rng rng(0, "samples of a C header");
+  const auto memory = policy.loaded->policy->Start(1);
+  double largest = 0;
+  bool all_clear = true;
+  int draws = 0;
+  for (int i = 0; i < kSamples; ++i) {
+    std::vector<double> state(policy.spec.state_names.size()), outputs;
+    std::vector<float> obs;
+    do {
+      for (size_t k = 0; k < state.size(); ++k) {
+        // Angles come first, then equally many velocities; values are rounded to float.
+        const double bound = k < state.size() / 2 ? kPi : kVelocity;
+        state[k] = static_cast<float>(rng.Uniform(-bound, bound) * 0.999);
+      }
+      obs = observer.Observe(state);
+      outputs = Evaluate(layers, obs);
+    } while (!IsClear(outputs) && ++draws < kMostDraws);
+    for (const double output : outputs) {
+      if (std::abs(output) < kMostFloat) continue;
+      throw BadInput(Concat(policy.loaded->path,
+                            ": expected outputs within the range of float, got ", output));
+    }
+    all_clear = all_clear && IsClear(outputs);
+    double torque = 0;
+    policy.loaded->policy->Act({obs.data(), 1, policy.obs_size()}, {&torque, 1, 1}, *memory);
+    observer.Remember(obs, torque);
+    samples.states.insert(samples.states.end(), state.begin(), state.end());
+    samples.outputs.insert(samples.outputs.end(), outputs.begin(), outputs.end());
+    samples.torques.push_back(static_cast<float>(torque));
+    largest = std::max(largest, LargestSize(outputs));
+  }
+  // If all outputs are nearly equal, the policy may choose any of its torques.
+  const double of_limit = all_clear ? kTolerance * std::max(1.0, largest) : 2;
+  const auto tolerance = [](double size) {
+    return static_cast<float>(std::min(size + 1e-30, kMostFloat));
+  };
+  samples.output_tolerance = tolerance(kTolerance * largest);
+  samples.torque_tolerance = tolerance(policy.limit * of_limit);
+  return samples;
+}
+
+}  // namespace upswing

@@ -1,0 +1,154 @@
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "base/text.h"
+#include "cli/commands.h"
+#include "cli/signals.h"
+#include "extras/deploy/export.h"
+#include "extras/deploy/web_server.h"
+#include "os/command.h"
+#include "os/file.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kAgents = "agents";  // the page's folder of policies
+
+struct DemoArguments {
+  std::vector<std::string> policies;
+  int64_t port = 0;  // 0: not given
+  std::string dist;
+};
+
+/// The folder of the built page: UPSWING_PAGE, else that of an installed program. Throws Failure.
+fs::path PageFolder() {
+  const char* given = std::getenv("UPSWING_PAGE");
+  const bool is_given = given != nullptr && *given != '\0';
+  fs::path page = is_given ? fs::path(given) : SharePath() / "page";
+  if (IsFile(page / "index.html")) return page;
+  throw Failure(
+      is_given ? Concat("demo: UPSWING_PAGE: expected a folder with the built page (index.html), "
+                        "got ",
+                        page.string(), "; ./upswing demo builds it")
+               : Concat("demo: expected the built page in ", page.string(),
+                        ", found none; UPSWING_PAGE names another folder, and ./upswing demo in "
+                        "the sources builds the page"));
+}
+
+/// Copies what is in `from` into the existing folder `to`. New folders are writable, also where an
+/// installed page is not.
+void CopyContent(const fs::path& from, const fs::path& to) {
+  for (const auto& entry : fs::directory_iterator(from)) {
+    const fs::path target = to / entry.path().filename();
+    if (entry.is_directory()) {
+      fs::create_directory(target);
+      CopyContent(entry.path(), target);
+    } else {
+      fs::copy_file(entry.path(), target);
+    }
+  }
+}
+
+/// Adds policies to a folder of agents.
+void AddAgents(const DemoArguments& a, const fs::path& folder) {
+  if (a.policies.empty()) return;
+  const std::vector<fs::path> paths(a.policies.begin(), a.policies.end());
+  (void)ExportToPage(paths, "", 0, folder);
+}
+
+/// --dist without slashes at its end, which would hide its name.
+fs::path DistFolder(std::string dist) {
+  while (dist.size() > 1 && dist.ends_with('/')) dist.pop_back();
+  return dist;
+}
+
+/// Mistakes in --port and --dist are reported before any file is read.
+void CheckPlace(const DemoArguments& a) {
+  if (a.dist.empty()) return;
+  if (a.port != 0) throw BadInput("demo: expected --port or --dist, got both");
+  const fs::path dist = DistFolder(a.dist);
+  CheckFree(dist, "choose another --dist");
+  const fs::path parent = dist.has_parent_path() ? dist.parent_path() : ".";
+  if (!fs::is_directory(parent)) {
+    throw BadInput(Concat("--dist: expected the existing folder ", parent.string(), " for ",
+                          dist.filename().string(), ", found none"));
+  }
+}
+
+/// Writes the page with the policies into a new folder.
+int WriteDist(const DemoArguments& a, const fs::path& page) {
+  const fs::path dist = DistFolder(a.dist);
+  Making making(dist, Making::Kind::kFolder);
+  CopyContent(page, making.path());
+  AddAgents(a, making.path() / kAgents);
+  if (StopSignal() != 0) return 128 + StopSignal();
+  making.Publish();
+  const std::string name = dist.string();
+  if (Printable(name) == name) {
+    fmt::print("{}: the page, for any web server; to look at it: python3 -m http.server -d {}\n",
+               name, ShellQuoted(name));
+  } else {
+    fmt::print("the page is written, for any web server\n");
+  }
+  return 0;
+}
+
+/// Serves the page until a signal ends it. With policies, their files and those of the page's own
+/// agents are in a temporary folder, because the page may be read-only.
+int ServePage(const DemoArguments& a, const fs::path& page) {
+  WebFiles files(page);
+  std::optional<Making> temporary;
+  if (!a.policies.empty()) {
+    temporary.emplace(fs::temp_directory_path() / "upswing-demo", Making::Kind::kFolder);
+    const fs::path agents = temporary->path() / kAgents;
+    fs::create_directory(agents);
+    if (fs::is_directory(page / kAgents)) CopyContent(page / kAgents, agents);
+    AddAgents(a, agents);
+    files.Replace(kAgents, agents);
+  }
+  WebServer server(files, static_cast<int>(a.port));
+  files.Compress();
+  fmt::print("The page is at http://localhost:{}/ (stop with Ctrl-C).\n", server.port());
+  std::fflush(stdout);
+  server.Run([] { return StopSignal() != 0; });
+  return 128 + StopSignal();
+}
+
+int RunDemo(const DemoArguments& a) {
+  const fs::path page = PageFolder();
+  InstallSignalHandlers("");
+  return a.dist.empty() ? ServePage(a, page) : WriteDist(a, page);
+}
+
+}  // namespace
+
+void AddDemo(CommandLine& line) {
+  DemoArguments& a = line.Runs(RunDemo);
+  line.Texts("policies", a.policies, "POLICY|RUN",
+             "policies to add to the page's: policy.safetensors or run folders");
+  Options own;
+  own.Add(&a.port, "port", {1, 65535}, "", "port to listen on").usual =
+      Concat(WebServer::kUsualPort, ", or the next free one");
+  line.Arguments(own);
+  line.Text("--dist", a.dist, "FOLDER",
+            "new or empty folder to write the page into, for any web server, instead of serving",
+            "a folder");
+  line.Check([&a] { CheckPlace(a); });
+  line.Footer(
+      "The server listens on this machine only.\n\n"
+      "Examples:\n"
+      "  ./upswing demo\n"
+      "  ./upswing demo runs/d3qn-seed1\n"
+      "  ./upswing demo --dist site && python3 -m http.server -d site\n");
+}
+
+}  // namespace upswing

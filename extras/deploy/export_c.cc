@@ -1,0 +1,228 @@
+#include <algorithm>
+#include <numbers>
+
+#include "base/error.h"
+#include "base/text.h"
+#include "extras/deploy/c_header.h"
+#include "extras/deploy/c_text.h"
+#include "extras/deploy/export.h"
+#include "extras/deploy/exported_policy.h"
+#include "os/streams.h"
+
+namespace upswing {
+namespace {
+
+constexpr size_t kMostParameters = 2'000'000;  // about 23 MB of header
+constexpr size_t kLongestPrefix = 32;
+constexpr int kBlockRows = 8;  // see linear in extras/deploy/c/network.c
+
+/// The weights (out × in) in the order of the function linear in extras/deploy/c/network.c: blocks
+/// of rows, each column by column, then the remaining rows.
+std::vector<float> InBlocks(const LayerView& layer) {
+  std::vector<float> ordered;
+  ordered.reserve(layer.W.size());
+  int row = 0;
+  for (; row + kBlockRows <= layer.out(); row += kBlockRows) {
+    for (int col = 0; col < layer.in(); ++col) {
+      for (int k = 0; k < kBlockRows; ++k) ordered.push_back(layer.W(col, row + k));
+    }
+  }
+  for (; row < layer.out(); ++row) {
+    for (int col = 0; col < layer.in(); ++col) ordered.push_back(layer.W(col, row));
+  }
+  return ordered;
+}
+
+std::vector<float> Copy(std::span<const float> values) { return {values.begin(), values.end()}; }
+
+/// The layers that choose the torque. Leaves out a dueling network's value stream, which does not
+/// change the best torque, and keeps only a Gaussian's mean.
+std::vector<LayerView> LayersOf(const ExportedPolicy& policy) {
+  std::vector<LayerView> layers = policy.ActingLayers();
+  if (!policy.is_discrete()) layers.back() = layers.back().Units(0, 1);
+  return layers;
+}
+
+/// The C name of a layer.
+std::string CName(std::string name) {
+  for (char& c : name) c = c == '.' ? '_' : c;
+  return name;
+}
+
+/// `text` as a C prefix: small letters and digits, beginning with a letter, with _ in place of
+/// other characters between them.
+std::string AsPrefix(std::string_view text) {
+  std::string prefix = Cleaned(text, '_');
+  if (!prefix.empty() && prefix[0] <= '9') prefix = "policy_" + prefix;
+  prefix.resize(std::min(prefix.size(), kLongestPrefix));
+  if (prefix.ends_with('_')) prefix.pop_back();
+  return prefix;
+}
+
+/// The policy's origin according to its file.
+std::string OriginOf(const PolicyInfo& info) {
+  std::vector<std::string> parts;
+  const auto add = [&](const char* what, const auto& value) {
+    if (value) parts.push_back(Concat(what, ' ', *value));
+  };
+  if (!info.agent.empty()) parts.push_back("agent " + info.agent);
+  add("seed", info.seed);
+  add("step", info.step);
+  if (info.success_rate) parts.push_back(Concat("success ", 100 * *info.success_rate, " percent"));
+  add("mean return", info.mean_return);
+  if (!info.upswing_version.empty()) parts.push_back("upswing " + info.upswing_version);
+  return parts.empty() ? "unknown" : CommentText(Join(parts, ", "));
+}
+
+/// Constants of energy and height for extras/deploy/c/pendulum.c. The energy is linear in them, so
+/// they follow from Energy at a few states.
+std::vector<float> EnergyConstants(const Plant& plant) {
+  constexpr double kPi = std::numbers::pi;
+  const double whole = 2 * EnergyTarget(plant);
+  const double hanging = Energy(plant, {0, 0, 0, 0}), folded = Energy(plant, {0, kPi, 0, 0});
+  const double own1 = Energy(plant, {0, 0, 1, -1}) - hanging;  // w1 = 1, w1 + w2 = 0
+  const double own2 = Energy(plant, {0, 0, 0, 1}) - hanging;   // w1 = 0, w1 + w2 = 1
+  const double both = Energy(plant, {0, 0, 1, 0}) - hanging - own1 - own2;
+  const double length = plant.length1 + plant.length2;
+  std::vector<float> constants;
+  for (const double constant :
+       {own1 / whole, own2 / whole, both / whole, (hanging + folded) / 2 / whole,
+        (hanging - folded) / 2 / whole, plant.length1 / length, plant.length2 / length}) {
+    constants.push_back(static_cast<float>(constant));
+  }
+  return constants;
+}
+
+/// Adds the macros that the double pendulum's header needs.
+void AddPlant(const Plant& plant, CParts& parts) {
+  // extras/deploy/c/pendulum.c uses the same limits.
+  static_assert(kMaxVelocity1 == 10 && kMaxVelocity2 == 20);
+  static_assert(kMemoryVelocity == 1 && kMemoryTorque == 5 && kMemorySize == 3);
+  parts.plant = "by which it computes energy and height";
+  parts.made_for = plant;
+  parts.constants = {{"energy", "of the observed energy and height", EnergyConstants(plant)}};
+}
+
+/// Adds the layers' arrays and the list of layers.
+void AddLayers(const std::vector<LayerView>& layers, const std::string& prefix, CParts& parts) {
+  std::string rows;
+  for (const LayerView& layer : layers) {
+    const std::string name = CName(layer.name), array = Concat(prefix, '_', name);
+    const auto add = [&](const char* what, const std::string& comment, std::vector<float> values) {
+      parts.constants.push_back({name + what, comment, std::move(values)});
+    };
+    add("_weight", Concat(layer.out(), " x ", layer.in()), InBlocks(layer));
+    add("_bias", "", Copy(layer.b));
+    std::string norm = "0, 0";
+    if (layer.layer_norm()) {
+      add("_norm_weight", "", Copy(layer.gain));
+      add("_norm_bias", "", Copy(layer.norm_bias));
+      norm = Concat(array, "_norm_weight,\n   ", array, "_norm_bias");
+    }
+    const char activation = layer.activation == Activation::kRelu   ? 'r'
+                            : layer.activation == Activation::kTanh ? 't'
+                                                                    : 'n';
+    rows += Concat("  {", array, "_weight, ", array, "_bias,\n   ", norm, ",\n   ", layer.in(),
+                   ", ", layer.out(), ", '", activation, "'},\n");
+  }
+  parts.layers = Concat(
+      "static const struct {\n  const float *weight, *bias, *norm_weight, *norm_bias;\n"
+      "  int in, out;\n  char activation; /* r: relu, t: tanh, n: none */\n} ",
+      prefix, "_layers[", layers.size(), "] = {\n", rows, "};\n");
+}
+
+CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
+  const ExportedPolicy policy = ViewForExport(loaded);
+  if (policy.action_size() != 1) {
+    throw BadInput(Concat(loaded.path, ": expected a policy of one number per action, got ",
+                          policy.action_size(), "; --onnx exports it"));
+  }
+  const std::vector<LayerView> layers = LayersOf(policy);
+  const CSamples samples = DrawSamples(policy, layers);
+  const int outputs = layers.back().out(), memory = loaded.memory();
+  const bool squashed = policy.rule() == ActionRule::kSquashedGaussian;
+  CHeader header;
+  header.prefix = prefix;
+  CParts parts;
+  parts.task = policy.task;
+  if (HasPlant(loaded.task)) AddPlant(loaded.plant, parts);
+  if (policy.is_discrete()) {
+    parts.constants.push_back({"torques",
+                               policy.spec.action_unit.empty() ? "" : "N m",
+                               {policy.torques().begin(), policy.torques().end()}});
+  }
+  AddLayers(layers, prefix, parts);
+
+  constexpr size_t kFloat = 4;
+  header.state_bytes = kFloat;  // the last torque
+  if (memory > 0) header.state_bytes += kFloat * static_cast<size_t>(3 + kMemorySize * memory);
+  int widest = 0, tanhs = squashed ? 1 : 0;
+  for (const LayerView& layer : layers) {
+    header.multiply_adds += layer.W.size();
+    widest = std::max(widest, layer.out());
+    if (layer.activation == Activation::kTanh) tanhs += layer.out();
+  }
+  header.stack_bytes = kFloat * static_cast<size_t>(policy.obs_size() + outputs + 2 * widest);
+
+  parts.origin = Concat("It is the ", CommentText(Replaced(loaded.policy->description(), "→", "-")),
+                        "; ", OriginOf(loaded.policy->info()));
+  parts.limit = policy.limit;
+  parts.period = policy.spec.step_seconds;
+  const std::string angles = policy.is_foreign()
+                                 ? std::string()
+                                 : Concat(", ", parts.task.state.size(), " sines and cosines");
+  parts.work = Concat(header.multiply_adds, " multiply-adds", angles,
+                      tanhs > 0 ? Concat(", ", tanhs, " of tanh") : "", '.');
+  std::string observation = "/* of the observation:\n";
+  int index = 0;
+  for (const auto& [name, meaning] : policy.task.observation) {
+    observation += Concat("     ", index++, ": ", name, ": ", meaning, '\n');
+  }
+  parts.macros = {{"OBSERVATION_SIZE", Concat(policy.obs_size(), ' ', observation, "*/")},
+                  {"OUTPUT_SIZE", Concat(outputs, " /* of the network */")},
+                  {"MULTIPLY_ADDS", Concat(header.multiply_adds, "L /* of a call */")},
+                  {"LAYERS", Concat(layers.size())},
+                  {"WIDEST_LAYER", Concat(widest)},
+                  {"RULE", policy.is_discrete() ? "'l' /* the largest output's torque */"
+                           : squashed           ? "'s' /* the mean, squashed */"
+                                                : "'c' /* the mean, clipped */"},
+                  {"STATE_SIZE", Concat(policy.spec.state_names.size())},
+                  {"SAMPLES", Concat(samples.count)},
+                  {"OUTPUT_TOLERANCE", CLiteral(samples.output_tolerance)},
+                  {"TORQUE_TOLERANCE", CLiteral(samples.torque_tolerance)}};
+  if (memory > 0) {
+    parts.macros.emplace_back("MEMORY_SIZE",
+                              Concat(kMemorySize * memory, " /* for ", memory, " past steps */"));
+  }
+  parts.samples = {
+      {"sample_states", "", samples.states},
+      {"sample_outputs", "", samples.outputs},
+      {"sample_torques", policy.spec.action_unit.empty() ? "" : "N m", samples.torques}};
+  WriteHeader(parts, header);
+  return header;
+}
+
+}  // namespace
+
+CHeader CHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
+  if (prefix.size() > kLongestPrefix || AsPrefix(prefix) != prefix || prefix.empty()) {
+    throw BadInput(Concat("prefix: expected a lower-case letter, then lower-case letters, digits ",
+                          "and _, at most ", kLongestPrefix, " characters, got \"", prefix, "\""));
+  }
+  if (loaded.policy->num_parameters() > kMostParameters) {
+    throw BadInput(Concat(loaded.path, ": expected at most ", kMostParameters,
+                          " parameters, as larger headers compile slowly, got ",
+                          loaded.policy->num_parameters()));
+  }
+  if (loaded.path.empty()) return ControllerHeaderOf(loaded, prefix);
+  return NetworkHeaderOf(loaded, prefix);
+}
+
+std::string CPrefixOf(const std::string& file, const LoadedPolicy& loaded) {
+  std::string prefix;
+  if (!IsStandardStream(file)) prefix = AsPrefix(std::filesystem::path(file).stem().string());
+  if (prefix.empty()) prefix = AsPrefix(loaded.policy->info().agent);
+  return prefix.empty() ? "policy" : prefix;
+}
+
+}  // namespace upswing

@@ -1,0 +1,165 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "agents/controllers.h"
+#include "base/error.h"
+#include "base/format.h"
+#include "base/text.h"
+#include "cli/commands.h"
+#include "extras/deploy/export.h"
+#include "os/streams.h"
+#include "runs/find_policy.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ExportArguments {
+  std::vector<std::string> policies;
+  PolicyArguments controller;  // settings of a controller
+  std::string page, id, test_vectors, onnx, c, prefix;
+  int64_t checkpoints = 0;
+};
+
+/// Throws BadInput unless exactly one output is given.
+void CheckOne(const ExportArguments& a) {
+  std::vector<std::string> given;
+  for (const auto& [flag, value] : {std::pair("--page", &a.page),
+                                    {"--onnx", &a.onnx},
+                                    {"--c", &a.c},
+                                    {"--test-vectors", &a.test_vectors}}) {
+    if (!value->empty()) given.emplace_back(flag);
+  }
+  if (given.size() == 1) return;
+  throw BadInput(Concat("export: expected one of --page, --onnx, --c and --test-vectors, got ",
+                        given.empty() ? "none" : Join(given, " and ")));
+}
+
+/// The single policy that `flag` exports; a controller only if `flag` takes controllers.
+LoadedPolicy SinglePolicy(const ExportArguments& a, const char* flag, bool takes) {
+  if (!a.id.empty()) throw BadInput(Concat("--id: expected --page with it, got ", flag));
+  if (a.policies.size() != 1) {
+    throw BadInput(Concat(flag, ": expected a policy or a run folder, got ",
+                          a.policies.empty() ? "none" : std::to_string(a.policies.size())));
+  }
+  PolicyArguments policy = a.controller;
+  policy.name = a.policies.front();
+  const std::string& name = policy.name;
+  if (!takes && IsController(name) && !fs::exists(name)) {
+    throw BadInput(Concat(
+        name, ": expected a learned policy (policy.safetensors or a run folder), ",
+        "got a controller, which has no network; --c exports lqr, energy, pfl ", "and tvlqr"));
+  }
+  return GetPolicy(policy);
+}
+
+int ExportOnnx(const ExportArguments& a) {
+  const LoadedPolicy loaded = SinglePolicy(a, "--onnx", false);
+  const std::string model = OnnxModelOf(loaded);
+  WriteOutput(a.onnx, model);
+  if (!IsStandardStream(a.onnx)) {
+    fmt::print("{} ({} KB), {}\n", Printable(a.onnx), model.size() / 1024,
+               loaded.policy->description());
+  }
+  return 0;
+}
+
+int ExportC(const ExportArguments& a) {
+  const LoadedPolicy loaded = SinglePolicy(a, "--c", true);
+  const CHeader header = CHeaderOf(loaded, a.prefix.empty() ? CPrefixOf(a.c, loaded) : a.prefix);
+  WriteOutput(a.c, header.text);
+  if (IsStandardStream(a.c)) return 0;
+  fmt::print("{} ({} KB), names begin with {}_\n", Printable(a.c), header.text.size() / 1024,
+             header.prefix);
+  fmt::print("  flash       {} bytes of constants\n", FormatCount(header.constant_bytes));
+  fmt::print("  RAM         {} bytes of state, {} bytes of stack in a call\n",
+             FormatCount(header.state_bytes), FormatCount(header.stack_bytes));
+  const std::string period = FormatNumber(*loaded.policy->info().control_period);
+  if (header.multiply_adds > 0) {
+    fmt::print("  work        {} multiply-adds per call, every {} s\n",
+               FormatCount(header.multiply_adds), period);
+  } else {
+    fmt::print("  work        one call every {} s; see the first lines of the header\n", period);
+  }
+  return 0;
+}
+
+int ExportPage(const ExportArguments& a) {
+  if (a.policies.empty()) throw BadInput("--page: expected policies or run folders, got none");
+  const std::vector<fs::path> paths(a.policies.begin(), a.policies.end());
+  for (const std::string& name : ExportToPage(paths, a.id, a.checkpoints, a.page)) {
+    fmt::print("{}\n", Printable((fs::path(a.page) / name).string()));
+  }
+  return 0;
+}
+
+int RunExport(const ExportArguments& a) {
+  CheckOne(a);
+  if (!a.prefix.empty() && a.c.empty()) throw BadInput("--prefix: expected --c with it, got none");
+  if (a.checkpoints > 0 && a.page.empty()) {
+    throw BadInput("--checkpoints: expected --page with it, got none");
+  }
+  if (a.c.empty() && !(a.controller.flags.empty() && a.controller.made_for.empty())) {
+    throw BadInput(
+        "settings of a controller: expected --c with them, the only export of controllers");
+  }
+  if (!a.onnx.empty()) return ExportOnnx(a);
+  if (!a.c.empty()) return ExportC(a);
+  if (!a.page.empty()) return ExportPage(a);
+  if (!a.policies.empty() || !a.id.empty()) {
+    throw BadInput(
+        "--test-vectors: expected no policy and no --id, because the vectors depend only on the "
+        "task");
+  }
+  WriteOutput(a.test_vectors, TestVectorsJson());
+  return 0;
+}
+
+}  // namespace
+
+void AddExport(CommandLine& line) {
+  ExportArguments& a = line.Runs(RunExport);
+  line.Texts("policies", a.policies, "POLICY|RUN",
+             "policies: policy.safetensors or run folders; for --c also lqr, energy, pfl or tvlqr");
+  AddControllers(line, a.controller);
+  line.Text(
+      "--onnx", a.onnx, "FILE",
+      "ONNX file to write, which maps observations to torques and values; -: standard output");
+  line.Text(
+      "--c", a.c, "FILE.h",
+      "C99 header to write for a microcontroller, which maps angles and velocities to torques; "
+      "-: standard output");
+  line.Text("--prefix", a.prefix, "NAME",
+            "prefix of all names in the C header (default the file name)", "a name");
+  line.Text("--page", a.page, "FOLDER",
+            "folder of the page's agents to write into; replaces agents with the same ID");
+  line.Text("--id", a.id, "ID",
+            "ID of a single policy in the page (default name of the run, or agent)", "an ID");
+  Options own;
+  own.Add(&a.checkpoints, "checkpoints", {2, 100}, "",
+          "number of policies per agent in the page, from untrained to trained; trains the agent "
+          "again; Q-networks only")
+      .usual = "none";
+  line.Arguments(own);
+  line.Text("--test-vectors", a.test_vectors, "FILE",
+            "JSON file to write, states with the results of the task's formulas, to test other "
+            "implementations; -: standard output");
+  line.Footer(
+      "Examples:\n"
+      "  ./upswing export runs/d3qn-seed1 --onnx policy.onnx\n"
+      "  ./upswing export runs/fast-seed1 --c policy.h          for a microcontroller\n"
+      "  ./upswing export tvlqr --c tvlqr.h                     a controller as C\n"
+      "  ./upswing export runs/d3qn-seed1 --page web/public/agents    for every visitor\n"
+      "  ./upswing export runs/* --page build/web/agents        in the page built here\n"
+      "  ./upswing export policy.safetensors --id mine --page build/web/agents\n"
+      "  ./upswing export runs/d3qn-seed1 --page web/public/agents --checkpoints 10\n"
+      "  ./upswing export --test-vectors vectors.json\n\n"
+      "`./upswing demo runs/d3qn-seed1` adds a policy to the page and serves the page.\n");
+}
+
+}  // namespace upswing

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <sys/socket.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "os/making.h"
+
+/// Bytes to and from another program or device. Only channel.cc knows sockets and terminals.
+namespace upswing {
+
+/// The address of a link, such as `udp:192.168.1.5:4000`, `serial:/dev/ttyACM0:921600`, `pty`, or
+/// the file of a twin.
+struct LinkAddress {
+  enum class Kind { kTwin, kUdp, kSerial, kPty };
+  Kind kind = Kind::kTwin;
+  std::string place;  // file, host or device
+  int number = 0;     // port, or bit/s
+};
+
+inline constexpr int kUsualBaud = 921600;
+
+/// Parses an address. `listens`: for `fake`, whose UDP address may lack the host (then 127.0.0.1),
+/// and that has `pty` in place of a twin and a device. Throws BadInput, which begins with `--link`.
+LinkAddress ParseLink(const std::string& text, bool listens);
+
+/// An open UDP socket or terminal. No call waits except Wait.
+class Channel {
+ public:
+  /// Connects a UDP socket, or opens a serial device. Throws BadInput.
+  static Channel Connect(const LinkAddress& address);
+  /// Binds a UDP socket, or makes a pseudo-terminal. Throws BadInput.
+  static Channel Listen(const LinkAddress& address);
+
+  /// Sends bytes, whole or not at all. Returns whether it could. Bytes that cannot be sent are
+  /// lost, as on the line.
+  bool Send(std::span<const std::byte> bytes);
+  /// Receives bytes into `buffer`; returns their number, 0: none.
+  size_t Receive(std::span<std::byte> buffer);
+  /// Waits until there is something to receive, at most `seconds`. Returns early at a signal.
+  void Wait(double seconds) const;
+  /// Sends from now on to the sender of the last received bytes.
+  void AnswerSender();
+
+  /// Whether Receive returns whole datagrams.
+  bool datagrams() const { return datagrams_; }
+  /// Where it listens, such as `udp:127.0.0.1:4000` or `/dev/pts/3`.
+  const std::string& name() const { return name_; }
+
+ private:
+  Channel(Descriptor fd, bool datagrams) : fd_(std::move(fd)), datagrams_(datagrams) {}
+
+  Descriptor fd_;
+  bool datagrams_;
+  bool connected_ = true;
+  std::string name_;
+  Descriptor other_end_{-1};  // of a pseudo-terminal, which stays open between two users
+  sockaddr_storage sender_{}, peer_{};
+  socklen_t sender_size_ = 0, peer_size_ = 0;
+};
+
+}  // namespace upswing

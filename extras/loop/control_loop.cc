@@ -1,0 +1,163 @@
+#include "extras/loop/control_loop.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "base/text.h"
+
+namespace upswing {
+namespace {
+
+constexpr int64_t kBoardHz = 500;     // steps per second of a BoardController
+constexpr double kAnswerShare = 0.5;  // share of a cycle that waits for the answer
+static_assert(kBoardTimestep * kBoardHz == 1);
+
+}  // namespace
+
+LoopController::LoopController(const Competitor& competitor, int64_t hz)
+    : hz_(hz), held_(competitor.period), controller_(competitor.make(0)) {
+  // The first call touches memory that is not there yet; a second controller takes it.
+  competitor.make(0)->Act(0, measured_, 1, torque_);
+  torque_ = {};
+  if (held_ == 1 && hz % kBoardHz != 0) {
+    throw BadInput(Concat("--hz: expected 500 or 1000 for ", Printable(competitor.name),
+                          ", which acts every 2 ms, got ", hz));
+  }
+}
+
+double LoopController::Act(int64_t cycle, const PendulumState& s, bool estimated) {
+  // After missed cycles only the last of the missed actions is made up.
+  const int64_t step = cycle * kBoardHz / hz_ / held_ * held_;
+  if (step == step_) return torque_[0];
+  step_ = step;
+  measured_.SetFirst(s, estimated);
+  controller_->Act(static_cast<int>(step), measured_, 1, torque_);
+  return torque_[0];
+}
+
+double LoopSummary::LatenessOf(double share) const {
+  const double wanted = share * static_cast<double>(cycles);
+  double count = 0;
+  for (size_t i = 0; i + 1 < late.size(); ++i) {
+    count += static_cast<double>(late[i]);
+    if (count >= wanted) return std::min(kBin * static_cast<double>(i + 1), latest);
+  }
+  return latest;
+}
+
+ControlLoop::ControlLoop(const LoopConfig& config, MachineLink& link, Estimator& estimator,
+                         Supervisor& supervisor, LoopController& controller, LogWriter& log)
+    : config_(config),
+      link_(link),
+      estimator_(estimator),
+      supervisor_(supervisor),
+      controller_(controller),
+      log_(log),
+      period_(1 / static_cast<double>(config.hz)) {
+  // The first deadline lies in the future.
+  cycle_ = static_cast<int64_t>(link.Now() * static_cast<double>(config.hz)) + 1;
+}
+
+void ControlLoop::CountLateness(double late) {
+  ++summary_.cycles;
+  if (late <= LoopSummary::kOnTime) ++summary_.on_time;
+  summary_.latest = std::max(summary_.latest, late);
+  const auto bin = static_cast<size_t>(std::max(0.0, late / LoopSummary::kBin));
+  ++summary_.late[std::min(bin, summary_.late.size() - 1)];
+}
+
+CycleFacts ControlLoop::FactsOf(double now, const std::optional<LinkReading>& reading) {
+  CycleFacts facts{.time = now, .fresh = reading.has_value()};
+  if (reading) {
+    last_reading_ = reading->time;
+    facts.read_at = reading->time;
+    facts.received = reading->received;
+    facts.angle = reading->angle;
+    facts.torque = reading->torque;
+    facts.locked = reading->locked;
+  } else if (last_reading_ >= 0) {
+    ++summary_.unanswered;
+  }
+  facts.age = last_reading_ < 0 ? 0 : now - last_reading_;
+  facts.zero = estimator_.zero();
+  facts.state = estimator_.now();
+  facts.ahead = estimator_.ahead();
+  facts.energy = estimator_.energy();
+  const bool over = running_cycle_ > 0 && static_cast<double>(cycle_ - running_cycle_) * period_ >=
+                                              config_.seconds - period_ / 2;
+  facts.stop = over || (config_.stop && config_.stop());
+  return facts;
+}
+
+Joints ControlLoop::ControllerTorque() {
+  Joints torque = estimator_.CompensationTorque(config_.compensation);
+  torque[static_cast<size_t>(config_.actuated_joint - 1)] +=
+      controller_.Act(cycle_ - running_cycle_, estimator_.ahead(), estimator_.has_twin());
+  return torque;
+}
+
+bool ControlLoop::Cycle() {
+  const double deadline = static_cast<double>(cycle_) * period_;
+  link_.WaitUntil(deadline);
+  const double now = link_.Now();
+  CountLateness(now - deadline);
+  const auto missed = static_cast<int64_t>(std::max(0.0, (now - deadline) / period_));
+  summary_.missed += missed;
+  cycle_ += missed;
+
+  // After a pause of this process the torques of the cycle before are too old to be sent.
+  if (enabled_ && !supervisor_.CheckAge(now - last_reading_ - period_)) {
+    torque_ = {};
+    enabled_ = false;
+  }
+  // A late cycle waits for its answer, too.
+  const double until = std::max(deadline, now - period_ / 4) + kAnswerShare * period_;
+  const auto reading = link_.Exchange(torque_, enabled_, until);
+  estimator_.Update(now, torque_, reading ? &*reading : nullptr);
+  const CycleFacts facts = FactsOf(now, reading);
+  const LoopState state = supervisor_.Step(facts);
+
+  Joints wanted{};
+  if (state == LoopState::kRunning) {
+    if (running_cycle_ == 0) running_cycle_ = cycle_;
+    summary_.driven = static_cast<double>(cycle_ - running_cycle_) * period_;
+    if (!Inverted(facts.state)) upright_since_ = -1;
+    if (Inverted(facts.state) && upright_since_ < 0) upright_since_ = now;
+    summary_.upright = upright_since_ < 0 ? 0 : now - upright_since_;
+    const int64_t begin = MonotonicNanoseconds();
+    wanted = ControllerTorque();
+    const double took = static_cast<double>(MonotonicNanoseconds() - begin) * 1e-9;
+    summary_.longest_act = std::max(summary_.longest_act, took);
+  }
+  torque_ = supervisor_.Torque(wanted, facts);
+  enabled_ = state != LoopState::kIdle && supervisor_.state() != LoopState::kFault;
+  if (reading) {
+    const LoopRow row{reading->time, reading->angle,  {facts.state.w1, facts.state.w2},
+                      torque_,       reading->torque, static_cast<int>(supervisor_.state()),
+                      now - deadline};
+    log_.Add(row, link_.simulated());
+  }
+  ++cycle_;
+  return !supervisor_.ended();
+}
+
+void ControlLoop::SwitchOff() {
+  for (int i = 0; i < kFarewells; ++i) {
+    link_.Exchange({}, /*enabled=*/false, link_.Now() + kAnswerShare * period_);
+    link_.WaitUntil(link_.Now() + kAnswerShare * period_);
+  }
+}
+
+void ControlLoop::Run() {
+  try {
+    while (Cycle()) {
+    }
+  } catch (...) {
+    SwitchOff();
+    throw;
+  }
+  SwitchOff();
+}
+
+}  // namespace upswing

@@ -1,0 +1,104 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "extras/loop/link.h"
+#include "extras/loop/log_writer.h"
+#include "extras/loop/supervisor.h"
+#include "extras/machine/estimator.h"
+#include "extras/realaigym/boards.h"
+
+/// The control loop on a machine.
+namespace upswing {
+
+/// A competitor's controller at the rate of the loop. Its own period stays: a policy of 20 ms holds
+/// its torque for several cycles.
+class LoopController {
+ public:
+  /// Throws BadInput if the controller's steps do not fit the rate (Hz).
+  LoopController(const Competitor& competitor, int64_t hz);
+  /// The motor's torque (N·m) in a cycle; number 0 is the first one. `estimated`: whether the
+  /// state's velocities come from a model.
+  double Act(int64_t cycle, const PendulumState& state, bool estimated);
+
+ private:
+  int64_t hz_;
+  int64_t held_;       // steps of the board's 2 ms for which a torque is held
+  int64_t step_ = -1;  // last one at which the controller acted
+  std::unique_ptr<BoardController> controller_;
+  BoardMeasurement measured_{};
+  Lanes torque_{};
+};
+
+struct LoopConfig {
+  int64_t hz = 500;                 // cycles per second
+  double seconds = 10;              // time in which the controller drives
+  int actuated_joint = 1;           // the controller's motor, 1 or 2
+  double compensation = 0;          // share of each joint's dry friction that motors compensate
+  std::function<bool()> stop = {};  // asks for a stop, such as by a signal
+};
+
+/// Times and results of a loop.
+struct LoopSummary {
+  static constexpr double kOnTime = 0.0002;  // s
+  static constexpr double kBin = 1e-5;       // s
+
+  int64_t cycles = 0;
+  int64_t on_time = 0;               // cycles that began within kOnTime of their deadlines
+  int64_t missed = 0;                // cycles that were left out because others took too long
+  int64_t unanswered = 0;            // cycles without a new reading, once there were readings
+  double latest = 0;                 // largest lateness, s
+  std::array<int64_t, 1000> late{};  // cycles by lateness in steps of kBin; the last: and more
+  double longest_act = 0;            // longest time that the controller took, s
+  double driven = 0;                 // time in which the controller drove, s
+  double upright = 0;                // time for which both links were inverted at its end, s
+
+  /// Lateness (s) that a share of the cycles does not exceed.
+  double LatenessOf(double share) const;
+};
+
+/// Cycle by cycle: waits for the deadline, sends the torques of the cycle before, gets the reading
+/// that answers them, estimates the state, asks the supervisor, and computes torques. Thus torques
+/// leave at the deadlines, and computing time does not blur them.
+class ControlLoop {
+ public:
+  /// Everything must outlive the loop.
+  ControlLoop(const LoopConfig& config, MachineLink& link, Estimator& estimator,
+              Supervisor& supervisor, LoopController& controller, LogWriter& log);
+
+  /// Runs a cycle. Returns whether another one follows. Allocates no memory, unless the controller
+  /// does.
+  bool Cycle();
+  /// Sends to the machine that its motors are off.
+  void SwitchOff();
+  /// Runs all cycles, then switches off.
+  void Run();
+
+  const LoopSummary& summary() const { return summary_; }
+
+ private:
+  void CountLateness(double late);
+  CycleFacts FactsOf(double now, const std::optional<LinkReading>& reading);
+  Joints ControllerTorque();
+
+  LoopConfig config_;
+  MachineLink& link_;
+  Estimator& estimator_;
+  Supervisor& supervisor_;
+  LoopController& controller_;
+  LogWriter& log_;
+  LoopSummary summary_;
+  double period_;              // s
+  int64_t cycle_ = 0;          // its deadline is cycle_ · period_
+  int64_t running_cycle_ = 0;  // first one in which the controller drove, or 0
+  double upright_since_ = -1;  // s; negative: not upright
+  double last_reading_ = -1;   // time, s
+  Joints torque_{};            // computed in the last cycle, N·m
+  bool enabled_ = false;
+};
+
+}  // namespace upswing

@@ -1,0 +1,204 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "base/error.h"
+#include "base/text.h"
+#include "cli/commands.h"
+#include "cli/signals.h"
+#include "extras/loop/control_loop.h"
+#include "os/streams.h"
+
+namespace upswing {
+namespace {
+
+struct RunArguments {
+  PolicyArguments policy;
+  std::string link, twin, robot, log, start = "hanging";
+  Limits limits;
+  MachineSensors sensors{.velocity_share = 0.2, .velocity_dead_zone = 0.1};
+  int64_t seed = 1;
+  double hz = 500, seconds = 10, compensation = 0, passive_torque = 0.5;
+  bool differences = false, draw = false;
+};
+
+std::unique_ptr<MachineLink> g_link;  // global for signal handlers, which may come until the end
+
+/// Throws BadInput if a serial line is too slow for a frame per cycle in each direction.
+void CheckBaud(const LinkAddress& link, int64_t hz) {
+  constexpr int64_t kBitsPerByte = 10;  // start, 8 bits, stop
+  const int64_t needed = hz * kBitsPerByte * static_cast<int64_t>(kFrameBytes);
+  if (link.kind == LinkAddress::Kind::kSerial && link.number < needed) {
+    throw BadInput(Concat("--link: expected at least ", needed, " bit/s for ", hz,
+                          " cycles per second, got ", link.number));
+  }
+}
+
+std::unique_ptr<MachineLink> OpenLink(const RunArguments& a, const LinkAddress& address,
+                                      const std::optional<Twin>& twin, const PendulumState& start) {
+  if (address.kind != LinkAddress::Kind::kTwin) {
+    return std::make_unique<ChannelLink>(Channel::Connect(address));
+  }
+  Rng rng(static_cast<uint64_t>(a.seed), "loop: machine");
+  return std::make_unique<TwinLink>(a.draw ? DrawTwin(*twin, rng) : *twin, start,
+                                    static_cast<uint64_t>(a.seed));
+}
+
+void PrintSummary(const LoopSummary& s, const LinkCounts& counts, const Supervisor& supervisor,
+                  bool simulated) {
+  fmt::print("  ran      {:.2f} s, {}\n", s.driven,
+             s.upright > 0 ? fmt::format("the last {:.2f} s upright", s.upright)
+                           : std::string("not upright at its end"));
+  const double share = static_cast<double>(s.on_time) / static_cast<double>(s.cycles);
+  fmt::print(
+      "  cycles   {}, {:.3f}% begin within {:g} ms of the deadline; 99.9% within {:.2f} ms, "
+      "latest {:.2f} ms, {} left out\n",
+      s.cycles, 100 * share, 1e3 * LoopSummary::kOnTime, 1e3 * s.LatenessOf(0.999), 1e3 * s.latest,
+      s.missed);
+  if (!simulated) {
+    fmt::print(
+        "  link     {} commands, {} readings; {} cycles without one, {} lost, {} doubled, "
+        "{} too old, {} broken bytes\n",
+        counts.sent, counts.received, s.unanswered, counts.lost, counts.duplicates, counts.old,
+        counts.broken);
+  }
+  fmt::print("  torque   cut in {} cycles; the controller takes up to {:.2f} ms\n",
+             supervisor.clipped(), 1e3 * s.longest_act);
+}
+
+int Drive(const RunArguments& a, const Competitor& competitor, const std::optional<Twin>& twin,
+          const LinkAddress& address) {
+  const PendulumState start = ParseStart(a.start);
+  const int joint = static_cast<int>(competitor.robot);
+  const auto hz = std::llround(a.hz);
+  const double period = 1 / a.hz;
+  LoopController controller(competitor, hz);
+  Estimator estimator = twin && !a.differences
+                            ? Estimator(*twin, period)
+                            : Estimator(twin ? twin->sensors : a.sensors, period);
+
+  Joints motor{a.passive_torque, a.passive_torque};
+  motor[static_cast<size_t>(joint - 1)] = twin ? twin->plant.torque_limit : a.limits.torque;
+  const MachineSensors sensors = twin ? twin->sensors : a.sensors;
+  Supervisor supervisor({.limits = a.limits,
+                         .start = start,
+                         .motor_limit = motor,
+                         .angle_range = sensors.angle_range,
+                         .quantum = sensors.quantum,
+                         .period = period});
+
+  LoopConfig config{
+      .hz = hz, .seconds = a.seconds, .actuated_joint = joint, .compensation = a.compensation};
+  config.stop = [] { return StopSignal() != 0; };
+
+  g_link = OpenLink(a, address, twin, start);
+  MachineLink& link = *g_link;
+  LogWriter log(a.log);
+  fmt::print("{} on {}, {} Hz, {}\n", Printable(competitor.name), Printable(a.link), a.hz,
+             NameOf(competitor.robot));
+  if (!link.simulated()) {
+    const std::string missing = EnterRealTime();
+    if (!missing.empty()) fmt::print("  not permitted: {}; cycles may be late\n", missing);
+  }
+  std::fflush(stdout);
+  GuardMotors([] { g_link->SwitchOffAtOnce(); });
+  ControlLoop loop(config, link, estimator, supervisor, controller, log);
+  loop.Run();
+  log.Finish();
+  PrintSummary(loop.summary(), link.counts(), supervisor, link.simulated());
+  if (log.dropped() > 0) fmt::print("  log      {} rows left out\n", log.dropped());
+  if (!a.log.empty()) fmt::print("written {}\n", Printable(a.log));
+  if (!supervisor.reason().empty()) throw Failure(supervisor.reason());
+  return StopSignal() == 0 ? 0 : 128 + StopSignal();
+}
+
+int RunRun(const RunArguments& a) {
+  if (a.policy.name.empty()) throw BadInput("run: expected a policy or a controller, got none");
+  if (a.link.empty()) throw BadInput("run: expected --link, got none");
+  if (!a.robot.empty() && !RobotNamed(a.robot)) {
+    throw BadInput(
+        Concat("--robot: expected pendubot or acrobot, got \"", Printable(a.robot), "\""));
+  }
+  const LinkAddress address = ParseLink(a.link, /*listens=*/false);
+  CheckBaud(address, std::llround(a.hz));
+  if (IsStandardStream(a.log)) throw BadInput("--log: expected a file, got standard output");
+  if (!a.log.empty()) CheckWritable("--log", a.log);
+  const bool in_process = address.kind == LinkAddress::Kind::kTwin;
+  std::optional<Twin> twin;
+  if (in_process || !a.twin.empty())
+    twin = a.twin.empty() ? ReadTwin(address.place, "--link") : ReadTwin(a.twin, "--twin");
+  if (in_process && !a.twin.empty()) {
+    throw BadInput("--twin: expected a link by UDP or a serial line with it, got a twin as --link");
+  }
+  if (a.draw && (!in_process || twin->covariance.empty()))
+    throw BadInput("--draw: expected a twin with [covariance] as --link, got none");
+  if (!twin && a.compensation > 0)
+    throw BadInput("--compensation: expected --twin with it, got none");
+  if (a.differences && a.compensation > 0)
+    throw BadInput(
+        "--compensation: expected no --differences with it, which estimates no friction");
+  return Drive(a, GetCompetitor(a.policy, a.robot, twin), twin, address);
+}
+
+}  // namespace
+
+void AddRun(CommandLine& line) {
+  RunArguments& a = line.Runs(RunRun);
+  AddPolicy(line, a.policy);
+  line.Text("--link", a.link, "LINK",
+            "machine: a twin (file or shipped plant), udp:HOST:PORT or serial:DEVICE[:BAUD] "
+            "(default 921600 bit/s)");
+  line.Text("--twin", a.twin, "FILE",
+            "twin of the machine at a UDP or serial link, for the estimate of its state");
+  line.Text("--robot", a.robot, "ROBOT",
+            "pendubot or acrobot: the motor of a controller's design (default: the policy's own)");
+  line.Text("--log", a.log, "FILE",
+            "new CSV file to write, a row per reading; `machine check` reads it");
+  line.Text(
+      "--start", a.start, "STATE",
+      "state in which the controller takes over: hanging, upright or q1,q2,w1,w2 [rad, rad/s] "
+      "(default hanging)");
+  Options own;
+  own.Section("loop");
+  own.Add(&a.hz, "hz", {100, 1000}, "1/s", "cycles per second").step = 50;
+  own.Add(&a.seconds, "seconds", {0.1, 86400}, "s", "time in which the controller drives");
+  own.Add(&a.passive_torque, "passive_torque", {0, 1000}, "N·m",
+          "largest torque of the joint without the controller's motor");
+  own.Add(&a.compensation, "compensation", kUnit, "",
+          "share of both joints' estimated dry friction that the motors compensate; needs a twin");
+  own.Add(&a.sensors.velocity_share, "velocity_share", {0.001, 1}, "",
+          "without a twin: share of the newest difference in the low-passed velocities");
+  own.Add(&a.sensors.velocity_dead_zone, "velocity_dead_zone", {0, 100}, "rad/s",
+          "without a twin: velocity below which the controller sees 0");
+  a.limits.Describe(own);
+  line.Arguments(own);
+  AddSeed(line, a.seed, "the twin's cycles and of --draw");
+  line.Flag("--differences", a.differences,
+            "estimate velocities by differences of the angles, without the twin's prediction");
+  line.Flag("--draw", a.draw,
+            "with a twin as --link: play a machine drawn from the twin's covariance");
+  line.Footer(
+      "The loop waits for readings (idle), then for the start state (armed), then the\n"
+      "controller drives (running). Afterwards, at Ctrl-C and beyond a limit it brakes until\n"
+      "the links hang; a second Ctrl-C switches the motors off at once. So does a fault: no\n"
+      "reading for --max-age, a reading that is no number, an angle that jumps, an encoder that\n"
+      "sticks or saturates (docs/howto/protection.md).\n"
+      "Exit code: 0, or 1 with the reason in a line after a fault or beyond a limit.\n\n"
+      "A controller is designed for the twin without dry friction. --made-for changes this\n"
+      "plant. Policies of `realaigym --search --twin` need --compensation 0.95.\n"
+      "Read docs/howto/real-machine.md before you switch on motors.\n\n"
+      "Examples:\n"
+      "  ./upswing run tvlqr --link twin.toml --compensation 0.95 --log rehearsal.csv\n"
+      "  ./upswing fake twin.toml --link udp:4000        in another terminal\n"
+      "  ./upswing run runs/d3qn-seed1 --link udp:127.0.0.1:4000 --twin twin.toml\n"
+      "  ./upswing run runs/d3qn-seed1 --link serial:/dev/ttyACM0:921600 --twin twin.toml \\\n"
+      "    --max-torque 2 --max-velocity 10 --seconds 5 --log first.csv\n"
+      "  ./upswing machine check first.csv\n");
+}
+
+}  // namespace upswing

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cmath>
+#include <memory>
+#include <string>
+
+#include "extras/loop/control_loop.h"
+#include "extras/machine/testing.h"
+
+/// Helpers for tests of control loops.
+namespace upswing {
+
+/// Swings the motor's joint by a sine of the time.
+class SineController : public BoardController {
+ public:
+  explicit SineController(double amplitude) : amplitude_(amplitude) {}
+  void Act(int step, const BoardMeasurement& /*measured*/, size_t /*count*/,
+           Lanes& torque) override {
+    torque[0] = amplitude_ * std::sin(6 * step * kBoardTimestep);
+  }
+
+ private:
+  double amplitude_;  // N·m
+};
+
+inline Competitor Sine(double amplitude) {
+  return {"sine",
+          Robot::kPendubot,
+          [amplitude](size_t) { return std::make_unique<SineController>(amplitude); },
+          {},
+          kPolicyPeriod};
+}
+
+/// A loop on a link, cycle by cycle.
+struct LoopBench {
+  Twin twin = TestTwin();
+  Limits limits;
+  LoopConfig config{.seconds = 2};
+  Competitor competitor = Sine(1.5);
+  std::unique_ptr<MachineLink> link;
+  std::string log_path;
+  bool differences = false;  // whether the estimator goes without the twin
+  std::unique_ptr<Estimator> estimator;
+  std::unique_ptr<Supervisor> supervisor;
+  std::unique_ptr<LoopController> controller;
+  std::unique_ptr<LogWriter> log;
+  std::unique_ptr<ControlLoop> loop;
+
+  void Make() {
+    const double period = 1.0 / static_cast<double>(config.hz);
+    estimator = differences ? std::make_unique<Estimator>(twin.sensors, period)
+                            : std::make_unique<Estimator>(twin, period);
+    supervisor =
+        std::make_unique<Supervisor>(SupervisorConfig{.limits = limits,
+                                                      .motor_limit = {5, 0.5},
+                                                      .angle_range = twin.sensors.angle_range,
+                                                      .quantum = twin.sensors.quantum,
+                                                      .period = period});
+    controller = std::make_unique<LoopController>(competitor, config.hz);
+    log = std::make_unique<LogWriter>(log_path);
+    loop = std::make_unique<ControlLoop>(config, *link, *estimator, *supervisor, *controller, *log);
+  }
+};
+
+}  // namespace upswing

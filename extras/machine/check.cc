@@ -1,0 +1,240 @@
+#include "extras/machine/check.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <set>
+#include <system_error>
+
+#include "base/error.h"
+#include "base/format.h"
+#include "base/json.h"
+#include "base/sample.h"
+#include "base/text.h"
+
+namespace upswing {
+namespace {
+
+/// A cycle: the time from a row to the next.
+struct Cycle {
+  const MachineLog* piece;
+  int row;  // index of the later row in its piece
+  double seconds;
+};
+
+std::vector<Cycle> CyclesOf(Pieces pieces) {
+  std::vector<Cycle> cycles;
+  for (const MachineLog& piece : pieces) {
+    for (int k = 1; k < piece.rows(); ++k) {
+      cycles.push_back({&piece, k, piece.time[k] - piece.time[k - 1]});
+    }
+  }
+  return cycles;
+}
+
+LogRows RangeOf(const Cycle& cycle) {
+  return upswing::RangeOf(*cycle.piece, cycle.row - 1, cycle.row);
+}
+
+void CheckClockUnit(double median, Findings& findings) {
+  constexpr double kSlow = 0.5, kVerySlow = 50;  // s
+  if (median < kSlow) return;
+  findings.push_back({Aspect::kClock, 0, Severity::kFault,
+                      fmt::format("cycles of {:.4g} s: suspect a clock in {}", median,
+                                  median < kVerySlow ? "ms" : "µs")});
+}
+
+/// Cycles that are longer count as gaps, s.
+double GapOf(double median) { return std::max(0.05, 20 * median); }
+
+void CheckLostCycles(const std::vector<Cycle>& cycles, double median, Findings& findings) {
+  constexpr double kLate = 1.5;  // a longer cycle, in medians, lost at least another
+  int places = 0, standing = 0;
+  double lost = 0;
+  const Cycle *first_standing = nullptr, *longest = nullptr;
+  for (const Cycle& cycle : cycles) {
+    if (cycle.seconds <= 0 && standing++ == 0) first_standing = &cycle;
+    if (cycle.seconds <= kLate * median || cycle.seconds > GapOf(median)) continue;
+    if (!longest || cycle.seconds > longest->seconds) longest = &cycle;
+    ++places;
+    lost += std::round(cycle.seconds / median) - 1;
+  }
+  if (standing > 0) {
+    findings.push_back({Aspect::kClock,
+                        0,
+                        Severity::kWarning,
+                        fmt::format("the clock stands still in {} row{}", standing,
+                                    standing > 1 ? "s, first" : ""),
+                        RangeOf(*first_standing),
+                        {{"standing", standing}}});
+  }
+  if (longest == nullptr) return;
+  constexpr double kMuch = 0.01;  // share of cycles
+  const double share = lost / (lost + static_cast<double>(cycles.size()));
+  findings.push_back({Aspect::kClock,
+                      0,
+                      share > kMuch ? Severity::kWarning : Severity::kNote,
+                      fmt::format("{} ({:.2g}%) lost at {}, longest {:.3g} ms",
+                                  Counted(std::lround(std::min(lost, 1e15)), "cycle"), 100 * share,
+                                  Counted(places, "place"), 1e3 * longest->seconds),
+                      RangeOf(*longest),
+                      {{"lost", lost}, {"places", places}}});
+}
+
+void CheckGaps(const std::vector<Cycle>& cycles, double median, Findings& findings) {
+  constexpr int kMostGaps = 10;  // with a line each
+  int gaps = 0;
+  for (const Cycle& cycle : cycles) {
+    if (cycle.seconds <= GapOf(median) || ++gaps > kMostGaps) continue;
+    findings.push_back({Aspect::kClock,
+                        0,
+                        Severity::kFault,
+                        fmt::format("a gap of {:.4g} s", cycle.seconds),
+                        RangeOf(cycle),
+                        {{"gap", cycle.seconds}}});
+  }
+  if (gaps <= kMostGaps) return;
+  findings.push_back({Aspect::kClock, 0, Severity::kFault, Counted(gaps - kMostGaps, "more gap")});
+}
+
+}  // namespace
+
+const char* NameOf(Severity severity) {
+  constexpr const char* kNames[] = {"note", "warning", "fault"};
+  return kNames[static_cast<int>(severity)];
+}
+
+const char* NameOf(Aspect aspect) {
+  constexpr const char* kNames[] = {"clock", "angle", "velocity", "torque", "motion"};
+  return kNames[static_cast<int>(aspect)];
+}
+
+LogRows RangeOf(const MachineLog& piece, int first, int last) {
+  return {piece.first_row + first, piece.first_row + last, piece.time[first], piece.time[last]};
+}
+
+double MedianCycle(Pieces pieces) {
+  std::vector<double> seconds;
+  for (const Cycle& cycle : CyclesOf(pieces)) seconds.push_back(cycle.seconds);
+  return QuartilesOf(std::move(seconds)).median;
+}
+
+double CentralDifference(const MachineLog& log, int k, int joint) {
+  const double seconds = log.time[k + 1] - log.time[k - 1];
+  return seconds > 0 ? (log.angle[k + 1][joint] - log.angle[k - 1][joint]) / seconds : 0;
+}
+
+double AngleRange(Pieces pieces, int joint) {
+  double low = pieces.front().angle.front()[joint], high = low;
+  for (const MachineLog& piece : pieces) {
+    for (const Joints& q : piece.angle) {
+      low = std::min(low, q[joint]);
+      high = std::max(high, q[joint]);
+    }
+  }
+  return high - low;
+}
+
+void CheckClock(Pieces pieces, Findings& findings) {
+  const std::vector<Cycle> cycles = CyclesOf(pieces);
+  std::vector<double> seconds;
+  for (const Cycle& cycle : cycles) seconds.push_back(cycle.seconds);
+  std::ranges::sort(seconds);
+  const double median = Quantile(seconds, 0.5), p99 = Quantile(seconds, 0.99);
+  if (median <= 0) {
+    findings.push_back({Aspect::kClock, 0, Severity::kFault, "the clock hardly ever advances"});
+    return;
+  }
+  findings.push_back({Aspect::kClock,
+                      0,
+                      Severity::kNote,
+                      fmt::format("{:.4g} Hz, cycles of {:.4g} ms (median), {:.4g} ms (99%), "
+                                  "{:.4g} ms (longest)",
+                                  1 / median, 1e3 * median, 1e3 * p99, 1e3 * seconds.back()),
+                      {},
+                      {{"median", median}, {"p99", p99}, {"longest", seconds.back()}}});
+  CheckClockUnit(median, findings);
+  CheckLostCycles(cycles, median, findings);
+  CheckGaps(cycles, median, findings);
+}
+
+bool LogCheck::faulty() const {
+  return std::ranges::any_of(
+      findings, [](const Finding& finding) { return finding.severity == Severity::kFault; });
+}
+
+LogCheck CheckLog(const std::string& name, Pieces pieces) {
+  LogCheck check{name, 0, static_cast<int>(pieces.size()), 0, {}};
+  for (const MachineLog& piece : pieces) {
+    check.rows += piece.rows();
+    check.seconds += piece.time.back() - piece.time.front();
+  }
+  CheckClock(pieces, check.findings);
+  CheckAngles(pieces, check.findings);
+  CheckVelocities(pieces, check.findings);
+  CheckTorques(pieces, check.findings);
+  CheckMotion(pieces, check.findings);
+  return check;
+}
+
+std::string AboutText(const Finding& finding) {
+  const std::string aspect = NameOf(finding.aspect);
+  return finding.joint > 0 ? Concat(aspect, " ", finding.joint) : aspect;
+}
+
+std::vector<MachineLog> ReadCheckedLogs(std::span<const std::string> files,
+                                        const std::string& columns,
+                                        const std::function<void(const std::string&)>& warn) {
+  std::vector<std::string> sorted(files.begin(), files.end());
+  std::ranges::sort(sorted);
+  std::set<std::filesystem::path> seen;
+  std::vector<MachineLog> logs;
+  for (const std::string& file : sorted) {
+    std::error_code error;
+    if (!seen.insert(std::filesystem::weakly_canonical(file, error)).second) {
+      throw BadInput(Concat("expected each log once, got ", Printable(file), " twice"));
+    }
+    std::vector<MachineLog> pieces = ReadLog(file, columns);
+    const LogCheck check = CheckLog(file, pieces);
+    const auto fault = std::ranges::find(check.findings, Severity::kFault, &Finding::severity);
+    if (fault != check.findings.end()) {
+      warn(Concat("warning: ", Printable(file), ": ", AboutText(*fault), ": ", fault->text,
+                  "; machine check lists all faults"));
+    }
+    std::ranges::move(pieces, std::back_inserter(logs));
+  }
+  return logs;
+}
+
+std::string RowsText(const LogRows& rows) {
+  return fmt::format("rows {} to {} ({:.3f} to {:.3f} s)", rows.first, rows.last, rows.begin,
+                     rows.end);
+}
+
+std::string CheckJson(std::span<const LogCheck> checks) {
+  nlohmann::ordered_json logs = nlohmann::ordered_json::array();
+  for (const LogCheck& check : checks) {
+    nlohmann::ordered_json log{
+        {"name", check.name},       {"rows", check.rows},
+        {"pieces", check.pieces},   {"seconds", check.seconds},
+        {"faulty", check.faulty()}, {"findings", nlohmann::ordered_json::array()}};
+    for (const Finding& finding : check.findings) {
+      nlohmann::ordered_json j{{"aspect", NameOf(finding.aspect)},
+                               {"severity", NameOf(finding.severity)},
+                               {"text", finding.text}};
+      if (finding.joint > 0) j["joint"] = finding.joint;
+      if (finding.rows) {
+        j["rows"] = {finding.rows->first, finding.rows->last};
+        j["time"] = {finding.rows->begin, finding.rows->end};
+      }
+      for (const auto& [name, number] : finding.numbers) j[name] = number;
+      log["findings"].push_back(std::move(j));
+    }
+    logs.push_back(std::move(log));
+  }
+  return PrintableJson({{"logs", logs}});
+}
+
+}  // namespace upswing

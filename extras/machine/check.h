@@ -1,0 +1,107 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "extras/machine/log.h"
+
+/// Checks of a machine's log for faults of sensors, columns and units, without a model of the
+/// machine. docs/reference/machine-log.md lists the checks.
+namespace upswing {
+
+enum class Severity { kNote, kWarning, kFault };
+const char* NameOf(Severity severity);
+
+/// The aspect of a log that a finding is about.
+enum class Aspect { kClock, kAngle, kVelocity, kTorque, kMotion };
+const char* NameOf(Aspect aspect);
+
+/// Rows of the file, numbered from 1, with their times.
+struct LogRows {
+  int first = 0, last = 0;
+  double begin = 0, end = 0;  // s
+};
+
+/// A result of a check. A fault misleads an identification that uses the log as it is.
+struct Finding {
+  Aspect aspect = Aspect::kClock;
+  int joint = 0;  // 1 or 2; 0: the whole log
+  Severity severity = Severity::kNote;
+  std::string text;                                          // one line
+  std::optional<LogRows> rows = {};                          // nothing: all rows
+  std::vector<std::pair<std::string, double>> numbers = {};  // for JSON, in SI units
+};
+
+/// The findings about a file.
+struct LogCheck {
+  std::string name;
+  int rows = 0, pieces = 0;
+  double seconds = 0;  // length of the pieces together
+  std::vector<Finding> findings;
+
+  bool faulty() const;
+};
+
+/// Checks the pieces of a file; see ReadLog. `name` is the file's.
+LogCheck CheckLog(const std::string& name, std::span<const MachineLog> pieces);
+
+/// `rows 12 to 40 (0.02 to 0.08 s)`.
+std::string RowsText(const LogRows& rows);
+
+std::string CheckJson(std::span<const LogCheck> checks);
+
+/// Draws angles, velocities, torques and cycle times with the findings' rows marked, as .svg or
+/// .png.
+void DrawCheck(const LogCheck& check, std::span<const MachineLog> pieces,
+               const std::filesystem::path& file);
+
+/// What a finding is about, such as `velocity 2`.
+std::string AboutText(const Finding& finding);
+
+/// Reads logs in the order of their names. Calls `warn` with a line about each one that has faults.
+/// Throws BadInput as ReadLog does, and for a log that is given twice.
+std::vector<MachineLog> ReadCheckedLogs(std::span<const std::string> files,
+                                        const std::string& columns,
+                                        const std::function<void(const std::string&)>& warn);
+
+// The checks, each of which appends its findings.
+using Findings = std::vector<Finding>;
+using Pieces = std::span<const MachineLog>;
+
+/// Rate, jitter, lost cycles and gaps.
+void CheckClock(Pieces pieces, Findings& findings);
+/// Resolution, saturation, degrees and stuck encoders.
+void CheckAngles(Pieces pieces, Findings& findings);
+/// Unit, sign, joint and saturation of the velocities, compared with differences of the angles.
+void CheckVelocities(Pieces pieces, Findings& findings);
+/// Delay, lag, gain, unit and joint of the measured torque, compared with the commanded one.
+void CheckTorques(Pieces pieces, Findings& findings);
+/// Joints that do not move, and motion that grows without torque.
+void CheckMotion(Pieces pieces, Findings& findings);
+
+/// Whether the motor of a joint (0 or 1) reports torques without a command: more than idle motors
+/// do, and motors whose rotors the other joint accelerates.
+bool ActsWithoutCommand(Pieces pieces, int joint);
+
+/// Rows `first` to `last` (indices) of a piece as rows of the file.
+LogRows RangeOf(const MachineLog& piece, int first, int last);
+
+/// Duration of the median cycle, s.
+double MedianCycle(Pieces pieces);
+
+/// Central difference of a joint's angle at row k, 0 < k < rows - 1, rad/s; 0 if the clock stands
+/// still.
+double CentralDifference(const MachineLog& log, int k, int joint);
+
+/// Range of a joint's angle over all pieces: largest minus smallest, rad.
+double AngleRange(Pieces pieces, int joint);
+
+/// Smallest range of an angle for which its differences say anything about velocities, rad.
+inline constexpr double kMoves = 0.05;
+
+}  // namespace upswing

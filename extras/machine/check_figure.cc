@@ -1,0 +1,138 @@
+// The figure of a log and its findings.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/text.h"
+#include "extras/machine/check.h"
+#include "report/figure.h"
+
+namespace upswing {
+namespace {
+
+constexpr int kMostPoints = 4000;  // of a line
+constexpr double kGap = std::numeric_limits<double>::quiet_NaN();
+
+/// A quantity as a line; pieces are apart.
+template <typename Value>
+Line LineOf(const std::string& name, Pieces pieces, const Value& value) {
+  int rows = 0;
+  for (const MachineLog& piece : pieces) rows += piece.rows();
+  const int step = std::max(1, rows / kMostPoints);
+  Line line;
+  line.name = name;
+  for (const MachineLog& piece : pieces) {
+    for (int k = 1; k < piece.rows(); k += step) {
+      line.x.push_back(piece.time[k]);
+      line.y.push_back(value(piece, k));
+    }
+    line.x.push_back(kGap);
+    line.y.push_back(kGap);
+  }
+  return line;
+}
+
+/// The rows of findings with a severity, as marks on a line's height.
+template <typename Value>
+void Mark(Panel& panel, const LogCheck& check, Pieces pieces, std::initializer_list<Aspect> aspects,
+          const Value& value) {
+  for (const Severity severity : {Severity::kWarning, Severity::kFault}) {
+    Line marks;
+    marks.name = NameOf(severity);
+    marks.points = true;
+    marks.marker = severity == Severity::kFault ? Marker::kCross : Marker::kSquare;
+    for (const Finding& finding : check.findings) {
+      if (finding.severity != severity || !finding.rows) continue;
+      if (std::ranges::count(aspects, finding.aspect) == 0) continue;
+      for (const MachineLog& piece : pieces) {
+        const int first = std::max(finding.rows->first - piece.first_row, 1);
+        const int last = std::min(finding.rows->last - piece.first_row, piece.rows() - 1);
+        for (int k = first; k <= last; k += std::max(1, (last - first) / 50)) {
+          marks.x.push_back(piece.time[k]);
+          marks.y.push_back(value(piece, k, std::max(finding.joint - 1, 0)));
+        }
+      }
+    }
+    if (!marks.x.empty()) panel.lines.push_back(std::move(marks));
+  }
+}
+
+/// A panel with a quantity of both joints.
+Panel PanelOf(const std::string& title, const std::string& label, Pieces pieces,
+              std::vector<Joints> MachineLog::*values, const char* prefix = "joint ") {
+  Panel panel;
+  panel.title = title;
+  panel.x_label = "time (s)";
+  panel.y_label = label;
+  for (const int joint : {0, 1}) {
+    panel.lines.push_back(
+        LineOf(Concat(prefix, joint + 1), pieces,
+               [&](const MachineLog& log, int k) { return (log.*values)[k][joint]; }));
+  }
+  return panel;
+}
+
+/// The warnings and faults, in words.
+std::string CaptionOf(const LogCheck& check) {
+  std::vector<std::string> texts;
+  for (const Finding& finding : check.findings) {
+    if (finding.severity == Severity::kNote) continue;
+    const std::string joint = finding.joint > 0 ? Concat(" ", finding.joint) : "";
+    texts.push_back(Concat(NameOf(finding.aspect), joint, ": ", finding.text, " (",
+                           NameOf(finding.severity), ")"));
+  }
+  return texts.empty() ? "no warning and no fault" : Join(texts, "; ");
+}
+
+}  // namespace
+
+void DrawCheck(const LogCheck& check, Pieces pieces, const std::filesystem::path& file) {
+  const MachineLog& first = pieces.front();
+  Figure figure;
+  figure.title = check.name;
+  figure.caption = CaptionOf(check);
+  figure.width = 1100;
+  const auto mark = [&](Panel& panel, std::initializer_list<Aspect> aspects,
+                        std::vector<Joints> MachineLog::*values) {
+    Mark(panel, check, pieces, aspects,
+         [values](const MachineLog& log, int k, int joint) { return (log.*values)[k][joint]; });
+  };
+  Panel angles = PanelOf("angles", "rad", pieces, &MachineLog::angle);
+  mark(angles, {Aspect::kAngle, Aspect::kMotion}, &MachineLog::angle);
+  figure.panels.push_back(std::move(angles));
+  if (!first.velocity.empty()) {
+    Panel velocities = PanelOf("velocities", "rad/s", pieces, &MachineLog::velocity);
+    mark(velocities, {Aspect::kVelocity}, &MachineLog::velocity);
+    figure.panels.push_back(std::move(velocities));
+  }
+  if (!first.commanded.empty() || !first.measured.empty()) {
+    const bool both = !first.commanded.empty() && !first.measured.empty();
+    Panel torques =
+        PanelOf("torques", "N·m", pieces,
+                first.commanded.empty() ? &MachineLog::measured : &MachineLog::commanded,
+                first.commanded.empty() ? "measured " : "commanded ");
+    if (both) {
+      Panel measured = PanelOf("", "", pieces, &MachineLog::measured, "measured ");
+      for (Line& line : measured.lines) torques.lines.push_back(std::move(line));
+    }
+    figure.panels.push_back(std::move(torques));
+  }
+  const auto cycle = [](const MachineLog& log, int k) {
+    return 1e3 * (log.time[k] - log.time[k - 1]);
+  };
+  Panel cycles;
+  cycles.title = "cycles";
+  cycles.x_label = "time (s)";
+  cycles.y_label = "ms";
+  cycles.lines.push_back(LineOf("", pieces, cycle));
+  double longest = 0;
+  for (const double ms : cycles.lines.back().y) longest = std::fmax(longest, ms);
+  if (longest > 0) cycles.y_range = {0, 1.1 * longest};
+  Mark(cycles, check, pieces, {Aspect::kClock},
+       [&](const MachineLog& log, int k, int /*joint*/) { return cycle(log, k); });
+  figure.panels.push_back(std::move(cycles));
+  figure.height = 100 + 230 * static_cast<int>(figure.panels.size());
+  Draw(figure, file);
+}
+
+}  // namespace upswing

@@ -1,0 +1,353 @@
+#include "extras/machine/check.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "base/rng.h"
+#include "extras/machine/testing.h"
+
+namespace upswing {
+namespace {
+
+/// A log of 10 s at 500 Hz without faults: smooth motion, velocities of their own, and a measured
+/// torque that is 0.95 times the command two rows before.
+MachineLog GoodLog() {
+  MachineLog log;
+  log.name = "log.csv";
+  Rng rng(1, "machine check test");
+  for (int k = 0; k < 5000; ++k) {
+    const double t = 0.002 * k;
+    log.time.push_back(t);
+    log.angle.push_back({1.2 * std::sin(3 * t) + 0.3 * std::sin(7.1 * t), 0.8 * std::sin(5 * t)});
+    log.velocity.push_back({3.6 * std::cos(3 * t) + 2.13 * std::cos(7.1 * t) + 0.02 * rng.Normal(),
+                            4 * std::cos(5 * t) + 0.02 * rng.Normal()});
+    log.commanded.push_back({std::sin(11 * t) + std::sin(2 * t * t), std::cos(13 * t + t * t)});
+    const Joints sent = log.commanded[std::max(0, k - 2)];
+    log.measured.push_back(
+        {0.95 * sent[0] + 0.01 * rng.Normal(), 0.95 * sent[1] + 0.01 * rng.Normal()});
+  }
+  return log;
+}
+
+/// The findings about a log.
+Findings Check(const MachineLog& log) { return CheckLog("log.csv", std::span(&log, 1)).findings; }
+
+/// Checks a good log after a change. Expects a single fault or warning, with this text, and returns
+/// it.
+Finding OnlyFinding(const std::function<void(MachineLog&)>& change, const std::string& text,
+                    Severity severity = Severity::kFault) {
+  MachineLog log = GoodLog();
+  change(log);
+  Findings found = Check(log);
+  std::erase_if(found, [](const Finding& f) { return f.severity == Severity::kNote; });
+  EXPECT_EQ(found.size(), 1U);
+  for (const Finding& f : found) EXPECT_NE(f.text.find(text), std::string::npos) << f.text;
+  if (found.empty()) return {};
+  EXPECT_EQ(found.front().severity, severity);
+  return found.front();
+}
+
+/// A change of a quantity of one joint in all rows.
+std::function<void(MachineLog&)> Times(std::vector<Joints> MachineLog::*values, int joint,
+                                       double factor) {
+  return [=](MachineLog& log) {
+    for (Joints& row : log.*values) row[joint] *= factor;
+  };
+}
+
+std::function<void(MachineLog&)> Swapped(std::vector<Joints> MachineLog::*values) {
+  return [=](MachineLog& log) {
+    for (Joints& row : log.*values) std::swap(row[0], row[1]);
+  };
+}
+
+TEST(MachineCheck, AGoodLogHasOnlyNotes) {
+  const Findings found = Check(GoodLog());
+  for (const Finding& f : found) EXPECT_EQ(f.severity, Severity::kNote) << f.text;
+  ASSERT_EQ(found.size(), 5U);  // the clock, two velocities, two torques
+  EXPECT_EQ(found[0].text, "500 Hz, cycles of 2 ms (median), 2 ms (99%), 2 ms (longest)");
+  const auto number = [&](size_t i, const std::string& name) {
+    for (const auto& [key, value] : found[i].numbers) {
+      if (key == name) return value;
+    }
+    return -1.0;
+  };
+  EXPECT_EQ(number(3, "delay_rows"), 2);
+  EXPECT_EQ(number(3, "lag"), 0);
+  EXPECT_NEAR(number(3, "gain"), 0.95, 0.001);
+  EXPECT_NEAR(number(4, "correlation"), 1, 0.001);
+}
+
+TEST(MachineCheck, DelayLagAndGainOfTheTorque) {
+  MachineLog log = GoodLog();
+  double torque = log.commanded[0][0];
+  for (int k = 0; k < log.rows(); ++k) {  // 3 rows, 5 ms, 0.8
+    torque += (1 - std::exp(-0.002 / 0.005)) * (log.commanded[std::max(0, k - 3)][0] - torque);
+    log.measured[k][0] = 0.8 * torque;
+  }
+  const Findings found = Check(log);
+  EXPECT_EQ(found[3].text,
+            "measured follows commanded after 3 rows and a lag of 5 ms, gain 0.80, correlation "
+            "1.000");
+}
+
+TEST(MachineCheck, LostCyclesAndGaps) {
+  const auto skip = [](int rows) {
+    return [rows](MachineLog& log) {
+      for (int k = 1000; k < log.rows(); ++k) log.time[k] += 0.002 * rows;
+    };
+  };
+  // Velocities follow the new clock only nearly, within the limits of the check.
+  MachineLog log = GoodLog();
+  skip(3)(log);
+  EXPECT_EQ(Check(log)[1].text, "3 cycles (0.06%) lost at 1 place, longest 8 ms");
+  const Finding gap = OnlyFinding(skip(100), "a gap of 0.202 s");
+  ASSERT_TRUE(gap.rows);
+  EXPECT_EQ(gap.rows->first, 1000);  // rows count from 1
+  EXPECT_EQ(gap.rows->last, 1001);
+  EXPECT_NEAR(gap.rows->begin, 1.998, 1e-12);
+  OnlyFinding(
+      [](MachineLog& standing) {
+        standing.time[7] = standing.time[6];
+        standing.velocity.clear();
+      },
+      "stands still in 1 row", Severity::kWarning);
+}
+
+TEST(MachineCheck, ManyGapsGetALineTogether) {
+  MachineLog log = GoodLog();
+  for (int k = 0; k < log.rows(); ++k) log.time[k] += 0.5 * (k / 200);  // 24 gaps
+  const Findings found = Check(log);
+  EXPECT_EQ(std::ranges::count(found, Severity::kFault, &Finding::severity), 11);
+  EXPECT_TRUE(std::ranges::count(found, "14 more gaps", &Finding::text) == 1);
+}
+
+TEST(MachineCheck, Clocks) {
+  OnlyFinding(
+      [](MachineLog& log) {
+        for (double& t : log.time) t *= 1000;
+        log.velocity.clear();
+      },
+      "suspect a clock in ms");
+  OnlyFinding(
+      [](MachineLog& log) {
+        for (double& t : log.time) t *= 1e6;
+        log.velocity.clear();
+      },
+      "suspect a clock in µs");
+}
+
+TEST(MachineCheck, UnitsAndSignOfVelocities) {
+  const auto velocity = &MachineLog::velocity;
+  EXPECT_EQ(OnlyFinding(Times(velocity, 0, -1), "opposite sign").joint, 1);
+  EXPECT_EQ(OnlyFinding(Times(velocity, 1, 180 / std::numbers::pi), "velocities in deg/s").joint,
+            2);
+  OnlyFinding(Times(velocity, 1, 60 / (2 * std::numbers::pi)), "velocities in rpm");
+  OnlyFinding(Times(velocity, 1, 6), "the unit or a gear");
+  OnlyFinding(Times(velocity, 1, 1.2), "1.200 times", Severity::kWarning);
+  OnlyFinding(
+      [](MachineLog& log) {
+        Rng rng(3, "noise");
+        for (Joints& v : log.velocity) v[0] = rng.Normal();
+      },
+      "does not follow the angle", Severity::kWarning);
+}
+
+TEST(MachineCheck, DegreesOfAngles) {
+  // With velocities in rad/s, the gain tells; at these speeds the range tells, too.
+  MachineLog log = GoodLog();
+  Times(&MachineLog::angle, 1, 180 / std::numbers::pi)(log);
+  const Findings found = Check(log);
+  const auto has = [&](const std::string& text) {
+    return std::ranges::any_of(found, [&](const Finding& f) {
+      return f.severity == Severity::kFault && f.joint == 2 &&
+             f.text.find(text) != std::string::npos;
+    });
+  };
+  EXPECT_TRUE(has("suspect angles in degrees"));
+  EXPECT_TRUE(has("suspect degrees"));
+  // Angles and velocities in degrees agree with each other.
+  OnlyFinding(
+      [](MachineLog& both) {
+        Times(&MachineLog::angle, 1, 180 / std::numbers::pi)(both);
+        Times(&MachineLog::velocity, 1, 180 / std::numbers::pi)(both);
+      },
+      "suspect degrees");
+}
+
+TEST(MachineCheck, SwappedColumns) {
+  for (const auto values : {&MachineLog::velocity, &MachineLog::measured}) {
+    MachineLog log = GoodLog();
+    Swapped(values)(log);
+    Findings found = Check(log);
+    std::erase_if(found, [](const Finding& f) { return f.severity != Severity::kFault; });
+    ASSERT_EQ(found.size(), 2U);
+    for (const Finding& f : found) {
+      EXPECT_NE(f.text.find("suspect swapped columns"), std::string::npos) << f.text;
+    }
+  }
+}
+
+TEST(MachineCheck, UnitsAndSignOfTorques) {
+  OnlyFinding(Times(&MachineLog::measured, 0, 1000), "measured torque in mN·m");
+  OnlyFinding(Times(&MachineLog::commanded, 0, 1000), "commanded torque in mN·m");
+  OnlyFinding(Times(&MachineLog::measured, 1, 0.166), "the unit or a gear");
+  OnlyFinding(Times(&MachineLog::measured, 1, -1), "opposite sign");
+  OnlyFinding(Times(&MachineLog::measured, 1, 0), "never changes", Severity::kWarning);
+  OnlyFinding(
+      [](MachineLog& log) {
+        log.measured.clear();
+        Times(&MachineLog::commanded, 1, 1000)(log);
+      },
+      "suspect mN·m");
+}
+
+TEST(MachineCheck, VelocitiesThatAreDifferences) {
+  MachineLog log = GoodLog();
+  for (int k = 1; k < log.rows(); ++k) {
+    for (const int j : {0, 1}) {
+      log.velocity[k][j] = (log.angle[k][j] - log.angle[k - 1][j]) / 0.002;
+    }
+  }
+  const std::string text =
+      "exactly the backward difference of the angle: no measurement of its own";
+  EXPECT_EQ(Check(log)[1].text, text);
+  EXPECT_EQ(Check(log)[2].text, text);
+}
+
+TEST(MachineCheck, QuantumOfTheEncoder) {
+  MachineLog log = GoodLog();
+  const double quantum = 2 * std::numbers::pi / 4096;
+  for (Joints& q : log.angle) q[0] = quantum * std::round(q[0] / quantum);
+  EXPECT_EQ(Check(log)[1].text, "steps of 0.00153 rad (4096 per turn)");
+}
+
+TEST(MachineCheck, StuckEncoder) {
+  const Finding stuck = OnlyFinding(
+      [](MachineLog& log) {
+        for (int k = 2200; k < 2212; ++k) log.angle[k][1] = log.angle[2199][1];
+      },
+      "the encoder sticks");
+  EXPECT_EQ(stuck.joint, 2);
+  ASSERT_TRUE(stuck.rows);
+  EXPECT_EQ(stuck.rows->first, 2200);
+  EXPECT_EQ(stuck.rows->last, 2212);
+  OnlyFinding(
+      [](MachineLog& log) {
+        for (Joints& q : log.angle) q[1] = 0.25;
+        log.velocity.clear();
+      },
+      "does not move although joint 1 does", Severity::kWarning);
+}
+
+TEST(MachineCheck, ACoarseEncoderDoesNotStick) {
+  MachineLog log = GoodLog();
+  log.velocity.clear();
+  const double quantum = 2 * std::numbers::pi / 256;
+  for (Joints& q : log.angle) {
+    for (double& angle : q) angle = quantum * std::round(angle / quantum);
+  }
+  for (const Finding& f : Check(log)) EXPECT_EQ(f.severity, Severity::kNote) << f.text;
+}
+
+TEST(MachineCheck, SaturatedSensors) {
+  const Finding angle = OnlyFinding(
+      [](MachineLog& log) {  // turns on and on until the encoder's end
+        log.velocity.clear();
+        for (int k = 0; k < log.rows(); ++k) {
+          const double t = log.time[k];
+          log.angle[k][0] = std::min(12.5, 5 * t + 0.1 * std::sin(std::numbers::pi * t));
+        }
+      },
+      "saturates at 12.5 rad");
+  ASSERT_TRUE(angle.rows);
+  EXPECT_NEAR(angle.rows->begin, 2.48, 0.1);
+  EXPECT_EQ(angle.rows->last, 5000);
+  const Finding velocity = OnlyFinding(
+      [](MachineLog& log) {
+        for (Joints& v : log.velocity) v[1] = std::clamp(v[1], -3.7, 3.7);
+      },
+      "saturates at 3.7 rad/s");
+  EXPECT_EQ(velocity.aspect, Aspect::kVelocity);
+}
+
+TEST(MachineCheck, MotionThatGrowsWithoutTorque) {
+  const auto swing = [](double growth) {
+    return [growth](MachineLog& log) {
+      log.velocity.clear();
+      for (int k = 0; k < log.rows(); ++k) {
+        const double t = log.time[k];
+        log.angle[k] = {0.1 * std::exp(growth * t) * std::sin(5 * t),
+                        0.05 * std::exp(growth * t) * std::sin(5 * t)};
+        log.commanded[k] = log.measured[k] = {};
+      }
+    };
+  };
+  const Finding grown = OnlyFinding(swing(0.2), "without torque");
+  ASSERT_TRUE(grown.rows);
+  EXPECT_EQ(grown.rows->first, 1);
+  EXPECT_EQ(grown.rows->last, 5000);
+  MachineLog log = GoodLog();
+  swing(-0.2)(log);
+  for (const Finding& f : Check(log)) EXPECT_EQ(f.severity, Severity::kNote) << f.text;
+  OnlyFinding(
+      [&](MachineLog& unknown) {
+        swing(0.2)(unknown);
+        unknown.commanded.clear();
+        unknown.measured.clear();
+      },
+      "the log has no torque", Severity::kWarning);
+}
+
+TEST(MachineCheck, PiecesAreNotJoined) {
+  const MachineLog whole = GoodLog();
+  std::vector<MachineLog> pieces(2, whole);
+  pieces[1].first_row = 5001;
+  const LogCheck check = CheckLog("two.csv", pieces);
+  EXPECT_EQ(check.rows, 10000);
+  EXPECT_NEAR(check.seconds, 2 * 9.998, 1e-9);
+  EXPECT_FALSE(check.faulty());
+  for (const Finding& f : check.findings) EXPECT_EQ(f.severity, Severity::kNote) << f.text;
+  for (int k = 1000; k < 5000; ++k) pieces[1].time[k] += 0.3;
+  const LogCheck gap = CheckLog("two.csv", pieces);
+  EXPECT_TRUE(gap.faulty());
+  const auto json = nlohmann::json::parse(CheckJson(std::span(&gap, 1)));
+  const auto& log = json["logs"][0];
+  EXPECT_EQ(log["pieces"], 2);
+  EXPECT_EQ(log["faulty"], true);
+  const auto& findings = log["findings"];
+  const auto fault = std::ranges::find_if(
+      findings, [](const auto& finding) { return finding["severity"] == "fault"; });
+  ASSERT_NE(fault, findings.end());
+  EXPECT_EQ((*fault)["rows"], (std::vector<int>{6000, 6001}));
+  EXPECT_EQ((*fault)["aspect"], "clock");
+}
+
+TEST(MachineCheck, TheMeasuredDataHaveNoFaults) {
+  const auto real = RealData();
+  if (real.empty()) GTEST_SKIP() << "no measured data in UPSWING_REAL or ../shared/real";
+  int logs = 0;
+  for (const char* folder : {"C.1/sysid", "C.1/swingup", "C.1/pushed", "A.0/free_decay"}) {
+    for (const auto& entry : std::filesystem::directory_iterator(real / folder)) {
+      const auto pieces = ReadLog(entry.path());
+      const LogCheck check = CheckLog(entry.path(), pieces);
+      for (const Finding& f : check.findings) {
+        EXPECT_NE(f.severity, Severity::kFault) << entry.path() << ": " << f.text;
+        // In this log dry friction holds joint 2, the only such log.
+        EXPECT_EQ(f.aspect == Aspect::kMotion,
+                  entry.path().stem() == "20230629-143906.csv" && f.aspect == Aspect::kMotion)
+            << entry.path() << ": " << f.text;
+      }
+      ++logs;
+    }
+  }
+  EXPECT_EQ(logs, 45);
+}
+
+}  // namespace
+}  // namespace upswing

@@ -1,0 +1,188 @@
+// Checks of the measured torque against the commanded one.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "extras/machine/check.h"
+#include "extras/machine/pairs.h"
+
+namespace upswing {
+namespace {
+
+/// A model of the measured torque: the command after a delay, a first-order lag and a gain.
+struct Response {
+  int rows = 0;    // delay
+  double lag = 0;  // s
+  Pairs pairs;     // of delayed command and measurement
+  double residual() const { return 1 - std::pow(pairs.correlation(), 2); }
+};
+
+constexpr double kMostPairs = 1e5;  // rows of a fit; more take long and tell no more
+
+/// Command of joint `from`, delayed and lagged, against the measured torque of joint `to`.
+Response Respond(Pieces pieces, int from, int to, int rows, double lag) {
+  Response response{rows, lag, {}};
+  for (const MachineLog& piece : pieces) {
+    double torque = 0;
+    for (int k = rows; k < piece.rows() && response.pairs.n < kMostPairs; ++k) {
+      const int sent = k - rows;
+      double command = piece.commanded[sent][from];
+      if (!piece.push.empty()) command += piece.push[sent][from];
+      const double seconds = k > rows ? piece.time[k] - piece.time[k - 1] : 1e9;
+      torque += (lag > 0 ? 1 - std::exp(-seconds / lag) : 1) * (command - torque);
+      response.pairs.Add(torque, piece.measured[k][to]);
+    }
+  }
+  return response;
+}
+
+/// The responses with the best fit of each delay.
+std::vector<Response> ResponsesOf(Pieces pieces, int from, int to) {
+  const double cycle = MedianCycle(pieces);
+  const int most = std::clamp(static_cast<int>(std::ceil(0.05 / std::max(cycle, 1e-4))), 3, 25);
+  std::vector<Response> responses;
+  for (int rows = 0; rows <= most; ++rows) {
+    Response best = Respond(pieces, from, to, rows, 0);
+    for (const double lag : {.001, .002, .003, .004, .005, .006, .008, .01, .012, .016, .02}) {
+      const Response next = Respond(pieces, from, to, rows, lag);
+      if (next.pairs.correlation() > best.pairs.correlation()) best = next;
+    }
+    responses.push_back(best);
+  }
+  return responses;
+}
+
+Response BestOf(const std::vector<Response>& responses) {
+  return *std::ranges::max_element(responses, {},
+                                   [](const Response& r) { return r.pairs.correlation(); });
+}
+
+/// `2 rows (1 to 3)`: the best delay, and the delays with nearly the same fit.
+std::string DelayText(const std::vector<Response>& responses, const Response& best) {
+  int low = best.rows, high = best.rows;
+  for (const Response& response : responses) {
+    if (response.residual() > 1.05 * best.residual() + 1e-12) continue;
+    low = std::min(low, response.rows);
+    high = std::max(high, response.rows);
+  }
+  return fmt::format("{} row{}{}", best.rows, best.rows == 1 ? "" : "s",
+                     low < high ? fmt::format(" ({} to {})", low, high) : "");
+}
+
+/// Reports a gain that no motor has; false if the gain is plausible.
+bool CheckTorqueGain(const Response& best, int joint, Findings& findings) {
+  const double gain = best.pairs.gain();
+  if (gain > 1.0 / 3 && gain < 3) return false;
+  const char* meaning = gain > 300 && gain < 3000    ? "suspect measured torque in mN·m"
+                        : gain > 3e-4 && gain < 3e-3 ? "suspect commanded torque in mN·m"
+                                                     : "suspect the unit or a gear";
+  findings.push_back({Aspect::kTorque,
+                      joint + 1,
+                      Severity::kFault,
+                      fmt::format("measured {:.3g} times commanded: {}", gain, meaning),
+                      {},
+                      {{"gain", gain}, {"correlation", best.pairs.correlation()}}});
+  return true;
+}
+
+/// Root mean square of a joint's measured torque, N·m.
+double RmsMeasured(Pieces pieces, int joint) {
+  double squares = 0, n = 0;
+  for (const MachineLog& piece : pieces) {
+    for (const Joints& torque : piece.measured) squares += torque[joint] * torque[joint];
+    n += static_cast<double>(piece.measured.size());
+  }
+  return n > 0 ? std::sqrt(squares / n) : 0;
+}
+
+void CheckTorque(Pieces pieces, int joint, Findings& findings) {
+  const std::vector<Response> responses = ResponsesOf(pieces, joint, joint);
+  const Response best = BestOf(responses);
+  constexpr double kFollows = 0.6, kClear = 0.9, kBetter = 0.02;  // correlations
+  const double r = best.pairs.correlation(), gain = best.pairs.gain();
+  const auto add = [&](Severity severity, const std::string& text) {
+    findings.push_back(
+        {Aspect::kTorque,
+         joint + 1,
+         severity,
+         text,
+         {},
+         {{"delay_rows", best.rows}, {"lag", best.lag}, {"gain", gain}, {"correlation", r}}});
+  };
+  if (!(best.pairs.Sxx() > 1e-9 * best.pairs.n)) {
+    if (ActsWithoutCommand(pieces, joint)) {
+      add(Severity::kFault, fmt::format("measured torque of {:.2g} N·m (rms) without a command",
+                                        RmsMeasured(pieces, joint)));
+    }
+    return;
+  }
+  if (!(best.pairs.Syy() > 1e-9 * best.pairs.n)) {
+    return add(Severity::kWarning, "measured torque never changes");
+  }
+  if (r < kClear) {
+    const Response other = BestOf(ResponsesOf(pieces, 1 - joint, joint));
+    if (other.pairs.correlation() > std::max(kClear, r + kBetter)) {
+      return add(Severity::kFault,
+                 fmt::format("measured torque follows the command of joint {}: suspect swapped "
+                             "columns",
+                             2 - joint));
+    }
+  }
+  if (r < kFollows) {
+    const double now = responses.front().pairs.correlation();
+    if (now < -kFollows) {
+      return add(Severity::kFault, "measured torque has the opposite sign of the command");
+    }
+    return add(Severity::kWarning,
+               fmt::format("measured torque does not follow the command (correlation {:.2f})", r));
+  }
+  if (CheckTorqueGain(best, joint, findings)) return;
+  add(Severity::kNote, fmt::format("measured follows commanded after {} and a lag of {:.0f} ms, "
+                                   "gain {:.2f}, correlation {:.3f}",
+                                   DelayText(responses, best), 1e3 * best.lag, gain, r));
+}
+
+/// Reports torques that no pendulum of this kind has.
+void CheckTorqueSize(Pieces pieces, int joint, Findings& findings) {
+  const bool known = std::ranges::any_of(findings, [&](const Finding& finding) {
+    return finding.aspect == Aspect::kTorque && finding.joint == joint + 1 &&
+           finding.severity == Severity::kFault;
+  });
+  double largest = 0;
+  for (const MachineLog& piece : pieces) {
+    for (const auto* torques : {&piece.commanded, &piece.measured}) {
+      for (const Joints& u : *torques) largest = std::max(largest, std::abs(u[joint]));
+    }
+  }
+  constexpr double kLarge = 100;  // N·m
+  if (known || largest <= kLarge) return;
+  findings.push_back({Aspect::kTorque,
+                      joint + 1,
+                      Severity::kFault,
+                      fmt::format("up to {:.4g} N·m: suspect mN·m", largest),
+                      {},
+                      {{"largest", largest}}});
+}
+
+}  // namespace
+
+bool ActsWithoutCommand(Pieces pieces, int joint) {
+  constexpr double kActs = 0.5;   // N·m, rms
+  constexpr double kShare = 0.5;  // of the other joint's
+  const bool has_command = std::ranges::any_of(
+      pieces, [&](const MachineLog& piece) { return HasTorque(piece.commanded, joint); });
+  return !has_command &&
+         RmsMeasured(pieces, joint) > std::max(kActs, kShare * RmsMeasured(pieces, 1 - joint));
+}
+
+void CheckTorques(Pieces pieces, Findings& findings) {
+  for (const int joint : {0, 1}) {
+    if (!pieces.front().commanded.empty() && !pieces.front().measured.empty()) {
+      CheckTorque(pieces, joint, findings);
+    }
+    CheckTorqueSize(pieces, joint, findings);
+  }
+}
+
+}  // namespace upswing

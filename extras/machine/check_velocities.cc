@@ -1,0 +1,160 @@
+// Checks of the velocities against the angles.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "base/text.h"
+#include "extras/machine/check.h"
+#include "extras/machine/pairs.h"
+
+namespace upswing {
+namespace {
+
+/// Velocities of `joint` against central differences of the angle of `other`.
+Pairs VelocityPairs(Pieces pieces, int joint, int other) {
+  Pairs pairs;
+  for (const MachineLog& piece : pieces) {
+    for (int k = 1; k + 1 < piece.rows(); ++k) {
+      pairs.Add(CentralDifference(piece, k, other), piece.velocity[k][joint]);
+    }
+  }
+  return pairs;
+}
+
+/// A gain of velocities that tells of a wrong unit.
+struct WrongUnit {
+  double gain;
+  const char* suspect;
+};
+constexpr double kDegree = std::numbers::pi / 180;
+constexpr WrongUnit kWrongUnits[] = {
+    {1 / kDegree, "velocities in deg/s"},
+    {kDegree, "angles in degrees"},
+    {60 / (2 * std::numbers::pi), "velocities in rpm"},
+    {kDegree * 60 / (2 * std::numbers::pi), "angles in degrees and velocities in rpm"},
+    {1e3, "a clock in ms"},
+    {1e6, "a clock in µs"}};
+
+/// What a gain of the velocities means.
+std::string MeaningOf(double gain) {
+  for (const WrongUnit& unit : kWrongUnits) {
+    if (std::abs(std::abs(gain) / unit.gain - 1) < 0.07) {
+      return Concat("suspect ", unit.suspect);
+    }
+  }
+  return gain < 0 ? "opposite sign" : "suspect the unit or a gear";
+}
+
+/// The difference of angles that the velocities of a joint are, for at least 99% of the rows; empty
+/// if they are none.
+std::string DifferenceOf(Pieces pieces, int joint) {
+  struct Kind {
+    const char* name;
+    int back, ahead;  // rows
+  };
+  for (const Kind& kind : {Kind{"backward", 1, 0}, {"central", 1, 1}, {"forward", 0, 1}}) {
+    double rows = 0, equal = 0;
+    for (const MachineLog& piece : pieces) {
+      for (int k = kind.back; k + kind.ahead < piece.rows(); ++k) {
+        const int from = k - kind.back, to = k + kind.ahead;
+        const double seconds = piece.time[to] - piece.time[from];
+        const double difference = piece.angle[to][joint] - piece.angle[from][joint];
+        const double v = piece.velocity[k][joint];
+        rows += 1;
+        equal += std::abs(v * seconds - difference) < 1e-6 * (seconds + std::abs(difference));
+      }
+    }
+    if (rows > 10 && equal >= 0.99 * rows) return kind.name;
+  }
+  return "";
+}
+
+/// Finds the largest velocity where the angle moves faster.
+void CheckVelocityLimit(Pieces pieces, int joint, Findings& findings) {
+  double limit = 0;
+  for (const MachineLog& piece : pieces) {
+    for (const Joints& v : piece.velocity) limit = std::max(limit, std::abs(v[joint]));
+  }
+  constexpr int kRows = 5;
+  std::optional<LogRows> longest;
+  int times = 0;
+  for (const MachineLog& piece : pieces) {
+    int first = 0;
+    for (int k = 1; k < piece.rows(); ++k) {
+      const bool last = k + 2 >= piece.rows();
+      const bool clipped = !last && std::abs(piece.velocity[k][joint]) >= limit * (1 - 1e-9) &&
+                           std::abs(CentralDifference(piece, k, joint)) > 1.03 * limit;
+      if (clipped) continue;
+      const int rows = k - 1 - first;  // from first + 1 to k - 1
+      if (rows >= kRows && ++times > 0) {
+        const LogRows range = RangeOf(piece, first + 1, k - 1);
+        if (!longest || range.last - range.first > longest->last - longest->first) longest = range;
+      }
+      first = k;
+    }
+  }
+  if (!longest) return;
+  findings.push_back({Aspect::kVelocity,
+                      joint + 1,
+                      Severity::kFault,
+                      fmt::format("saturates at {:.4g} rad/s{}", limit,
+                                  times > 1 ? fmt::format("; {} times, longest", times) : ""),
+                      longest,
+                      {{"limit", limit}, {"times", times}}});
+}
+
+void CheckVelocity(Pieces pieces, int joint, Findings& findings) {
+  const auto add = [&](Severity severity, const std::string& text, const Pairs& pairs) {
+    findings.push_back({Aspect::kVelocity,
+                        joint + 1,
+                        severity,
+                        text,
+                        {},
+                        {{"gain", pairs.gain()}, {"correlation", pairs.correlation()}}});
+  };
+  const Pairs own = VelocityPairs(pieces, joint, joint);
+  const double r = own.correlation(), gain = own.gain();
+  if (AngleRange(pieces, joint) < kMoves) {
+    return add(Severity::kNote, "not compared: the joint hardly moves", own);
+  }
+  constexpr double kAgree = 0.8, kClear = 0.9, kBetter = 0.02;  // correlations
+  const Pairs other = VelocityPairs(pieces, joint, 1 - joint);
+  const double of_other = std::abs(other.correlation());
+  if (of_other > std::max(kClear, std::abs(r) + kBetter) &&
+      AngleRange(pieces, 1 - joint) > kMoves) {
+    return add(Severity::kFault,
+               fmt::format("follows the angle of joint {}: suspect swapped columns", 2 - joint),
+               other);
+  }
+  if (std::abs(r) < kAgree) {
+    return add(Severity::kWarning, fmt::format("does not follow the angle (correlation {:.2f})", r),
+               own);
+  }
+  if (std::abs(gain - 1) > 0.3) {
+    return add(Severity::kFault,
+               fmt::format("{:.4g} times the change of the angle: {}", gain, MeaningOf(gain)), own);
+  }
+  const std::string difference = DifferenceOf(pieces, joint);
+  if (!difference.empty()) {
+    return add(Severity::kNote,
+               fmt::format("exactly the {} difference of the angle: no measurement of its own",
+                           difference),
+               own);
+  }
+  add(std::abs(gain - 1) > 0.1 ? Severity::kWarning : Severity::kNote,
+      fmt::format("{:.3f} times the change of the angle, correlation {:.3f}", gain, r), own);
+}
+
+}  // namespace
+
+void CheckVelocities(Pieces pieces, Findings& findings) {
+  if (pieces.front().velocity.empty()) return;
+  for (const int joint : {0, 1}) {
+    CheckVelocity(pieces, joint, findings);
+    CheckVelocityLimit(pieces, joint, findings);
+  }
+}
+
+}  // namespace upswing

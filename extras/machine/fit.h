@@ -1,0 +1,40 @@
+#pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/progress.h"
+#include "base/thread_pool.h"
+#include "extras/machine/motion.h"
+#include "extras/machine/windows.h"
+
+/// Identification of a twin by multiple shooting (Bock, 1983): many windows of the logs, each with
+/// a free start state, and values that all windows share. Levenberg and Marquardt's method with a
+/// robust cost; the start states are eliminated window by window.
+namespace upswing {
+
+/// Settings of an identification.
+struct FitConfig {
+  WindowRules windows = {1, 0.5};  // seconds, hop
+  int iterations = 40;
+  double tolerance = 1e-5;  // least relative decrease of the cost in an iteration
+};
+
+/// The result of an identification.
+struct FitResult {
+  Twin twin;  // with its sessions; the covariance includes the variance between them
+  int windows = 0;
+  double error = 0;         // median over the windows of the rms of both angles' error, rad
+  double torque_error = 0;  // median rms error of the reported torques, N·m; NaN without them
+};
+
+/// Identifies the twin's values called `names`. `first` is the initial guess, and has the values of
+/// all others. Throws BadInput if no window of the logs keeps the rules, if a name is unknown, or
+/// if the predictions stay hopelessly wrong.
+FitResult Fit(std::span<const MachineLog> logs, const Twin& first,
+              const std::vector<std::string>& names, const FitConfig& config, ThreadPool* pool,
+              const Progress& progress = nullptr);
+
+}  // namespace upswing

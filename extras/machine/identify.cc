@@ -1,0 +1,169 @@
+#include "extras/machine/identify.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "base/error.h"
+#include "base/text.h"
+#include "extras/machine/check.h"
+
+namespace upswing {
+namespace {
+
+constexpr double kJudgedSeconds = 1;  // length of the windows that choose a structure
+
+/// The fold of each log: the logs of a session are dealt in turn. If all sessions have a single
+/// log, the sessions are dealt instead. Throws BadInput for a single log.
+std::vector<int> Folds(std::span<const MachineLog> logs, int folds) {
+  if (logs.size() < 2) {
+    throw BadInput(
+        "--folds: expected two logs or more for a cross-validation, got 1; "
+        "--folds 0 goes without");
+  }
+  std::map<std::string, int> dealt;
+  std::vector<int> fold;
+  for (const MachineLog& log : logs) fold.push_back(dealt[SessionOf(log.name)]++ % folds);
+  if (dealt.size() == logs.size()) {
+    for (int i = 0; i < static_cast<int>(logs.size()); ++i) fold[i] = i % folds;
+  }
+  return fold;
+}
+
+bool HasMotors(std::span<const MachineLog> logs) {
+  return std::ranges::any_of(logs, [](const MachineLog& log) {
+    return HasTorque(log.commanded, 0) || HasTorque(log.commanded, 1);
+  });
+}
+
+/// Throws BadInput for a log in which a motor acts without commanded torques, which drive the
+/// model.
+void ExpectCommands(const MachineLog& log) {
+  for (const int joint : {0, 1}) {
+    const bool acts = log.commanded.empty() ? HasTorque(log.measured, joint)
+                                            : ActsWithoutCommand(std::span(&log, 1), joint);
+    if (!acts) continue;
+    throw BadInput(Concat(log.name, ": joint ", joint + 1,
+                          ": expected commanded torques besides the measured ones, got none; "
+                          "--columns can name measured torques as commanded",
+                          joint + 1));
+  }
+}
+
+}  // namespace
+
+std::vector<Structure> Structures(bool has_motors) {
+  std::vector<Structure> structures;
+  std::vector<std::string> values{"center1", "inertia1", "inertia2"};
+  const auto add = [&](const char* name, const std::vector<std::string>& more) {
+    values.insert(values.end(), more.begin(), more.end());
+    structures.push_back({name, values});
+  };
+  if (!has_motors) {
+    add("rigid links", {"length1"});
+    add("and viscous friction", {"damping1", "damping2"});
+    add("and dry friction", {"coulomb1", "coulomb2"});
+    add("and zeros of each session", {"zero1", "zero2"});
+    return structures;
+  }
+  add("rigid links", {"center2"});
+  add("and viscous friction", {"damping1", "damping2"});
+  add("and dry friction", {"coulomb1", "coulomb2"});
+  add("and inertia of the motors", {"armature"});
+  add("and delay and lag of the motors", {"delay", "lag", "current_delay", "current_inertia"});
+  add("and zeros of each session", {"zero1", "zero2"});
+  return structures;
+}
+
+Identification Identify(std::span<const MachineLog> logs, const Twin& first,
+                        const IdentifyConfig& config, ThreadPool* pool, const Progress& progress) {
+  for (const MachineLog& log : logs) ExpectCommands(log);
+  const std::vector<Structure> structures = Structures(HasMotors(logs));
+  Identification result;
+  const int n = static_cast<int>(logs.size());
+  const double fits = 1.0 + config.folds * static_cast<double>(structures.size());
+  double done = 0;
+  const auto fit = [&](std::span<const MachineLog> own, const Twin& guess, const Structure& s) {
+    const auto part = [&](double step, double steps) {
+      if (progress) progress(done + step / steps, fits);
+    };
+    FitResult r = Fit(own, guess, s.values, config.fit, pool, part);
+    ++done;
+    return r;
+  };
+
+  result.chosen = static_cast<int>(structures.size()) - 1;
+  if (config.folds >= 2) {
+    const std::vector<int> fold = Folds(logs, config.folds);
+    double best = 0;
+    std::vector<Twin> guesses(config.folds, first);
+    for (int s = 0; s < static_cast<int>(structures.size()); ++s) {
+      std::vector<Twin> twins(n, first);
+      for (int f = 0; f < config.folds; ++f) {
+        std::vector<MachineLog> others;
+        for (int i = 0; i < n; ++i) {
+          if (fold[i] != f) others.push_back(logs[i]);
+        }
+        // Each structure begins with the values of the one before it.
+        guesses[f] = fit(others, guesses[f], structures[s]).twin;
+        for (int i = 0; i < n; ++i) {
+          if (fold[i] == f) twins[i] = InSession(guesses[f], logs[i]);
+        }
+      }
+      std::vector<std::vector<double>> errors(n);
+      ParallelFor(pool, n, [&](int i) {
+        errors[i] = WindowErrors(logs[i], twins[i], kJudgedSeconds, false);
+      });
+      const double error = PooledMedian(errors);
+      result.structures.push_back({structures[s], error});
+      if (s > 0 && !(error < best)) continue;
+      best = error;
+      result.chosen = s;
+      result.left_out = twins;
+    }
+  }
+  result.fit = fit(logs, first, structures[result.chosen]);
+  MeasureLoop(logs, result.fit.twin);
+  return result;
+}
+
+void MeasureLoop(std::span<const MachineLog> logs, Twin& twin) {
+  std::vector<double> periods, jitters, steps, torque_steps;
+  twin.loop.late = 0;
+  double cycles = 0, late = 0;
+  const auto note_step = [](double step, std::vector<double>& list) {
+    if (std::abs(step) > 1e-9) list.push_back(std::abs(step));
+  };
+  for (const MachineLog& log : logs) {
+    std::vector<double> own;
+    for (int k = 1; k < log.rows(); ++k) {
+      own.push_back(log.time[k] - log.time[k - 1]);
+      note_step(log.angle[k][0] - log.angle[k - 1][0], steps);
+      if (!log.measured.empty())
+        note_step(log.measured[k][0] - log.measured[k - 1][0], torque_steps);
+    }
+    if (own.empty()) continue;
+    const double period = Median(own);
+    double squares = 0, on_time = 0;
+    for (const double p : own) {
+      if (p > 1.25 * period) {
+        late += p > 5 * period ? 0 : 1;  // longer ones are gaps
+        if (p <= 5 * period) twin.loop.late = std::max(twin.loop.late, p - period);
+      } else {
+        squares += (p - period) * (p - period);
+        ++on_time;
+      }
+    }
+    cycles += static_cast<double>(own.size());
+    periods.push_back(period);
+    jitters.push_back(std::sqrt(squares / on_time));
+  }
+  if (periods.empty()) return;
+  twin.loop.period = Median(periods);
+  twin.loop.jitter = Median(jitters);
+  twin.loop.late_share = late / cycles;
+  if (!steps.empty()) twin.sensors.quantum = std::ranges::min(steps);
+  if (!torque_steps.empty()) twin.sensors.torque_quantum = std::ranges::min(torque_steps);
+}
+
+}  // namespace upswing

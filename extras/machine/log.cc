@@ -1,0 +1,344 @@
+#include "extras/machine/log.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "agents/toml_settings.h"
+#include "base/csv.h"
+#include "base/error.h"
+#include "base/format.h"
+#include "base/text.h"
+#include "os/file.h"
+#include "os/gzip.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr size_t kMostPieces = 10000;
+constexpr double kMostMagnitude = 1e12;  // larger numbers are garbage, and their squares overflow
+
+/// A unit that a column may have.
+struct LogUnit {
+  const char* name;
+  const char* quantity;
+  double scale;  // SI units in it
+};
+constexpr double kTurn = 2 * std::numbers::pi;
+constexpr LogUnit kUnits[] = {{"s", "time", 1},
+                              {"ms", "time", 1e-3},
+                              {"us", "time", 1e-6},
+                              {"rad", "angle", 1},
+                              {"deg", "angle", kTurn / 360},
+                              {"rad/s", "velocity", 1},
+                              {"deg/s", "velocity", kTurn / 360},
+                              {"rpm", "velocity", kTurn / 60},
+                              {"Nm", "torque", 1},
+                              {"N·m", "torque", 1},
+                              {"mNm", "torque", 1e-3},
+                              {"mN·m", "torque", 1e-3}};
+
+/// A quantity of each joint: its key in TOML files, and its columns in RealAIGym's logs of 2023 and
+/// of 2022, without the joint's number.
+struct JointQuantity {
+  const char *key, *name, *old_name;
+  const char* unit_of;  // quantity of its units
+  std::array<LogColumn, 2> LogColumns::*columns;
+  std::vector<Joints> MachineLog::*values;
+};
+constexpr JointQuantity kJointQuantities[] = {
+    {"angle", "pos_meas", "pos", "angle", &LogColumns::angle, &MachineLog::angle},
+    {"velocity", "vel_meas", "vel", "velocity", &LogColumns::velocity, &MachineLog::velocity},
+    {"commanded", "tau_con", "tau", "torque", &LogColumns::commanded, &MachineLog::commanded},
+    {"measured", "tau_meas", "", "torque", &LogColumns::measured, &MachineLog::measured},
+    {"push", "tau_pert", "", "torque", &LogColumns::push, &MachineLog::push}};
+
+/// The scale of a unit. Throws BadInput, which begins with `place`, for another quantity's unit.
+double ScaleOf(const std::string& unit, std::string_view quantity, const std::string& place) {
+  std::vector<std::string> names;
+  for (const LogUnit& known : kUnits) {
+    if (quantity != known.quantity) continue;
+    if (unit == known.name) return known.scale;
+    names.emplace_back(known.name);
+  }
+  throw BadInput(Concat(place, "unit: expected ", Join(names, ", "), ", got \"", unit, "\""));
+}
+
+/// The number of a TOML node.
+double NumberIn(const toml::node& node, Range range, const std::string& place) {
+  const auto number = node.is_number() ? node.value<double>() : std::nullopt;
+  if (number && std::isfinite(*number) && range.Contains(std::abs(*number))) return *number;
+  throw BadInput(Concat(place, "expected a number of magnitude ", range.low, " to ", range.high,
+                        ", got ", TextOf(node).value_or("another type")));
+}
+
+std::string TextIn(const toml::node& node, const std::string& place) {
+  if (node.is_string() && !node.as_string()->get().empty()) return node.as_string()->get();
+  throw BadInput(Concat(place, "expected the name of a column in quotes, got ",
+                        TextOf(node).value_or("another type")));
+}
+
+/// Reads `"name"` or `{column = "name", unit = "deg", factor = -1}`.
+LogColumn ColumnIn(const toml::node& node, std::string_view quantity, const std::string& place) {
+  LogColumn column;
+  const toml::table* table = node.as_table();
+  if (table == nullptr) {
+    column.name = TextIn(node, place);
+    return column;
+  }
+  for (const auto& [key, value] : *table) {
+    const std::string inner = Concat(place, key.str(), ": ");
+    if (key == "column") {
+      column.name = TextIn(value, inner);
+    } else if (key == "unit") {
+      column.scale *= ScaleOf(TextOf(value).value_or(""), quantity, place);
+    } else if (key == "factor") {
+      column.scale *= NumberIn(value, {1e-9, 1e9}, inner);
+    } else {
+      throw BadInput(Concat(place, "expected column, unit or factor, got ", key.str()));
+    }
+  }
+  if (column.name.empty()) throw BadInput(Concat(place, "expected a column, got none"));
+  return column;
+}
+
+/// Sets one key of a TOML file; false if there is no such key.
+bool SetColumn(LogColumns& columns, std::string_view key, const toml::node& node,
+               const std::string& place) {
+  if (key == "time") {
+    columns.time = ColumnIn(node, "time", place);
+  } else if (key == "piece") {
+    columns.piece = TextIn(node, place);
+  } else if (key == "hanging") {
+    columns.hanging = NumberIn(node, {0, 1e6}, place);
+  } else if (key == "absolute") {
+    if (!node.is_boolean()) {
+      throw BadInput(
+          Concat(place, "expected true or false, got ", TextOf(node).value_or("another type")));
+    }
+    columns.absolute = node.as_boolean()->get();
+  } else {
+    for (const JointQuantity& q : kJointQuantities) {
+      for (int joint = 0; joint < 2; ++joint) {
+        if (key != Concat(q.key, joint + 1)) continue;
+        (columns.*q.columns)[joint] = ColumnIn(node, q.unit_of, place);
+        return true;
+      }
+    }
+    return false;
+  }
+  return true;
+}
+
+/// Throws BadInput if a column of the file stands for two keys.
+void CheckOwnColumns(const LogColumns& columns, const std::string& where) {
+  std::map<std::string, std::string> keys{{columns.time.name, "time"}};
+  const auto add = [&](const std::string& name, const std::string& key) {
+    if (name.empty()) return;
+    const auto [found, is_new] = keys.emplace(name, key);
+    if (is_new) return;
+    throw BadInput(Concat(where, ": expected a column for each key, got \"", Printable(name),
+                          "\" for ", found->second, " and ", key));
+  };
+  for (const JointQuantity& q : kJointQuantities) {
+    for (int joint = 0; joint < 2; ++joint) {
+      add((columns.*q.columns)[joint].name, Concat(q.key, joint + 1));
+    }
+  }
+  add(columns.piece, "piece");
+}
+
+std::vector<std::string> KnownKeys() {
+  std::vector<std::string> keys{"time", "piece", "hanging", "absolute"};
+  for (const JointQuantity& q : kJointQuantities) {
+    for (const int joint : {1, 2}) keys.push_back(Concat(q.key, joint));
+  }
+  return keys;
+}
+
+/// The columns of a log of RealAIGym, from the file's line of names.
+LogColumns RealAiGymColumns(const std::vector<std::string>& names, const std::string& where) {
+  const auto has = [&](const std::string& name) { return std::ranges::count(names, name) > 0; };
+  const bool is_old = !has("pos_meas1");
+  if (!has("time") || !has(is_old ? "pos1" : "pos_meas1")) {
+    throw BadInput(Concat(where,
+                          ": expected the columns time and pos_meas1 or pos1, or --columns FILE "
+                          "that names yours, got \"",
+                          Shortened(Join(names, ","), 200), "\""));
+  }
+  LogColumns columns;
+  columns.time.name = "time";
+  for (const JointQuantity& q : kJointQuantities) {
+    const std::string name = is_old ? q.old_name : q.name;
+    const bool needed = q.values == &MachineLog::angle;
+    for (int joint = 0; joint < 2; ++joint) {
+      const std::string column = Concat(name, joint + 1);
+      if (needed || has(column)) (columns.*q.columns)[joint].name = column;
+    }
+  }
+  return columns;
+}
+
+/// Numbers of a column in SI units. Throws BadInput for a huge one.
+std::vector<double> Scaled(CsvColumn column, double scale, double zero, const std::string& where) {
+  for (size_t row = 0; row < column.values.size(); ++row) {
+    double& x = column.values[row];
+    x = (x - zero) * scale;
+    if (std::abs(x) <= kMostMagnitude) continue;
+    throw BadInput(Concat(where, ": row ", row + 1, ": ", column.name,
+                          ": expected a number of magnitude 0 to ", kMostMagnitude, ", got ", x));
+  }
+  return std::move(column.values);
+}
+
+/// All rows of a file as one log, and the values of its column of pieces.
+struct WholeLog {
+  MachineLog log;
+  std::vector<double> piece;  // empty: a single piece
+};
+
+WholeLog ReadRows(std::string_view csv, const LogColumns& columns, const std::string& where) {
+  if (columns.velocity[0].name.empty() != columns.velocity[1].name.empty()) {
+    throw BadInput(
+        Concat(where, ": expected the velocities of both joints or of neither, got one"));
+  }
+  std::vector<std::string> names;
+  const auto add = [&](const std::string& name) {
+    if (!name.empty() && std::ranges::count(names, name) == 0) names.push_back(name);
+  };
+  add(columns.time.name);
+  add(columns.piece);
+  for (const JointQuantity& q : kJointQuantities) {
+    for (const LogColumn& column : columns.*q.columns) add(column.name);
+  }
+  std::map<std::string, CsvColumn> table;
+  for (CsvColumn& column : ReadCsv(csv, names, where)) {
+    std::string name = column.name;
+    table.emplace(std::move(name), std::move(column));
+  }
+  WholeLog whole;
+  whole.log.time = Scaled(table[columns.time.name], columns.time.scale, 0, where);
+  if (!columns.piece.empty()) whole.piece = table[columns.piece].values;
+  for (const JointQuantity& q : kJointQuantities) {
+    std::vector<Joints>& values = whole.log.*q.values;
+    const bool is_angle = q.values == &MachineLog::angle;
+    for (int joint = 0; joint < 2; ++joint) {
+      const LogColumn& column = (columns.*q.columns)[joint];
+      if (column.name.empty()) continue;
+      const std::vector<double> numbers =
+          Scaled(table[column.name], column.scale, is_angle ? columns.hanging : 0, where);
+      values.resize(numbers.size());
+      for (size_t row = 0; row < numbers.size(); ++row) values[row][joint] = numbers[row];
+    }
+    if (!columns.absolute || (!is_angle && q.values != &MachineLog::velocity)) continue;
+    for (Joints& row : values) row[1] -= row[0];
+  }
+  return whole;
+}
+
+/// Rows `begin` to `end` of a log.
+MachineLog PieceOf(const MachineLog& whole, int begin, int end) {
+  MachineLog piece;
+  piece.first_row = begin + 1;
+  piece.time.assign(whole.time.begin() + begin, whole.time.begin() + end);
+  for (const JointQuantity& q : kJointQuantities) {
+    const std::vector<Joints>& values = whole.*q.values;
+    if (!values.empty()) (piece.*q.values).assign(values.begin() + begin, values.begin() + end);
+  }
+  return piece;
+}
+
+/// Sets a piece's clock to 0 at its first row. Rounds the times to the decimals that the file's
+/// clock resolves (1 µs for seconds since 1970), so that its origin and unit change no bit.
+void StartClock(MachineLog& piece) {
+  const double begin = piece.time.front();
+  const double largest = std::max(std::abs(begin), std::abs(piece.time.back()));
+  const double rounding = 4 * (std::nextafter(largest, 2 * kMostMagnitude) - largest);
+  const double ticks = std::pow(10, std::min(15.0, -std::ceil(std::log10(rounding))));
+  for (double& time : piece.time) time = std::round((time - begin) * ticks) / ticks;
+}
+
+void CheckRows(const MachineLog& log, const std::string& where) {
+  if (log.rows() < 2) {
+    throw BadInput(
+        Concat(where, ": row ", log.first_row, ": expected at least 2 rows, got ", log.rows()));
+  }
+  for (int k = 1; k < log.rows(); ++k) {
+    if (log.time[k] >= log.time[k - 1]) continue;
+    throw BadInput(Concat(where, ": row ", log.first_row + k, ": time: expected at least ",
+                          FormatNumber(log.time[k - 1]), " s as in the row before, got ",
+                          FormatNumber(log.time[k]), " s"));
+  }
+}
+
+}  // namespace
+
+bool HasTorque(const std::vector<Joints>& torque, int joint) {
+  return std::ranges::any_of(torque, [joint](const Joints& u) { return u[joint] != 0; });
+}
+
+LogColumns ParseLogColumns(std::string_view text, const std::string& where) {
+  LogColumns columns;
+  for (const auto& [key, node] : ParseToml(text, where)) {
+    const std::string place = Concat(PlaceOf(node, where), ": ", key.str(), ": ");
+    if (SetColumn(columns, key.str(), node, place)) continue;
+    throw BadInput(Concat(place, "expected one of ", Join(KnownKeys(), ", "),
+                          DidYouMean(key.str(), KnownKeys())));
+  }
+  const auto expect = [&](const LogColumn& column, const char* key) {
+    if (column.name.empty())
+      throw BadInput(Concat(where, ": expected the key ", key, ", got none"));
+  };
+  expect(columns.time, "time");
+  expect(columns.angle[0], "angle1");
+  expect(columns.angle[1], "angle2");
+  CheckOwnColumns(columns, where);
+  if (columns.absolute && columns.velocity[0].name.empty() != columns.velocity[1].name.empty()) {
+    throw BadInput(Concat(where, ": expected velocity1 and velocity2, or neither, with absolute"));
+  }
+  return columns;
+}
+
+std::vector<MachineLog> ParseLog(std::string_view csv, const LogColumns* columns,
+                                 const std::string& where) {
+  WholeLog whole =
+      ReadRows(csv, columns ? *columns : RealAiGymColumns(CsvNames(csv, where), where), where);
+  const int rows = whole.log.rows();
+  std::vector<MachineLog> pieces;
+  if (whole.piece.empty()) {
+    pieces.push_back(std::move(whole.log));
+    pieces.back().name = where;
+  }
+  for (int begin = 0; begin < static_cast<int>(whole.piece.size());) {
+    int end = begin;
+    while (end < rows && whole.piece[end] == whole.piece[begin]) ++end;
+    if (pieces.size() == kMostPieces) {
+      throw BadInput(Concat(where, ": row ", begin + 1, ": ", columns->piece, ": expected at most ",
+                            kMostPieces, " pieces, got more"));
+    }
+    pieces.push_back(PieceOf(whole.log, begin, end));
+    pieces.back().name = Concat(where, " ", columns->piece, " ", FormatNumber(whole.piece[begin]));
+    begin = end;
+  }
+  for (MachineLog& piece : pieces) {
+    CheckRows(piece, where);
+    StartClock(piece);
+  }
+  return pieces;
+}
+
+std::vector<MachineLog> ReadLog(const fs::path& file, const fs::path& columns) {
+  LogColumns own;
+  if (!columns.empty()) own = ParseLogColumns(ReadOwnFile(columns), columns.string());
+  const std::string where = file.string();
+  std::string text = ReadOwnFile(file);
+  if (IsGzip(text)) text = Gunzip(text, where);
+  return ParseLog(text, columns.empty() ? nullptr : &own, where);
+}
+
+}  // namespace upswing

@@ -1,0 +1,393 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <iterator>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/error.h"
+#include "base/format.h"
+#include "base/json.h"
+#include "base/text.h"
+#include "cli/commands.h"
+#include "cli/progress.h"
+#include "cli/say.h"
+#include "extras/machine/check.h"
+#include "extras/machine/identify.h"
+#include "os/file.h"
+#include "os/machine.h"
+#include "os/streams.h"
+#include "report/figure.h"
+
+namespace upswing {
+namespace {
+
+struct MachineArguments {
+  std::string action;
+  std::vector<std::string> logs;
+  std::string columns, figure, plant, out, csv;
+  std::vector<std::string> against;
+  int64_t folds = 5, threads = 0;
+  double seconds = 1;
+  bool as_json = false;
+};
+
+void PrintCheck(const LogCheck& check) {
+  fmt::print("{}: {} rows, {:.2f} s{}\n", Printable(check.name), check.rows, check.seconds,
+             check.pieces > 1 ? fmt::format(" in {} pieces", check.pieces) : "");
+  for (const Finding& finding : check.findings) {
+    fmt::print("  {:<8} {:<11} {}{}\n", NameOf(finding.severity), AboutText(finding), finding.text,
+               finding.rows ? ", " + RowsText(*finding.rows) : "");
+  }
+}
+
+int RunCheck(const MachineArguments& a) {
+  if (!a.figure.empty() && a.logs.size() > 1) {
+    throw BadInput(Concat("--figure: expected one log with it, got ", a.logs.size()));
+  }
+  std::vector<LogCheck> checks;
+  for (const std::string& file : a.logs) {
+    const std::vector<MachineLog> pieces = ReadLog(file, a.columns);
+    checks.push_back(CheckLog(file, pieces));
+    if (!a.figure.empty()) DrawCheck(checks.back(), pieces, a.figure);
+    if (!a.as_json) PrintCheck(checks.back());
+  }
+  if (a.as_json) fmt::print("{}\n", CheckJson(checks));
+  if (!a.figure.empty() && !a.as_json) fmt::print("written {}\n", Printable(a.figure));
+  return std::ranges::any_of(checks, &LogCheck::faulty) ? 1 : 0;
+}
+
+std::string ErrorText(const Estimate& e) {
+  if (!e.interval) return fmt::format("{:.3f}", e.value);
+  return fmt::format("{:.3f} ({:.3f}–{:.3f})", e.value, e.interval->low, e.interval->high);
+}
+
+/// The torques that drive predictions in place of reported ones.
+const char* CommandedIn(std::span<const MachineLog> logs) {
+  const bool has_commands = std::ranges::any_of(logs, [](const MachineLog& log) {
+    return HasTorque(log.commanded, 0) || HasTorque(log.commanded, 1);
+  });
+  return has_commands ? "commanded" : "no";
+}
+
+void PrintErrors(std::span<const ErrorRow> rows, std::span<const Predictor> predictors,
+                 const char* commanded) {
+  size_t width = 8;
+  for (const ErrorRow& row : rows) width = std::max(width, Columns(Printable(row.session)));
+  const auto pad = [](const std::string& text, size_t columns) {
+    return text + std::string(columns - std::min(columns, Columns(text)), ' ');
+  };
+  constexpr size_t kCell = 22;
+  std::string heads;
+  for (const Predictor& p : predictors) heads += pad(Printable(p.name), kCell);
+  for (const bool reported : {false, true}) {
+    if (std::ranges::none_of(rows, [&](const auto& r) { return r.reported == reported; })) continue;
+    fmt::print("\nmedian error of the angles, rad (95% over runs), driven by {} torques\n",
+               reported ? "reported" : commanded);
+    fmt::print("  {}    s runs windows  {}\n", pad("", width), heads);
+    for (const ErrorRow& row : rows) {
+      if (row.reported != reported) continue;
+      std::string cells;
+      for (const Estimate& error : row.errors) cells += pad(ErrorText(error), kCell);
+      fmt::print("  {} {:>4} {:>4} {:>7}  {}\n",
+                 pad(row.session.empty() ? "all runs" : Printable(row.session), width),
+                 FormatNumber(row.seconds), row.runs, row.windows, cells);
+    }
+  }
+  if (predictors.size() < 2) return;
+  fmt::print("\nerror smaller than {}'s by, % (95% over runs)\n",
+             Printable(predictors.back().name));
+  // A single session has no row for all runs: its own row has them.
+  const bool has_all =
+      std::ranges::any_of(rows, [](const ErrorRow& row) { return row.session.empty(); });
+  for (const ErrorRow& row : rows) {
+    if (has_all && !row.session.empty()) continue;
+    const auto [value, interval] = row.improvement;
+    fmt::print(
+        "  {}, {} s, {} torques: {:.0f}{}\n",
+        row.session.empty() ? "all runs" : Printable(row.session), FormatNumber(row.seconds),
+        row.reported ? "reported" : commanded, 100 * value,
+        interval ? fmt::format(" ({:.0f}–{:.0f})", 100 * interval->low, 100 * interval->high) : "");
+  }
+}
+
+/// Adds the models that --against names. A model whose name is taken gets its file as the name.
+void AddOthers(std::span<const Twin> twins, const MachineArguments& a,
+               std::span<const MachineLog> logs, std::vector<Predictor>& predictors) {
+  for (size_t i = 0; i < twins.size(); ++i) {
+    const bool is_taken =
+        std::ranges::find(predictors, twins[i].name, &Predictor::name) != predictors.end();
+    predictors.push_back(PredictorOf(is_taken ? a.against[i] : twins[i].name, twins[i], logs));
+  }
+}
+
+/// Reads the models that --against names.
+std::vector<Twin> ReadOthers(const MachineArguments& a) {
+  std::vector<Twin> twins;
+  for (const std::string& file : a.against) {
+    if (std::ranges::count(a.against, file) > 1) {
+      throw BadInput(Concat("--against: expected different files, got \"", Printable(file),
+                            "\" more than once"));
+    }
+    twins.push_back(ReadTwin(file, "--against"));
+  }
+  return twins;
+}
+
+nlohmann::ordered_json ErrorsJson(std::span<const ErrorRow> rows,
+                                  std::span<const Predictor> predictors, const char* commanded) {
+  const auto json_of = [](const Estimate& e) {
+    nlohmann::ordered_json json{{"value", e.value}};
+    if (e.interval) json["interval"] = {e.interval->low, e.interval->high};
+    return json;
+  };
+  auto list = nlohmann::ordered_json::array();
+  for (const ErrorRow& row : rows) {
+    nlohmann::ordered_json errors;
+    for (size_t p = 0; p < predictors.size(); ++p) {
+      errors[predictors[p].name] = json_of(row.errors[p]);
+    }
+    list.push_back({{"session", row.session},
+                    {"seconds", row.seconds},
+                    {"torques", row.reported ? "reported" : commanded},
+                    {"runs", row.runs},
+                    {"windows", row.windows},
+                    {"median_error_rad", errors},
+                    {"improvement", json_of(row.improvement)}});
+  }
+  return list;
+}
+
+constexpr std::array kHorizons{0.2, 0.5, 1.0};
+
+int RunValidate(const MachineArguments& a) {
+  if (a.logs.size() < 2) {
+    throw BadInput("machine validate: expected a twin and at least one log");
+  }
+  const std::string& file = a.logs.front();
+  if (file.ends_with(".csv") || file.ends_with(".csv.gz")) {
+    throw BadInput(Concat("machine validate: expected the twin's file before the logs, got \"",
+                          Printable(file), "\""));
+  }
+  const Twin twin = ReadTwin(file, "machine validate");
+  const std::vector<Twin> others = ReadOthers(a);
+  const std::vector<MachineLog> logs =
+      ReadCheckedLogs(std::span(a.logs).subspan(1), a.columns, SayError);
+  std::vector<Predictor> predictors{PredictorOf(twin.name, twin, logs)};
+  AddOthers(others, a, logs, predictors);
+  ThreadPool pool(ResolveThreads(a.threads));
+  const auto rows = CompareErrors(logs, predictors, kHorizons, &pool);
+  if (rows.empty()) {
+    throw BadInput(
+        "machine validate: expected logs with a motion of 0.2 s away from upright, got none");
+  }
+  if (!a.figure.empty()) DrawErrors(logs, predictors, a.figure, &pool);
+  if (!a.csv.empty()) WriteNamedFile(a.csv, MotionCsv(logs, predictors));
+  if (a.as_json) {
+    fmt::print("{}\n",
+               PrintableJson({{"errors", ErrorsJson(rows, predictors, CommandedIn(logs))}}));
+    return 0;
+  }
+  PrintErrors(rows, predictors, CommandedIn(logs));
+  for (const std::string& written : {a.figure, a.csv}) {
+    if (!written.empty()) fmt::print("written {}\n", Printable(written));
+  }
+  return 0;
+}
+
+void PrintTwin(const Identification& found) {
+  const Twin& twin = found.fit.twin;
+  const Options options = OptionsOf(twin);
+  const size_t n = twin.uncertain.size();
+  fmt::print("\nvalue                 ± standard deviation\n");
+  for (size_t i = 0; i < n; ++i) {
+    const Option& option = *options.Get(twin.uncertain[i]);
+    const double variance = twin.covariance[i * n + i];
+    if (variance > 0) {
+      fmt::print("  {:<16} {:>10.5f} ± {:.5f} {}\n", option.name, option.number(),
+                 std::sqrt(variance), option.unit);
+    } else {
+      fmt::print("  {:<16} {:>10.5f}   {}, at its limit or not visible in the logs\n", option.name,
+                 option.number(), option.unit);
+    }
+  }
+  fmt::print("\nsession                          zero 1  zero 2  friction 1  friction 2\n");
+  for (const Session& s : twin.sessions) {
+    fmt::print("  {:<30} {:>7.4f} {:>7.4f} {:>11.4f} {:>11.4f}\n", Shortened(Printable(s.name), 30),
+               s.zero1, s.zero2, s.coulomb1, s.coulomb2);
+  }
+}
+
+void PrintIdentification(const Identification& found, size_t logs) {
+  fmt::print("{} in {}\n", Counted(found.fit.windows, "window"),
+             Counted(static_cast<int64_t>(logs), "log"));
+  if (!found.structures.empty()) {
+    fmt::print("\nmodel                                    error on left-out runs, 1 s, rad\n");
+    for (size_t s = 0; s < found.structures.size(); ++s) {
+      fmt::print("{} {:<40} {:.4f}\n", static_cast<int>(s) == found.chosen ? "*" : " ",
+                 found.structures[s].structure.name, found.structures[s].error);
+    }
+  }
+  PrintTwin(found);
+}
+
+nlohmann::ordered_json IdentificationJson(const Identification& found, const std::string& file) {
+  auto structures = nlohmann::ordered_json::array();
+  for (const auto& [structure, error] : found.structures) {
+    structures.push_back({{"name", structure.name}, {"left_out_error_rad", error}});
+  }
+  return {{"twin", file},
+          {"windows", found.fit.windows},
+          {"structures", structures},
+          {"chosen", found.chosen}};
+}
+
+void CheckIdentifyArguments(const MachineArguments& a) {
+  if (a.plant.empty()) {
+    throw BadInput("machine identify: expected --plant FILE with masses and lengths, got none");
+  }
+  if (a.out.empty()) throw BadInput("machine identify: expected --out FILE, got none");
+  if (a.folds == 1) throw BadInput("--folds: expected 0, or 2 or more, got 1");
+  CheckWritable("--out", a.out);
+}
+
+int RunIdentify(const MachineArguments& a) {
+  CheckIdentifyArguments(a);
+  const Twin first = ReadTwin(a.plant, "--plant");
+  const std::vector<Twin> others = ReadOthers(a);
+  const std::vector<MachineLog> logs = ReadCheckedLogs(a.logs, a.columns, SayError);
+  IdentifyConfig config;
+  config.folds = static_cast<int>(a.folds);
+  config.fit.windows.seconds = a.seconds;
+  config.fit.windows.hop = a.seconds / 2;
+  ThreadPool pool(ResolveThreads(a.threads));
+  Identification found;
+  {
+    EpisodeProgress progress(a.as_json, "fits");
+    found = Identify(logs, first, config, &pool, std::ref(progress));
+  }
+  Twin& twin = found.fit.twin;
+  twin.name = std::filesystem::path(a.out).stem().string();
+  WriteNamedFile(a.out, TwinText(twin));
+  // Errors on runs that a twin has not seen, if there was a cross-validation.
+  std::vector<Predictor> predictors{found.left_out.empty()
+                                        ? PredictorOf("same runs", twin, logs)
+                                        : Predictor{"left-out runs", found.left_out}};
+  if (a.against.empty()) predictors.push_back(PredictorOf(first.name, first, logs));
+  AddOthers(others, a, logs, predictors);
+  const auto rows = CompareErrors(logs, predictors, kHorizons, &pool);
+  if (!a.figure.empty()) DrawErrors(logs, predictors, a.figure, &pool);
+  if (a.as_json) {
+    nlohmann::ordered_json json = IdentificationJson(found, a.out);
+    json["errors"] = ErrorsJson(rows, predictors, CommandedIn(logs));
+    fmt::print("{}\n", PrintableJson(json));
+    return 0;
+  }
+  PrintIdentification(found, logs.size());
+  PrintErrors(rows, predictors, CommandedIn(logs));
+  fmt::print("written {}\n", Printable(a.out));
+  if (!a.figure.empty()) fmt::print("written {}\n", Printable(a.figure));
+  return 0;
+}
+
+/// Refuses options of other actions.
+void CheckOptions(const CommandLine& line, const std::string& action) {
+  struct Owned {
+    const char* option;
+    std::vector<std::string> actions;
+  };
+  const std::array<Owned, 6> kOwned{{{"--plant", {"identify"}},
+                                     {"--out", {"identify"}},
+                                     {"--folds", {"identify"}},
+                                     {"--seconds", {"identify"}},
+                                     {"--csv", {"validate"}},
+                                     {"--against", {"identify", "validate"}}}};
+  for (const auto& [option, actions] : kOwned) {
+    if (!line.Has(option) || std::ranges::count(actions, action) > 0) continue;
+    throw BadInput(Concat("machine ", Printable(action), ": expected no ", option,
+                          ", which belongs to ", Join(actions, " and ")));
+  }
+}
+
+int RunMachine(const MachineArguments& a) {
+  if (a.logs.empty()) throw BadInput(Concat("machine ", a.action, ": expected a log, got none"));
+  if (!a.figure.empty()) {
+    CheckFigureName(a.figure);
+    CheckWritable("--figure", a.figure);
+    CheckCanDraw();
+  }
+  if (!a.csv.empty()) CheckWritable("--csv", a.csv);
+  if (a.action == "check") return RunCheck(a);
+  return a.action == "identify" ? RunIdentify(a) : RunValidate(a);
+}
+
+}  // namespace
+
+void AddMachine(CommandLine& line) {
+  MachineArguments& a = line.Runs(RunMachine);
+  line.Text("action", a.action, "ACTION",
+            "check: look for faults in logs; identify: fit a twin, a model of the machine, to "
+            "logs; validate: compare a twin's predictions with logs");
+  line.Require("action");
+  line.Texts("log", a.logs, "LOG",
+             "logs of a machine with two joints, .csv or .csv.gz; validate: first the twin's file");
+  line.Text("--columns", a.columns, "FILE",
+            "TOML file that names the columns and units (default: those of RealAIGym)");
+  line.Text("--figure", a.figure, "FILE", "figure of a log to draw, .svg or .png");
+  line.Text("--csv", a.csv, "FILE",
+            "validate: CSV file to write, measured and predicted angles of 1 s of each log");
+  line.Text("--plant", a.plant, "FILE",
+            "identify: plant file or shipped plant with masses, lengths and first guesses");
+  line.Text("--out", a.out, "FILE", "identify: TOML file of the twin to write");
+  line.Repeated("--against", a.against, "FILE",
+                "identify, validate: another twin or plant to compare with; repeat for more");
+  Options own;
+  own.Section("identify");
+  own.Add(&a.folds, "folds", {0, 100}, "",
+          "number of folds of the cross-validation that chooses the model; 0: none");
+  own.Add(&a.seconds, "seconds", {0.05, 10}, "s", "length of a window");
+  line.Arguments(own);
+  AddThreads(line, a.threads);
+  line.Flag("--json", a.as_json, "print JSON instead of text");
+  line.Check([&line, &a] {
+    constexpr std::array kActions{"check", "identify", "validate"};
+    if (std::ranges::find(kActions, a.action) == kActions.end()) {
+      throw BadInput(Concat("machine: expected check, identify or validate, got \"",
+                            Printable(a.action), "\""));
+    }
+    CheckOptions(line, a.action);
+  });
+  line.Footer(
+      "check prints a line for each finding. A note is a fact, such as the rate. A warning\n"
+      "needs a look. A fault misleads an analysis of the log: degrees, swapped columns,\n"
+      "a stuck encoder. Exit code: 0 without a fault, 1 with one, 2 if a log cannot be read.\n\n"
+      "identify fits masses, centres, inertias, friction, delay and lag to windows of the\n"
+      "logs. Each window has a free start state. The commanded torques drive the model; the\n"
+      "reported ones are a second measurement. Cross-validation chooses the model.\n"
+      "The twin's covariance includes the differences between sessions.\n\n"
+      "A file of columns:\n"
+      "  time = {column = \"t\", unit = \"ms\"}         # s, ms, us\n"
+      "  angle1 = {column = \"theta1\", unit = \"deg\"}  # rad, deg\n"
+      "  angle2 = {column = \"theta2\", unit = \"deg\", factor = -1}\n"
+      "  velocity1 = \"omega1\"                       # rad/s, deg/s, rpm\n"
+      "  commanded1 = {column = \"u\", unit = \"mNm\"}   # Nm, mNm; also measured1, push1\n"
+      "  piece = \"run\"        # a change of this column begins a separate piece\n"
+      "  absolute = true      # joint 2 is measured against the vertical\n"
+      "  hanging = 180        # angle that hangs, in the file's unit\n\n"
+      "Examples:\n"
+      "  ./upswing machine check trajectory.csv\n"
+      "  ./upswing machine check logs/*.csv.gz --json\n"
+      "  ./upswing machine identify logs/*.csv --plant realaigym-c1 \\\n"
+      "    --out twin.toml\n"
+      "  ./upswing machine validate twin.toml new/*.csv \\\n"
+      "    --against realaigym-c1\n"
+      "  ./upswing machine check swing.csv --columns columns.toml --figure swing.svg\n");
+}
+
+}  // namespace upswing

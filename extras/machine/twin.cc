@@ -1,0 +1,305 @@
+#include "extras/machine/twin.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "agents/toml_settings.h"
+#include "base/error.h"
+#include "base/text.h"
+#include "pendulum/disturbance.h"
+#include "pendulum/posterior.h"
+#include "runs/covariance.h"
+#include "runs/plant_file.h"
+
+namespace upswing {
+namespace {
+
+using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+constexpr size_t kMostSessions = 1000;
+
+/// A factor L of the covariance L L'. Throws BadInput if the matrix is not a covariance.
+Matrix Factor(const Twin& twin, const std::string& where) {
+  const int n = static_cast<int>(twin.uncertain.size());
+  const Eigen::Map<const Matrix> covariance(twin.covariance.data(), n, n);
+  // Scaled to ones on the diagonal, so that the test does not depend on units.
+  const Eigen::VectorXd deviation = covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  const auto refuse = [&](const std::string& names, const std::string& expected, double got) {
+    throw BadInput(
+        Concat(where, ": [covariance]: ", names, ": expected ", expected, ", got ", got));
+  };
+  Matrix correlation = Matrix::Zero(n, n);
+  constexpr double kRounding = 1e-6;
+  const auto name = [&](int i) -> const std::string& {
+    return twin.uncertain[static_cast<size_t>(i)];
+  };
+  for (int i = 0; i < n; ++i) {
+    if (covariance(i, i) < 0) refuse(name(i), "a variance of 0 or more", covariance(i, i));
+  }
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) {
+      const double scale = deviation(i) * deviation(j);
+      if (std::abs(covariance(i, j)) > (1 + kRounding) * scale) {
+        refuse(Concat(name(i), " and ", name(j)),
+               Concat("a covariance within ", scale, ", the product of their standard deviations"),
+               covariance(i, j));
+      }
+      if (scale > 0) correlation(i, j) = covariance(i, j) / scale;
+    }
+  }
+  const Eigen::LDLT<Matrix> factors(correlation);
+  const Eigen::VectorXd D = factors.vectorD();
+  if (D.minCoeff() < -kRounding) {
+    throw BadInput(Concat(where,
+                          ": [covariance]: expected a positive semidefinite matrix, got one ",
+                          "with a negative eigenvalue"));
+  }
+  Matrix L = factors.matrixL();
+  L = factors.transpositionsP().transpose() * L;
+  return deviation.asDiagonal() * L * D.cwiseMax(0).cwiseSqrt().asDiagonal();
+}
+
+/// Reads the table [sessions]: for each session, a table of its values.
+void ReadSessions(const toml::table& table, const std::string& where, Twin& twin) {
+  if (table.size() > kMostSessions) {
+    throw BadInput(Concat(PlaceOf(table, where), ": [sessions]: expected at most ", kMostSessions,
+                          " sessions, got ", table.size()));
+  }
+  for (const auto& [name, node] : table) {
+    if (!node.is_table()) {
+      throw BadInput(Concat(PlaceOf(node, where), ": ", Printable(name.str()),
+                            ": expected a table, got another type"));
+    }
+    Session& session = twin.sessions.emplace_back();
+    session.name = std::string(name.str());
+    ApplyTable(OptionsOf(session), *node.as_table(), where, /*alone=*/true);
+  }
+}
+
+/// Removes values from the covariance.
+void Forget(Twin& twin, const std::function<bool(const std::string&)>& forgets) {
+  std::vector<std::string> names;
+  std::vector<double> covariance;
+  const size_t n = twin.uncertain.size();
+  for (size_t i = 0; i < n; ++i) {
+    if (forgets(twin.uncertain[i])) continue;
+    names.push_back(twin.uncertain[i]);
+    for (size_t j = 0; j < n; ++j) {
+      if (!forgets(twin.uncertain[j])) covariance.push_back(twin.covariance[i * n + j]);
+    }
+  }
+  twin.uncertain = names;
+  twin.covariance = covariance;
+}
+
+/// The sensors of the control loop, and the time that a torque takes, as the age of what they show.
+Disturbance DisturbanceOf(const Twin& twin) {
+  Disturbance d;
+  const double share = twin.sensors.velocity_share;
+  d.sensors.latency =
+      std::clamp(twin.loop.period + twin.actuator.delay + twin.actuator.lag, 0.0, kLongestLatency);
+  if (twin.sensors.quantum > 0) {
+    d.sensors.encoder_counts = std::round(2 * std::numbers::pi / twin.sensors.quantum);
+  }
+  d.sensors.velocity_window = std::min(twin.loop.period, kLongestWindow);
+  d.sensors.velocity_filter = std::min(twin.loop.period * (1 - share) / share, kSlowestFilter);
+  return d;
+}
+
+std::string Quoted(std::string_view text) {
+  std::string quoted = "\"";
+  for (const char c : Printable(text)) {
+    if (c == '"' || c == '\\') quoted += '\\';
+    quoted += c;
+  }
+  return quoted + '"';
+}
+
+}  // namespace
+
+void Actuator::Describe(Options& o) {
+  constexpr double kLongest = 0.1;  // s
+  o.Section("actuator");
+  o.Add(&delay, "delay", {-kLongest, kLongest}, "s",
+        "time from reading the angles to the response of the torque sent with them");
+  o.Add(&lag, "lag", {0, kLongest}, "s", "time constant of the torque");
+  o.Add(&passive_limit, "passive_limit", {0, 1000}, "N·m",
+        "largest torque of the joint that is not actuated");
+  o.Add(&current_delay, "current_delay", {-kLongest, kLongest}, "s",
+        "time from the reported torque to the reading of the angles");
+  o.Add(&current_inertia, "current_inertia", {0, 1}, "kg·m²",
+        "part of the reported torque that opposes the joint's acceleration");
+}
+
+void MachineSensors::Describe(Options& o) {
+  o.Section("sensors");
+  o.Add(&quantum, "quantum", {0, 1}, "rad", "step of a measured angle");
+  o.Add(&angle_range, "angle_range", {1, 1e6}, "rad", "largest measured angle");
+  o.Add(&torque_quantum, "torque_quantum", {0, 10}, "N·m", "step of a reported torque");
+  o.Add(&zero1, "zero1", {-1, 1}, "rad", "measured angle of joint 1 that hangs");
+  o.Add(&zero2, "zero2", {-1, 1}, "rad", "measured angle of a straight joint 2");
+  o.Add(&velocity_share, "velocity_share", {0.001, 1}, "",
+        "share of the newest difference of angles in the low-passed velocity");
+  o.Add(&velocity_dead_zone, "velocity_dead_zone", {0, 100}, "rad/s",
+        "velocity below which the loop takes 0");
+}
+
+void LoopTiming::Describe(Options& o) {
+  o.Section("loop");
+  o.Add(&period, "period", {1e-4, 1}, "s", "median time between two cycles");
+  o.Add(&jitter, "jitter", {0, 0.1}, "s", "standard deviation of this time");
+  o.Add(&late_share, "late_share", kUnit, "", "share of the cycles that are late");
+  o.Add(&late, "late", {0, 1}, "s", "largest lateness of these");
+}
+
+void Session::Describe(Options& o) {
+  o.Add(&zero1, "zero1", {-1, 1}, "rad", "measured angle of joint 1 that hangs");
+  o.Add(&zero2, "zero2", {-1, 1}, "rad", "measured angle of a straight joint 2");
+  o.Add(&coulomb1, "coulomb1", {0, 10}, "N·m", "dry friction of joint 1");
+  o.Add(&coulomb2, "coulomb2", {0, 10}, "N·m", "dry friction of joint 2");
+}
+
+std::string SessionOf(const std::string& log) {
+  std::string session;
+  for (const char c : log) {
+    if (c < '0' || c > '9') session += c;
+  }
+  constexpr int kFolders = 2;
+  size_t begin = session.size();
+  for (int i = 0; i <= kFolders && begin != std::string::npos && begin > 0; ++i) {
+    begin = session.rfind('/', begin - 1);
+  }
+  if (begin != std::string::npos && begin < session.size()) session.erase(0, begin + 1);
+  return session.substr(0, session.find(".csv"));
+}
+
+void Twin::Describe(Options& options) {
+  plant.Describe(options);
+  actuator.Describe(options);
+  sensors.Describe(options);
+  loop.Describe(options);
+}
+
+Twin ParseTwin(std::string_view text, const std::string& where) {
+  toml::table table = ParseToml(text, where);
+  Twin twin;
+  twin.name.clear();
+  const bool has_plant = table.contains("plant");
+  const auto take = [&](std::string_view key, const auto& read) {
+    if (const toml::node* node = table.get(key)) {
+      read(*node, Concat(PlaceOf(*node, where), ": ", key));
+      table.erase(key);
+    }
+  };
+  take("name", [&](const toml::node& node, const std::string& place) {
+    if (!node.is_string()) throw BadInput(Concat(place, ": expected a text, got another type"));
+    twin.name = node.as_string()->get();
+  });
+  // By reference: a copy would not know its lines.
+  const auto table_of = [](const toml::node& node, const std::string& place) -> const toml::table& {
+    if (!node.is_table()) throw BadInput(Concat(place, ": expected a table, got another type"));
+    return *node.as_table();
+  };
+  table.erase("disturbance");  // follows from the other values
+  Covariance covariance = TakeCovariance(table, where);
+  twin.uncertain = std::move(covariance.names);
+  twin.covariance = std::move(covariance.values);
+  take("sessions", [&](const toml::node& node, const std::string& place) {
+    ReadSessions(table_of(node, place), where, twin);
+  });
+  ApplyTable(OptionsOf(twin), table, where, /*alone=*/false);
+  if (!has_plant) throw BadInput(Concat(where, ": expected a table [plant], got none"));
+  if (!twin.uncertain.empty()) Factor(twin, where);
+  return twin;
+}
+
+Twin ReadTwin(const std::string& name, const std::string& flag) {
+  const auto [toml, where] = ReadPlantDocument(name, flag);
+  Twin twin = ParseTwin(toml, Printable(where));
+  if (twin.name.empty()) twin.name = std::filesystem::path(name).stem().string();
+  return twin;
+}
+
+std::string TwinText(const Twin& twin) {
+  std::string text = Concat("name = ", Quoted(twin.name), "\n\n");
+  text += OptionsOf(twin).Toml(/*comments=*/true, [](const Option&) { return true; });
+  const Disturbance disturbance = DisturbanceOf(twin);
+  text += "\n" + OptionsOf(disturbance).Toml(/*comments=*/true, [](const Option&) { return true; });
+  for (const Session& session : twin.sessions) {
+    text += Concat("\n[sessions.", Quoted(session.name), "]\n");
+    const Options options = OptionsOf(session);
+    for (const Option& option : options.all()) {
+      text += Concat(option.name, " = ", option.text(), "\n");
+    }
+  }
+  if (twin.uncertain.empty()) return text;
+  text += "\n[covariance]  # of the values with these names, in this order\n";
+  const size_t n = twin.uncertain.size();
+  for (size_t i = 0; i < n; ++i) {
+    std::vector<std::string> row;
+    for (size_t j = 0; j < n; ++j) row.push_back(FormatNumber(twin.covariance[i * n + j]));
+    text += Concat(twin.uncertain[i], " = [", Join(row, ", "), "]\n");
+  }
+  return text;
+}
+
+Twin InSession(const Twin& twin, const MachineLog& log) {
+  Twin own = twin;
+  const std::string name = SessionOf(log.name);
+  for (const Session& session : twin.sessions) {
+    if (session.name != name) continue;
+    own.sensors.zero1 = session.zero1;
+    own.sensors.zero2 = session.zero2;
+    own.plant.coulomb1 = session.coulomb1;
+    own.plant.coulomb2 = session.coulomb2;
+    const Options known = OptionsOf(session);
+    Forget(own, [&](const std::string& value) { return known.Get(value) != nullptr; });
+    break;
+  }
+  return own;
+}
+
+Twin DrawTwin(const Twin& twin, Rng& rng) {
+  Twin drawn = twin;
+  const int n = static_cast<int>(twin.uncertain.size());
+  if (n == 0) return drawn;
+  Eigen::VectorXd z(n);
+  for (double& number : z) number = rng.Normal();
+  const Eigen::VectorXd change = Factor(twin, twin.name) * z;
+  const Options options = OptionsOf(drawn);
+  for (int i = 0; i < n; ++i) {
+    const Option& option = *options.Get(twin.uncertain[static_cast<size_t>(i)]);
+    double& value = *std::get<double*>(option.target);
+    const Range range = UncertainRange(option);
+    value = std::clamp(value + change(i), range.low, range.high);
+  }
+  return drawn;
+}
+
+int ActuatedJoint(const MachineLog& log, const Twin& twin) {
+  if (log.commanded.empty()) return 0;
+  Joints largest{};
+  for (const Joints& torque : log.commanded) {
+    for (int j = 0; j < 2; ++j) largest[j] = std::max(largest[j], std::abs(torque[j]));
+  }
+  // A compensating motor adds friction compensation to a command within its limit.
+  const double compensating = 2 * std::max(twin.actuator.passive_limit, 0.0);
+  for (int j = 0; j < 2; ++j) {
+    if (largest[1 - j] <= compensating && largest[j] > 2 * compensating) return j + 1;
+  }
+  return 0;
+}
+
+Joints TorqueLimits(const Twin& twin, int actuated_joint) {
+  Joints limit{twin.plant.torque_limit, twin.plant.torque_limit};
+  if (actuated_joint != 0) limit[2 - actuated_joint] = twin.actuator.passive_limit;
+  return limit;
+}
+
+}  // namespace upswing

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "pendulum/manipulator.h"
+
+/// The double pendulum of the benchmark RealAIGym (docs/howto/realaigym.md): its parameters, and
+/// the constants of its equations of motion. Its inertias are about the joints, unlike those of
+/// Plant.
+namespace upswing {
+
+inline constexpr double kBoardTimestep = 0.002;  // step of Runge-Kutta and of control, s
+inline constexpr int kBoardSteps = 5000;         // steps per simulation, 10 s
+inline constexpr double kBoardTorqueLimit = 6;   // of the motor, N·m
+inline constexpr double kBoardGearRatio = 6;     // of the motors
+
+/// A plant of the benchmark. The defaults are the board's plant: design C.1, model 1.1.
+struct BoardPlant {
+  double mass1 = 0.5234602302310271, mass2 = 0.6255677234174437;           // kg
+  double length1 = 0.2, length2 = 0.3;                                     // m
+  double center1 = 0.2, center2 = 0.25569305436052964;                     // m from the joint
+  double inertia1 = 0.031887199591513114, inertia2 = 0.05086984812807257;  // kg·m²
+  double rotor_inertia = 0;                                                // of each motor, kg·m²
+  double damping1 = 0, damping2 = 0;                                       // N·m·s/rad
+  double friction1 = 0, friction2 = 0;                                     // N·m
+  double gravity = 9.81;                                                   // m/s²
+};
+
+Manipulator ManipulatorOf(const BoardPlant& plant);
+
+/// State q1, q2, w1, w2.
+using BoardState = std::array<double, 4>;
+
+/// Number of simulations that are stepped together.
+inline constexpr size_t kBoardBlock = 64;
+/// One number for each simulation of a block.
+using Lanes = std::array<double, kBoardBlock>;
+
+}  // namespace upswing

@@ -1,0 +1,179 @@
+#include "extras/realaigym/rules.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "base/rng.h"
+#include "control/linearize.h"
+
+namespace upswing {
+namespace {
+
+/// Draws six pushes with growing times, and keeps three random ones for the motor's joint. Pushes
+/// about the other joint have no effect there (docs/howto/realaigym.md).
+std::array<BoardPush, 4> RandomPushes(Rng& rng) {
+  std::array<int, 6> order;
+  std::iota(order.begin(), order.end(), 0);
+  for (size_t i = order.size() - 1; i > 0; --i) std::swap(order[i], order[rng.Below(i + 1)]);
+  std::array<BoardPush, 6> all;
+  double time = 0;
+  for (BoardPush& push : all) {
+    time += 1 + rng.Uniform(0, 0.5);
+    push.time = time;
+    push.width = rng.Uniform(0.05, 0.1);
+    push.amplitude = rng.Uniform(0.5, 5) * (rng.Uniform() < 0.5 ? -1 : 1);
+  }
+  std::array<BoardPush, 4> ours{};
+  for (size_t k = 0; k < 3; ++k) ours[k] = all[static_cast<size_t>(order[k])];
+  return ours;
+}
+
+}  // namespace
+
+const char* NameOf(Robot robot) { return robot == Robot::kPendubot ? "pendubot" : "acrobot"; }
+
+std::optional<Robot> RobotNamed(std::string_view name) {
+  for (const Robot robot : {Robot::kPendubot, Robot::kAcrobot}) {
+    if (name == NameOf(robot)) return robot;
+  }
+  return std::nullopt;
+}
+
+Lqr SolveBoardLqr(Robot robot, const Eigen::Vector4d& Q, double R) {
+  const Manipulator plant = ManipulatorOf(BoardPlant());
+  return SolveContinuousLqr(LinearizeUpright(plant, static_cast<int>(robot)), Q.asDiagonal(), R)
+      .value();
+}
+
+bool AtGoal(const BoardState& state) {
+  const auto [q1, q2, w1, w2] = state;
+  return std::abs(Wrapped(q1 - std::numbers::pi)) < kBoardGoalAngle &&
+         std::abs(Wrapped(q2)) < kBoardGoalAngle && std::abs(w1) < kBoardGoalVelocity &&
+         std::abs(w2) < kBoardGoalVelocity;
+}
+
+std::array<double, 5> PerformancePenalties(const BoardOutcome& o, const ScoreScales& n) {
+  const std::array<double, 5> scales{n.swing_up_seconds, n.energy, n.torque_cost, n.smoothness,
+                                     n.velocity_cost};
+  const std::array<double, 5> costs{o.swing_up_seconds, o.energy, o.torque_cost, o.smoothness,
+                                    o.velocity_cost};
+  std::array<double, 5> penalties;
+  for (size_t i = 0; i < 5; ++i) {
+    penalties[i] = std::tanh(std::numbers::pi * costs[i] / scales[i]);
+  }
+  return penalties;
+}
+
+double PerformanceScore(const BoardOutcome& outcome, const ScoreScales& scales) {
+  if (!outcome.above_line) return 0;
+  const auto penalties = PerformancePenalties(outcome, scales);
+  return 1 - std::accumulate(penalties.begin(), penalties.end(), 0.0) / 5;
+}
+
+RobustnessCase MakeCase(RobustnessRow row, int parameter, double level, uint64_t seed) {
+  RobustnessCase made{row, parameter, level, {}};
+  BoardEpisode& episode = made.episode;
+  episode.seed = seed;
+  switch (row) {
+    case RobustnessRow::kModel: {
+      const BoardVariation& varied = kBoardVariations.at(static_cast<size_t>(parameter));
+      double& number = episode.plant.*varied.parameter;
+      made.value = varied.low + (varied.high - varied.low) * level;
+      number = varied.is_factor ? number * made.value : made.value;
+      break;
+    }
+    case RobustnessRow::kVelocityNoise:
+      episode.velocity_noise = made.value = 0.5 * level;
+      break;
+    case RobustnessRow::kTorqueNoise:
+      episode.torque_noise = made.value = 1.1 * level;
+      break;
+    case RobustnessRow::kResponse:
+      episode.response = made.value = 0.1 + (2 - 0.1) * level;
+      break;
+    case RobustnessRow::kDelay:
+      episode.delay = static_cast<int>(std::lround(level * (kBoardLevels - 1)));
+      made.value = episode.delay * kBoardTimestep;
+      break;
+    case RobustnessRow::kPush: {
+      Rng rng(seed, "realaigym: pushes");
+      episode.pushes = RandomPushes(rng);
+    }
+  }
+  return made;
+}
+
+std::vector<RobustnessCase> RobustnessCases(uint64_t seed) {
+  std::vector<RobustnessCase> cases;
+  Rng rng(seed, "realaigym: cases");
+  const auto add = [&](RobustnessRow row, int parameter, int level) {
+    const double share = static_cast<double>(level) / (kBoardLevels - 1);
+    cases.push_back(MakeCase(row, parameter, share, rng.Next()));
+  };
+  for (int parameter = 0; parameter < static_cast<int>(kBoardVariations.size()); ++parameter) {
+    for (int level = 0; level < kBoardLevels; ++level) add(RobustnessRow::kModel, parameter, level);
+  }
+  for (const RobustnessRow row : {RobustnessRow::kVelocityNoise, RobustnessRow::kTorqueNoise}) {
+    for (int i = 0; i < kBoardLevels * kBoardRepeats; ++i) add(row, 0, i / kBoardRepeats);
+  }
+  for (const RobustnessRow row : {RobustnessRow::kResponse, RobustnessRow::kDelay}) {
+    for (int level = 0; level < kBoardLevels; ++level) add(row, 0, level);
+  }
+  for (int i = 0; i < kBoardPushCases; ++i) add(RobustnessRow::kPush, 0, 0);
+  return cases;
+}
+
+double Robustness::score() const {
+  return std::accumulate(rows.begin(), rows.end(), 0.0) / kRobustnessRows;
+}
+
+Robustness JudgeRobustness(const std::vector<RobustnessCase>& cases,
+                           const std::vector<BoardOutcome>& outcomes) {
+  Robustness result;
+  std::vector<int> rows;    // row of each curve
+  std::vector<int> counts;  // simulations at the curve's last value
+  double pushed = 0;
+  for (size_t i = 0; i < cases.size(); ++i) {
+    const RobustnessCase& each = cases[i];
+    const double reached = outcomes[i].at_goal ? 1 : 0;
+    if (each.row == RobustnessRow::kPush) {
+      pushed += reached / kBoardPushCases;
+      continue;
+    }
+    const auto row = static_cast<int>(each.row);
+    const bool model = each.row == RobustnessRow::kModel;
+    const std::string name = model ? kBoardVariations.at(static_cast<size_t>(each.parameter)).name
+                                   : kRobustnessRowNames.at(static_cast<size_t>(row));
+    if (result.curves.empty() || result.curves.back().name != name) {
+      result.curves.push_back({name, {}, {}});
+      rows.push_back(row);
+      counts.push_back(0);
+    }
+    RobustnessCurve& curve = result.curves.back();
+    if (curve.values.empty() || curve.values.back() != each.value) {
+      curve.values.push_back(each.value);
+      curve.share.push_back(0);
+      counts.back() = 0;
+    }
+    double& share = curve.share.back();
+    share += (reached - share) / ++counts.back();
+  }
+  // A noise level passes if more than half of its repeats do.
+  std::array<int, kRobustnessRows> levels{};
+  for (size_t k = 0; k < rows.size(); ++k) {
+    const auto row = static_cast<size_t>(rows[k]);
+    for (const double share : result.curves[k].share) {
+      result.rows.at(row) += share > 0.5 ? 1 : 0;
+      ++levels.at(row);
+    }
+  }
+  for (size_t row = 0; row < kRobustnessRows; ++row) {
+    if (levels.at(row) > 0) result.rows.at(row) /= levels.at(row);
+  }
+  result.rows.back() = pushed;
+  return result;
+}
+
+}  // namespace upswing

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <array>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/tensors.h"
+#include "extras/realaigym/simulation.h"
+
+namespace upswing {
+
+/// A small network that swings up, blended with a linear regulator that holds upright:
+///   u = (1 - s) u_net(x) + s u_lin(x),   u_lin = -K x,   s = smooth step of (1 - x' P x / ρ)
+/// x is the deviation from upright. The velocities come from the last measured angles, which have
+/// no noise on the board: w = (3 q - 4 q' + q'')/(2 h).
+///
+/// A network that mirrors sees the mirror image of the pendulum where |q1| > π, and its torque
+/// changes sign. So a network that swings up in one direction swings back after a fall past
+/// upright, within the range of a machine's encoders.
+///
+/// All parameters form one vector, so that they can be searched (search.h).
+class SwingNet {
+ public:
+  /// Number of parameters before the network's: K (4), log ρ, sharpness of the blend.
+  static constexpr int kLinear = 6;
+
+  SwingNet(Robot robot, int hidden, bool mirrors = false);
+
+  int hidden() const { return hidden_; }
+  Robot robot() const { return robot_; }
+  bool mirrors() const { return mirrors_; }
+  /// Number of parameters.
+  size_t size() const;
+  /// Initial parameters of a search: the regulator of the nominal plant, and a random network.
+  std::vector<double> Initial(uint64_t seed) const;
+
+  /// A controller of a block of simulations with the same parameters for all.
+  std::unique_ptr<BoardController> Control(std::span<const double> numbers) const;
+  /// A controller with several parameter vectors, each for `lanes_each` consecutive simulations:
+  /// kSwingGroup (swing_net.h) or 1. If there are too few vectors, the last one serves the other
+  /// simulations.
+  std::unique_ptr<BoardController> Control(std::span<const std::span<const double>> numbers,
+                                           size_t lanes_each) const;
+
+  /// The file's tensors. Metadata: `format` upswing-realaigym, `format_version` (2; 3 mirrors),
+  /// `robot` and `hidden`. Tensor: `numbers`, F64 (size).
+  Tensors ToTensors(std::span<const double> numbers) const;
+
+ private:
+  Robot robot_;
+  int hidden_;
+  bool mirrors_;
+  std::array<double, 4> K_;   // initial gain of a search
+  std::array<double, 16> P_;  // (4 × 4), of the initial regulator
+};
+
+/// A SwingNet with its parameters, as stored in a file.
+struct SwingPolicy {
+  SwingNet net;
+  std::vector<double> numbers;
+};
+
+/// Whether a file's tensors are a board policy.
+bool IsSwingPolicy(const Tensors& tensors);
+/// Reads a board policy. Throws BadInput unless the first six numbers, which are exponents, are
+/// within 50 and the others within 1e6.
+SwingPolicy ReadSwingPolicy(const Tensors& tensors);
+
+}  // namespace upswing

@@ -1,0 +1,158 @@
+#include "agents/config.h"
+
+#include "base/error.h"
+#include "base/text.h"
+#include "pendulum/physics.h"
+
+namespace upswing {
+
+namespace {
+
+/// A learning algorithm's name and its settings, which create the agent.
+struct Algorithm {
+  const char* name;
+  AgentConfig& (*settings)(Config& config);
+};
+
+// The first is the default.
+constexpr Algorithm kAlgorithms[] = {
+    {"dqn", [](Config& config) -> AgentConfig& { return config.dqn; }},
+    {"sac", [](Config& config) -> AgentConfig& { return config.sac; }},
+    {"ppo", [](Config& config) -> AgentConfig& { return config.ppo; }},
+};
+
+}  // namespace
+
+const std::vector<std::string>& AlgorithmNames() {
+  static const std::vector<std::string> kNames = NamesOf(kAlgorithms);
+  return kNames;
+}
+
+AgentConfig& Config::learner() {
+  for (const Algorithm& known : kAlgorithms) {
+    if (algorithm == known.name) return known.settings(*this);
+  }
+  throw Failure(Concat("algorithm: expected one of ", Join(AlgorithmNames(), ", "), ", got \"",
+                       algorithm, "\""));
+}
+
+void Config::Describe(Options& o) {
+  o.Section("train");
+  o.Add(&agent, "agent", "named agent that sets the defaults of the other settings");
+  o.AddChoice(&algorithm, "algorithm", AlgorithmNames(),
+              "learning algorithm; each has its own settings")
+      .implied = true;
+  train.Describe(o);
+  o.Section("task");
+  o.AddChoice(&task, "task", TaskNames(), "task to learn").implied = true;
+  o.Add(&environment, "environment",
+        "environment of the task gymnasium, as upswing.train(env=...) in Python describes it")
+      .implied = true;
+  DescribeEnvironment(o);
+  learner().Describe(o);
+}
+
+void Config::DescribePlantTask(Options& o) {
+  train.DescribeCurriculum(o);
+  DescribeEnvironment(o);
+}
+
+void Config::DescribeEnvironment(Options& o) {
+  o.Section("task");
+  o.Add(&episode_seconds, "episode_seconds", {0.02, 1e6}, "s", "length of a training episode")
+      .step = kControlPeriod;
+  o.Add(&random_start_share, "random_start_share", kUnit, "",
+        "share of training episodes that start in a random state instead of hanging");
+  o.Add(&random_start_velocity, "random_start_velocity", {0, 50}, "rad/s",
+        "largest velocity of random start states");
+  o.Add(&memory, "memory", {0, kMostMemory}, "steps",
+        "number of past steps whose torque and velocity changes the agent observes");
+  o.Add(&identify, "identify",
+        "let the agent observe an estimate of the plant's constants, identified from its motion")
+      .implied = true;
+  o.AddChoice(
+      &physics, "physics", EngineNames(),
+      "physics engine of the training; closed-form is faster than mujoco, with the same physics");
+  std::vector<std::string> judges = EngineNames();
+  judges.insert(judges.begin(), std::string(kScreened));
+  o.AddChoice(&eval_physics, "eval_physics", judges,
+              "physics engine of evaluations; screened: closed-form, and mujoco confirms a solved "
+              "task");
+  o.Section("plant");
+  o.Add(&model, "model", "MJCF file that replaces the built-in model");
+  plant.Describe(o);
+  disturbance.Describe(o);
+  randomization.Describe(o);
+  reward.Describe(o);
+}
+
+Options EverySetting(Config& scratch) {
+  Options options;
+  for (const std::string& name : AlgorithmNames()) {
+    scratch.algorithm = name;
+    options.AddMissing(OptionsOf(scratch));
+  }
+  return options;
+}
+
+EnvConfig Config::Environments() const {
+  EnvConfig env;
+  env.task = task;
+  env.environment = environment;
+  env.plants = {plant};
+  env.disturbances = {disturbance};
+  env.randomization = randomization;
+  env.num_envs = static_cast<int>(train.envs);
+  env.episode_seconds = episode_seconds;
+  env.memory = static_cast<int>(memory);
+  if (identify) env.identified_from = plant;
+  env.start = {train.start_noise, random_start_share, random_start_velocity};
+  env.weights = reward;
+  env.seed = static_cast<uint64_t>(train.seed);
+  env.stream = "training environment";
+  env.mjcf = mjcf;
+  return env;
+}
+
+void ExpectSameSettings(const Config& before, const Config& now, const std::string& where,
+                        const std::function<bool(const Option&)>& counts) {
+  for (const auto& [option, old] : Differences(OptionsOf(now), OptionsOf(before))) {
+    if (!counts(option)) continue;
+    throw BadInput(Concat(where, ": made with ", option.section, ".", option.name, " = ",
+                          old ? old->text() : "none", ", but the configuration has ",
+                          option.text()));
+  }
+}
+
+std::string ConfigToml(const Config& config, bool identity_only) {
+  return OptionsOf(config).Toml(
+      !identity_only, [&](const Option& option) { return !identity_only || option.identity(); });
+}
+
+std::string PlantText(const Plant& plant) {
+  std::vector<std::string> texts;
+  for (const auto& [name, value] : PlantValues(plant)) {
+    texts.push_back(Concat(name, " ", FormatNumber(value)));
+  }
+  return Join(texts, ", ");
+}
+
+std::vector<const Option*> ApplyChanges(const Options& options, const std::vector<std::string>& set,
+                                        const std::string& flag) {
+  std::vector<const Option*> changed;
+  for (const std::string& change : set) {
+    const size_t equals = change.find('=');
+    if (equals == std::string::npos) {
+      throw BadInput(Concat(flag, ": expected NAME=VALUE, got \"", change, "\""));
+    }
+    const std::string name(Trim(std::string_view(change).substr(0, equals)));
+    const std::string where = Concat(flag, " ", name);
+    for (const Option* option : options.Find(name, where)) {
+      option->Set(Trim(std::string_view(change).substr(equals + 1)), where);
+      changed.push_back(option);
+    }
+  }
+  return changed;
+}
+
+}  // namespace upswing

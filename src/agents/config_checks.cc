@@ -1,0 +1,87 @@
+#include "agents/config_checks.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "base/format.h"
+#include "base/text.h"
+
+namespace upswing {
+namespace {
+
+/// Size as text, such as `1.5 GB`.
+std::string Gigabytes(double bytes) {
+  const auto tenths = std::llround(1e-8 * bytes);
+  return Concat(tenths / 10, ".", tenths % 10, " GB");
+}
+
+AgentSize SizeOfLearner(const Config& config) { return config.learner().Size(config.Spec()); }
+
+/// Throws BadInput if a setting of the double pendulum differs from its default in a task without
+/// that setting.
+void CheckTask(Config& config, const std::string& where) {
+  if (!IsForeign(config.task) && !config.environment.empty()) {
+    throw BadInput(Concat(where.empty() ? "" : where + ": ", "environment: expected none, because ",
+                          "the task ", config.task, " is not ", kGymnasium, ", got one"));
+  }
+  if (HasPlant(config.task)) return;
+  Config defaults;
+  Options now, usual;
+  config.DescribePlantTask(now);
+  defaults.DescribePlantTask(usual);
+  for (const auto& [option, other] : Differences(now, usual)) {
+    throw BadInput(Concat(where.empty() ? "" : where + ": ", option.name,
+                          ": expected none, because the task ", config.task, " of agent ",
+                          config.agent, " has no such setting, got ", option.text()));
+  }
+}
+
+}  // namespace
+
+void CheckSettings(Config& config, const std::string& where) {
+  try {
+    config.learner().Check(config.train.envs);
+    (void)config.randomization.MakePosterior();  // throws if there is none to draw from
+  } catch (const Error& error) {
+    throw BadInput(Concat(where, where.empty() ? "" : ": ", error.what()));
+  }
+  CheckTask(config, where);
+}
+
+std::vector<std::string> Warnings(const Config& config) {
+  // All environments step together, so the last step can exceed the budget.
+  const int64_t envs = config.train.envs;
+  const int64_t steps = (config.train.steps + envs - 1) / envs * envs;
+  std::vector<std::string> warnings = config.learner().Warnings(steps, envs);
+  if (std::ranges::all_of(config.reward.weight, [](double weight) { return weight == 0; })) {
+    warnings.emplace_back("every reward weight is 0: the agent learns nothing");
+  }
+  return warnings;
+}
+
+TrainingSize SizeOf(const Config& config) {
+  constexpr double kFloat = sizeof(float);
+  const AgentSize l = SizeOfLearner(config);
+  const double replay = kFloat * l.transition * l.capacity;
+  const double saved = kFloat * l.saved_arrays * l.parameters;
+  // The first checkpoint, without a replay memory, is in memory at the same time as the training.
+  return {
+      kFloat * (l.arrays * l.parameters + l.batch * l.widest * l.layers) + std::max(saved, replay),
+      saved + replay};
+}
+
+void CheckMemory(const Config& config, int64_t available, int64_t runs) {
+  const double needed = static_cast<double>(runs) * SizeOf(config).memory;
+  if (needed <= static_cast<double>(available)) return;
+  const AgentSize learner = SizeOfLearner(config);
+  throw BadInput(Concat("train: expected at most ", Gigabytes(static_cast<double>(available)),
+                        " of memory, which is what is free, got ", Gigabytes(needed), " for ",
+                        runs > 1 ? Concat(runs, " runs at a time, each with a ") : "a ",
+                        "network of ", FormatCount(learner.parameters), " parameters and a ",
+                        learner.store, " of ", FormatCount(learner.capacity),
+                        " transitions; reduce --hidden", runs > 1 ? ", " : " or ",
+                        learner.store_flag, runs > 1 ? " or --jobs" : ""));
+}
+
+}  // namespace upswing

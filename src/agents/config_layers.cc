@@ -1,0 +1,242 @@
+// The layers of a training's settings: defaults, named agent, configuration file, flags.
+#include <algorithm>
+#include <map>
+
+#include "agents/config.h"
+#include "agents/config_checks.h"
+#include "agents/named_agents.h"
+#include "agents/toml_settings.h"
+#include "base/error.h"
+#include "base/text.h"
+
+namespace upswing {
+namespace {
+
+const NamedAgent& FindAgent(const std::string& name, const std::string& where) {
+  const auto agents = EmbeddedAgents();
+  const auto found = std::ranges::find_if(agents, [&](const auto& a) { return a.name == name; });
+  if (found != agents.end()) return *found;
+  const std::vector<std::string> names = NamesOf(agents);
+  throw BadInput(Concat(where, ": expected an agent, one of ", Join(names, ", "), ", got \"", name,
+                        "\"", DidYouMean(name, names)));
+}
+
+/// A text setting that other settings depend on: its value in the last layer that sets it, and the
+/// place of that value for messages.
+struct EarlySetting {
+  std::string value, where;
+  bool in_file = false;
+};
+
+EarlySetting FindEarly(std::string_view section, std::string_view key, const toml::table& file,
+                       const std::string& file_name, const std::vector<FlagValue>& flags) {
+  EarlySetting setting;
+  if (const auto* node = file[section][key].as_string()) {
+    setting = {node->get(), Concat(PlaceOf(*node, file_name), ": ", key), true};
+  }
+  for (const auto& [name, text, where] : flags) {
+    if (name == key) setting = {text, where.empty() ? FlagOf(name) : where};
+  }
+  return setting;
+}
+
+/// Throws BadInput that begins with `where` unless there is an algorithm of this name.
+void CheckAlgorithm(const std::string& name, const std::string& where) {
+  const std::vector<std::string>& names = AlgorithmNames();
+  if (std::ranges::find(names, name) != names.end()) return;
+  throw BadInput(Concat(where, ": expected one of ", Join(names, ", "), ", got \"", Printable(name),
+                        "\"", DidYouMean(name, names)));
+}
+
+/// The algorithm of a parsed configuration. Throws BadInput.
+std::string AlgorithmIn(const toml::table& table, const std::string& where) {
+  const EarlySetting found = FindEarly("train", "algorithm", table, where, {});
+  if (found.where.empty()) return AlgorithmNames().front();
+  CheckAlgorithm(found.value, found.where);
+  return found.value;
+}
+
+/// The named agent of a configuration, its settings and its algorithm.
+struct ChosenAgent {
+  std::string_view name;
+  std::string place;  // for messages
+  toml::table settings;
+  std::string algorithm;
+};
+
+/// Chooses the named agent. Throws BadInput if it does not exist or has another algorithm than
+/// requested.
+ChosenAgent ChooseAgent(const toml::table& table, const std::string& where,
+                        const std::vector<FlagValue>& flags) {
+  EarlySetting setting = FindEarly("train", "agent", table, where, flags);
+  if (setting.where.empty()) setting.value = Config().agent;
+  const NamedAgent& agent = FindAgent(setting.value, setting.where);
+  const std::string place = Concat("agent ", agent.name);
+  toml::table settings = ParseToml(agent.toml, place);
+  const std::string algorithm = AlgorithmIn(settings, place);
+  const EarlySetting asked = FindEarly("train", "algorithm", table, where, flags);
+  if (!asked.where.empty()) {
+    CheckAlgorithm(asked.value, asked.where);
+    if (asked.value != algorithm) {
+      throw BadInput(Concat(asked.where, ": expected ", algorithm, ", the algorithm of agent ",
+                            agent.name, ", got ", asked.value, "; choose another agent, such as ",
+                            asked.value));
+    }
+  }
+  return {agent.name, place, std::move(settings), algorithm};
+}
+
+/// Defaults of trainings on a foreign task: as usual for each algorithm, over the network and the
+/// settings of the named agent, which are tuned for the tasks of the program.
+std::string_view ForeignDefaults(std::string_view algorithm) {
+  if (algorithm == "dqn") {
+    return "[train]\nenvs = 1\neval_episodes = 10\n"
+           "[agent]\nmirror = false\nreward_scale = 1.0\nreward_centering = 0.0\n"
+           "updates_per_step = 0.25\nlearning_starts = 1000\nlearning_rate = 1e-3\n"
+           "tau = 0.01\n";
+  }
+  if (algorithm == "sac") {
+    return "[train]\nenvs = 1\neval_episodes = 10\n"
+           "[agent]\nmirror = false\nreward_scale = 1.0\nreward_centering = 0.0\n"
+           "updates_per_step = 1.0\nlearning_starts = 1000\nlearning_rate = 3e-4\n"
+           "learning_rate_end = 3e-4\nalpha = 1.0\nalpha_rate = 3e-4\nactor_rate = 1.0\n"
+           "actor_period = 1\nn_step = 1\nprioritized = false\ntwin = true\ntau = 0.005\n"
+           "entropy_reward = true\ntarget_entropy = -1.0\nsmoothness = 0.0\n";
+  }
+  return "[train]\nenvs = 8\neval_episodes = 10\n"
+         "[agent]\nmirror = false\nreward_scale = 1.0\nnormalize = false\nhorizon = 256\n"
+         "epochs = 10\nbatch = 64\nlearning_rate = 3e-4\nlearning_rate_end = 0.0\n"
+         "kl_target = 0.0\nentropy_bonus = 0.0\nentropy_bonus_end = 0.0\n";
+}
+
+/// Applies the settings of a named agent to a foreign task: its network and its learning.
+void ApplyToForeign(const Options& options, const ChosenAgent& agent) {
+  toml::table learner;
+  for (const char* section : {"network", "agent"}) {
+    if (const auto* settings = agent.settings[section].as_table())
+      learner.insert(section, *settings);
+  }
+  ApplyTable(options, learner, agent.place, false);
+  const std::string place = Concat("defaults of ", agent.algorithm);
+  ApplyTable(options, ParseToml(ForeignDefaults(agent.algorithm), place), place, false);
+}
+
+/// Completes settings by the environment of a foreign task: its discrete actions, and a learning
+/// rate that decays until the last step unless `decay_given`. Throws BadInput.
+void FitToForeign(const Options& options, bool decay_given, Config& config) {
+  const ForeignTask task = ForeignTask::Parse(config.environment, "environment");
+  if (!decay_given) options.Set("learning_rate_steps", options.Get("steps")->text(), "steps");
+  if (task.choices.empty()) {
+    if (config.algorithm == "ppo") config.ppo.actions = "continuous";
+    return;
+  }
+  if (config.algorithm == "sac") {
+    throw BadInput(Concat("agent: expected an agent of dqn or ppo, because the actions of ",
+                          task.name, " are discrete, got ", config.agent, ", an agent of sac"));
+  }
+  const auto count = static_cast<int64_t>(task.choices.size());
+  config.dqn.levels = config.ppo.levels = count;
+  config.ppo.actions = "levels";
+}
+
+}  // namespace
+
+Options KnownOptions(Config& config) {
+  Options options = OptionsOf(config);
+  std::map<std::string, std::vector<std::string>> owners;
+  for (const std::string& algorithm : AlgorithmNames()) {
+    Config other(algorithm);
+    const Options of_other = OptionsOf(other);
+    for (const Option& option : of_other.all()) owners[option.name].push_back(algorithm);
+  }
+  for (const auto& [name, algorithms] : owners) {
+    if (options.Get(name) != nullptr) continue;
+    options.Explain(
+        name, Concat("expected a setting of ", config.algorithm, ", the algorithm of agent ",
+                     config.agent, ", got ", name, ", a setting of ", Join(algorithms, " and ")));
+  }
+  return options;
+}
+
+void SetFlags(const Options& options, const std::vector<FlagValue>& flags) {
+  for (const auto& [name, value, place] : flags) {
+    options.Set(name, value, place.empty() ? FlagOf(name) : place);
+  }
+}
+
+Config ConfigIn(std::string_view text, const std::string& where) {
+  const toml::table table = ParseToml(text, where);
+  Config config(AlgorithmIn(table, where));
+  ApplyTable(OptionsOf(config), table, where, false);
+  return config;
+}
+
+void ApplyToml(const Options& options, std::string_view text, const std::string& where) {
+  ApplyTable(options, ParseToml(text, where), where, false);
+}
+
+Config ParseConfig(std::string_view text, const std::string& where,
+                   const std::vector<FlagValue>& flags, const ModelReader& read_model) {
+  const toml::table table = ParseToml(text, where);
+  const ChosenAgent agent = ChooseAgent(table, where, flags);
+  const bool foreign = FindEarly("task", "task", table, where, flags).value == kGymnasium;
+  Config config(agent.algorithm);
+  config.agent = agent.name;
+  const Options options = KnownOptions(config);
+
+  // A model file has its own plant; other settings may change it.
+  const EarlySetting named = FindEarly("plant", "model", table, where, flags);
+  ModelFile model;
+  if (!named.value.empty()) {
+    model = read_model(named.value, named.in_file);
+    config.plant = model.plant;
+    config.mjcf = model.mjcf;
+  }
+
+  if (foreign) {
+    ApplyToForeign(options, agent);
+  } else {
+    ApplyTable(options, agent.settings, agent.place, false);
+  }
+  ApplyTable(options, table, where, false);
+  SetFlags(options, flags);
+  config.agent = agent.name;
+  config.model = model.path;
+  if (foreign) {
+    const EarlySetting decay = FindEarly("agent", "learning_rate_steps", table, where, flags);
+    const bool decay_in_file = table["agent"]["learning_rate_steps"].is_number();
+    FitToForeign(options, decay_in_file || !decay.where.empty(), config);
+  }
+  CheckSettings(config, where);
+  return config;
+}
+
+std::vector<std::string> MissingSettings(const std::string& text, const std::string& where,
+                                         bool identity_only) {
+  const toml::table table = ParseToml(text, where);
+  const Config config(AlgorithmIn(table, where));
+  const Options options = OptionsOf(config);
+  std::vector<std::string> missing;
+  for (const Option& option : options.all()) {
+    const bool needed = !option.implied && (option.identity() || !identity_only);
+    if (!needed || table[option.section][option.name]) continue;
+    missing.push_back(Concat(option.section, ".", option.name));
+  }
+  return missing;
+}
+
+std::vector<std::pair<std::string, std::string>> NamedAgents() {
+  std::vector<std::pair<std::string, std::string>> names;
+  for (const NamedAgent& agent : EmbeddedAgents()) {
+    // The file begins with a comment that describes the agent.
+    std::vector<std::string> comment;
+    for (const std::string_view line : Split(agent.toml, '\n')) {
+      if (!line.starts_with('#')) break;
+      comment.emplace_back(Trim(line.substr(1)));
+    }
+    names.emplace_back(agent.name, Join(comment, " "));
+  }
+  return names;
+}
+
+}  // namespace upswing

@@ -1,0 +1,145 @@
+#include "agents/controllers.h"
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "base/text.h"
+#include "control/hybrid.h"
+#include "control/mpc.h"
+#include "control/swing_up.h"
+#include "control/tvlqr.h"
+
+namespace upswing {
+namespace {
+
+/// A controller's name and its factory.
+struct Controller {
+  const char* name;
+  std::shared_ptr<const Policy> (*make)(const ControllerConfig& config);
+  bool only_balances = false;
+};
+
+using Made = std::shared_ptr<const Policy>;
+
+/// Makes a controller that swings up by a law and catches by LQR.
+Made WithCatch(const ControllerConfig& config, const std::string& kind, const std::string& what,
+               const Options& settings, LawPolicy::Law law) {
+  return std::make_shared<HybridPolicy>(
+      kind, settings, config.lqr,
+      std::make_shared<LawPolicy>(kind, what, settings, config.plant, std::move(law)),
+      config.plant);
+}
+
+/// Throws BadInput unless the motor is at joint 1, as these control laws assume.
+void ExpectPendubot(const char* kind, const Plant& plant) {
+  if (plant.actuated_joint == 1) return;
+  throw BadInput(
+      Concat(kind, ": expected a plant with the motor at joint 1 (actuated_joint), got joint 2"));
+}
+
+Made MakeEnergyShaping(const ControllerConfig& config) {
+  ExpectPendubot("energy", config.plant);
+  const EnergyShapingConfig& energy = config.energy;
+  return WithCatch(config, "energy",
+                   Concat("energy shaping, weights ", Rounded(energy.kE), ", ", Rounded(energy.kD),
+                          " and ", Rounded(energy.kP)),
+                   OptionsOfAll(config.lqr, energy),
+                   [energy, plant = ManipulatorOf(config.plant)](const StateVector& d) {
+                     return EnergyShapingTorque(energy, plant, d);
+                   });
+}
+
+Made MakePartialFeedback(const ControllerConfig& config) {
+  ExpectPendubot("pfl", config.plant);
+  const PartialFeedbackConfig& pfl = config.pfl;
+  return WithCatch(config, "pfl",
+                   Concat("collocated partial feedback linearisation, gains ", Rounded(pfl.kP),
+                          ", ", Rounded(pfl.kD), " and ", Rounded(pfl.kE)),
+                   OptionsOfAll(config.lqr, pfl),
+                   [pfl, plant = ManipulatorOf(config.plant)](const StateVector& d) {
+                     return PartialFeedbackTorque(pfl, plant, d);
+                   });
+}
+
+Made MakeHybrid(const ControllerConfig& config) {
+  if (config.swing_up_policy == nullptr) {
+    throw BadInput("hybrid: expected a policy that swings up (--swing-up POLICY), got none");
+  }
+  return std::make_shared<HybridPolicy>("hybrid", OptionsOf(config.lqr), config.lqr,
+                                        config.swing_up_policy, config.plant);
+}
+
+constexpr Controller kControllers[] = {
+    {"energy", MakeEnergyShaping},
+    {"hybrid", MakeHybrid},
+    {"lqr",
+     [](const ControllerConfig& config) -> Made {
+       return std::make_shared<LqrPolicy>(config.lqr, config.plant);
+     },
+     true},
+    {"mpc",
+     [](const ControllerConfig& config) -> Made {
+       return std::make_shared<MpcPolicy>(config.lqr, config.mpc, config.plant);
+     }},
+    {"pfl", MakePartialFeedback},
+    {"tvlqr",
+     [](const ControllerConfig& config) -> Made {
+       return std::make_shared<TvlqrPolicy>(config.lqr, config.tvlqr, config.plant);
+     }},
+};
+
+}  // namespace
+
+void ControllerConfig::Describe(Options& o) {
+  lqr.Describe(o);
+  tvlqr.Describe(o);
+  mpc.Describe(o);
+  energy.Describe(o);
+  pfl.Describe(o);
+  o.Section("hybrid");
+  o.Add(&swing_up, "swing_up", "policy that swings up: policy.safetensors or a run folder").usual =
+      "none";
+}
+
+std::vector<std::string> ControllerNames() { return NamesOf(kControllers); }
+
+bool IsController(const std::string& name) {
+  return std::ranges::any_of(kControllers, [&](const Controller& c) { return name == c.name; });
+}
+
+bool OnlyBalances(const std::string& name) {
+  return std::ranges::any_of(
+      kControllers, [&](const Controller& c) { return name == c.name && c.only_balances; });
+}
+
+bool HasSection(const std::string& controller, const std::string& section) {
+  return section == "lqr" || section == controller;
+}
+
+std::shared_ptr<const Policy> MakeController(const std::string& name,
+                                             const ControllerConfig& config) {
+  for (const Controller& controller : kControllers) {
+    if (name == controller.name) return controller.make(config);
+  }
+  throw BadInput(Concat("expected a controller, one of ", Join(ControllerNames(), ", "), ", got \"",
+                        name, "\""));
+}
+
+std::string TitleOf(const std::string& name, const ControllerConfig& config,
+                    const std::string& plant_name, const Plant& named) {
+  const auto changes = [](const Options& now, const Options& usual) {
+    std::vector<std::string> texts;
+    for (const auto& [option, before] : Differences(now, usual)) {
+      texts.push_back(Concat(option.name, " ", option.plain_text()));
+    }
+    return texts;
+  };
+  const ControllerConfig usual;
+  std::vector<std::string> texts = changes(OptionsOf(config), OptionsOf(usual));
+  auto plant = changes(OptionsOf(config.plant), OptionsOf(named));
+  if (!plant_name.empty()) plant.insert(plant.begin(), plant_name);
+  if (!plant.empty()) texts.push_back(Concat("for ", Join(plant, " and ")));
+  return texts.empty() ? name : Concat(name, " (", Join(texts, ", "), ")");
+}
+
+}  // namespace upswing

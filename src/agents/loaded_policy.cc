@@ -1,0 +1,134 @@
+#include "agents/loaded_policy.h"
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "base/text.h"
+#include "nn/network_policy.h"
+
+namespace upswing {
+namespace {
+
+/// Throws BadInput unless the policy's observations are those of this program's double pendulum.
+/// Names of observations are not compared, because they are only for people.
+void CheckObservation(const LoadedPolicy& loaded, const std::string& where) {
+  const int inputs = loaded.policy->obs_size();
+  const int remembered = inputs - kObservationSize - (loaded.identifies() ? kIdentifiedSize : 0);
+  if (remembered < 0 || remembered % kMemorySize != 0 || loaded.memory() > kMostMemory) {
+    throw BadInput(Concat(
+        where, ": expected a policy of ", kObservationSize, " observations, ",
+        loaded.identifies() ? Concat(kIdentifiedSize, " of identification, ") : "", "and ",
+        kMemorySize, " for each of at most ", kMostMemory, " steps of memory, got ", inputs));
+  }
+  const auto& given = loaded.policy->info().observation;
+  if (!given) throw BadInput(Concat(where, ": no metadata \"observation\""));
+  const ObservationInfo expected = ObservationInfoOf(loaded.memory(), loaded.identifies());
+  const auto same_memory = [&] {
+    if (!given->memory || !expected.memory) return !given->memory && !expected.memory;
+    return given->memory->steps == expected.memory->steps &&
+           given->memory->velocity == expected.memory->velocity &&
+           given->memory->torque == expected.memory->torque;
+  };
+  const bool same_scale =
+      !given->identified || given->identified->scale == expected.identified->scale;
+  if (given->max_velocity != expected.max_velocity || !same_scale || !same_memory()) {
+    throw BadInput(
+        Concat(where,
+               ": metadata \"observation\": expected the names and scales of this version "
+               "and a memory of ",
+               loaded.memory(), " steps, as the network's inputs have, got others"));
+  }
+}
+
+/// Throws BadInput unless the policy is for a task of this program.
+void CheckTask(const LoadedPolicy& loaded, const std::string& where) {
+  if (IsForeign(loaded.task)) {  // only the environment knows its spaces
+    if (loaded.policy->info().control_period) return;
+    throw BadInput(Concat(where, ": no metadata \"control_period\""));
+  }
+  const std::vector<std::string> names = TaskNames();
+  if (std::ranges::find(names, loaded.task) == names.end()) {
+    throw BadInput(Concat(where, ": metadata \"task\": expected one of ", Join(names, ", "),
+                          ", got \"", loaded.task, "\""));
+  }
+  EnvConfig config;
+  config.task = loaded.task;
+  const EnvSpec spec = SpecOf(config);
+  const auto& period = loaded.policy->info().control_period;
+  if (period != spec.step_seconds) {
+    throw BadInput(Concat(
+        where, ": metadata \"control_period\": expected ", FormatNumber(spec.step_seconds),
+        " s, the control period of the task, got ", period ? FormatNumber(*period) : "none"));
+  }
+  if (loaded.policy->action_size() != spec.action_size()) {
+    throw BadInput(Concat(where, ": expected ", spec.action_size(), " number per action, as in ",
+                          loaded.task, ", got ", loaded.policy->action_size()));
+  }
+  if (HasPlant(loaded.task)) return CheckObservation(loaded, where);
+  if (loaded.policy->obs_size() != spec.obs_size) {
+    throw BadInput(Concat(where, ": expected a policy of ", spec.obs_size, " observations, as in ",
+                          loaded.task, ", got ", loaded.policy->obs_size()));
+  }
+}
+
+/// The plant of a policy's training. Throws BadInput.
+Plant TrainingPlant(const PolicyInfo& info, const std::string& where) {
+  Plant plant;
+  const std::string place = Concat(where, ": metadata \"plant\"");
+  const Options options = OptionsOf(plant);
+  for (const Option& option : options.all()) {
+    const auto found = info.plant.find(option.name);
+    if (found == info.plant.end() && option.implied) continue;
+    if (found == info.plant.end()) throw BadInput(Concat(place, ": no ", option.name));
+    option.Set(FormatNumber(found->second), Concat(place, ": ", option.name));
+  }
+  return plant;
+}
+
+}  // namespace
+
+LoadedPolicy PolicyIn(const Tensors& file) {
+  const std::string& where = file.where();
+  const auto format = file.metadata.find("format");
+  if (format != file.metadata.end() && format->second == "upswing-realaigym") {
+    throw BadInput(Concat(
+        where,
+        ": expected a policy of `upswing train`, got one for RealAIGym (`upswing realaigym`)"));
+  }
+  const auto policy = std::make_shared<const NetworkPolicy>(NetworkPolicy::From(file));
+  const PolicyInfo& info = policy->info();
+  const std::string task = info.task.empty() ? kDoublePendulum : info.task;
+  LoadedPolicy loaded{where, where, policy, task, Plant(), ""};
+  CheckTask(loaded, where);
+  if (!HasPlant(loaded.task)) return loaded;
+  loaded.plant = TrainingPlant(info, where);
+  loaded.mjcf = info.model;
+  return loaded;
+}
+
+int LoadedPolicy::memory() const {
+  return HasPlant(task) ? MemorySteps(policy->obs_size(), identifies()) : 0;
+}
+
+bool LoadedPolicy::identifies() const {
+  const auto& observation = policy->info().observation;
+  return HasPlant(task) && observation && observation->identified;
+}
+
+PolicyInfo InfoOf(const Config& config) {
+  PolicyInfo info;
+  info.agent = config.agent;
+  info.seed = config.train.seed;
+  info.upswing_version = UPSWING_VERSION;
+  info.config = ConfigToml(config, true);
+  const EnvSpec spec = config.Spec();
+  info.task = spec.task;
+  info.control_period = spec.step_seconds;
+  if (!HasPlant(config.task)) return info;
+  for (const auto& [name, value] : PlantValues(config.plant)) info.plant[name] = value;
+  info.observation = ObservationInfoOf(config.memory, config.identify);
+  info.model = config.mjcf;
+  return info;
+}
+
+}  // namespace upswing

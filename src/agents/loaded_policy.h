@@ -1,0 +1,42 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "agents/config.h"
+#include "base/policy.h"
+#include "base/tensors.h"
+#include "pendulum/double_pendulum.h"
+
+namespace upswing {
+
+/// A policy and what it needs to be tried out.
+struct LoadedPolicy {
+  std::string name;  // for messages
+  std::string path;  // its file; empty for a controller
+  std::shared_ptr<const Policy> policy;
+  std::string task;  // see TaskNames
+  // Of the double pendulum:
+  Plant plant;       // plant of the training or of the design
+  std::string mjcf;  // empty: the built-in model
+  // Designs the controller for another plant; empty for a learned policy. Throws BadInput if no
+  // such controller exists.
+  std::function<std::shared_ptr<const Policy>(const Plant&)> design_for = {};
+
+  /// Number of past steps in its observations.
+  int memory() const;
+  /// Whether its observations contain an estimate of the plant.
+  bool identifies() const;
+  /// Origin: "training", or "design" for a controller.
+  const char* origin() const { return path.empty() ? "design" : "training"; }
+};
+
+/// The policy in a file. Its MJCF model is not checked. Throws BadInput also for a task that this
+/// program lacks: another control period or other observations.
+LoadedPolicy PolicyIn(const Tensors& file);
+
+/// Metadata of a policy file on its agent and task.
+PolicyInfo InfoOf(const Config& config);
+
+}  // namespace upswing

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "agents/config.h"
+#include "base/tensors.h"
+#include "base/thread_pool.h"
+#include "rl/trainer.h"
+
+namespace upswing {
+
+/// The environments of the evaluation at a step of a training with these settings: one per episode.
+/// The engine is the training's.
+EnvConfig EvaluationEnvironments(const Config& config, int64_t step);
+
+/// Whether evaluations run in the closed form and MuJoCo confirms the evaluations that solve the
+/// task. With the same setting, a model of your own, which has no closed form, is evaluated in
+/// MuJoCo.
+bool IsScreened(const Config& config);
+
+/// Computer on which a training runs.
+struct Host {
+  Engines engines;
+  int64_t memory;  // free memory, bytes
+  int threads = 1;
+  ForeignMaker make_foreign = {};  // for trainings on a foreign task
+};
+
+/// A training: environments, agent and training loop, made from its settings. It writes no file;
+/// TrainingRun does.
+class Training {
+ public:
+  /// Throws BadInput if the training does not fit into the free memory, or if the host lacks an
+  /// engine of the settings.
+  Training(Config config, const Host& host);
+
+  /// Adds an observer; see Trainer::AddObserver.
+  void AddObserver(TrainObserver& observer) { trainer_.AddObserver(observer); }
+
+  /// Makes one step of all environments; see Trainer::Step.
+  bool Step() { return trainer_.Step(); }
+  const Trainer& trainer() const { return trainer_; }
+  const TrainState& state() const { return trainer_.state(); }
+  const Config& config() const { return config_; }
+  const Agent& agent() const { return *agent_; }
+  const VectorEnv& env() const { return *env_; }
+  const EnvSpec& spec() const { return env_->spec(); }
+  int threads() const { return pool_.threads(); }
+
+  /// The current policy, without exploration.
+  std::unique_ptr<Policy> policy() const;
+
+  /// Saves or loads the whole state, without the settings.
+  void State(const Archive& archive) { trainer_.State(archive); }
+
+  /// The whole state with its settings. The tensors view the arrays: save them before the next
+  /// Step.
+  Tensors Checkpoint();
+  /// Loads a checkpoint. Throws BadInput unless it is from this version and these settings.
+  void Load(const Tensors& checkpoint);
+
+ private:
+  TrainSetup MakeSetup(const Engines& engines);
+  /// Evaluates a policy from new start states with the reward's standard weights, with the
+  /// disturbances of the training. Plants are the training plant, or a new random plant per episode
+  /// if training randomizes plants.
+  Evaluation Evaluate(const Engine& engine, const Policy& policy, int64_t step);
+
+  Config config_;
+  ForeignMaker make_foreign_;
+  ThreadPool pool_;
+  std::unique_ptr<VectorEnv> env_;
+  std::unique_ptr<Agent> agent_;
+  Trainer trainer_;
+};
+
+}  // namespace upswing

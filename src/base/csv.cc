@@ -1,0 +1,149 @@
+#include "base/csv.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "base/text.h"
+
+namespace upswing {
+namespace {
+
+constexpr size_t kMostColumns = 4096;
+
+/// A line of a table. The error begins with the line's place.
+struct Line {
+  std::string_view text;
+  const std::string& where;
+  int number = 0;
+
+  Error Bad(std::string_view what) const {
+    return BadInput(Concat(where, ":", number, ": ", what));
+  }
+};
+
+/// The end of the cell that begins at `at`: a comma outside quotes, or the end of the line.
+size_t EndOfCell(const Line& line, size_t at) {
+  bool quoted = false;
+  for (; at < line.text.size() && (quoted || line.text[at] != ','); ++at) {
+    if (line.text[at] == '"') quoted = !quoted;  // two quotes in a row change nothing
+  }
+  if (quoted) throw line.Bad(Concat("expected a closing quote, got \"", line.text, "\""));
+  return at;
+}
+
+/// Replaces `cells` by the cells of a row, without surrounding blanks. They are views, because a
+/// string for each cell would take many times the memory of the file.
+void FindCells(const Line& line, std::vector<std::string_view>& cells) {
+  cells.clear();
+  for (size_t begin = 0; begin <= line.text.size();) {
+    if (cells.size() == kMostColumns) {
+      throw line.Bad(Concat("expected at most ", kMostColumns, " columns, got more"));
+    }
+    const size_t end = EndOfCell(line, begin);
+    cells.push_back(Trim(line.text.substr(begin, end - begin)));
+    begin = end + 1;
+  }
+}
+
+bool IsQuoted(std::string_view cell) {
+  return cell.size() > 1 && cell.front() == '"' && cell.back() == '"';
+}
+
+std::string_view WithoutQuotes(std::string_view cell) {
+  return IsQuoted(cell) ? cell.substr(1, cell.size() - 2) : cell;
+}
+
+/// The text that a cell stands for.
+std::string TextOf(std::string_view cell) {
+  const std::string text(WithoutQuotes(cell));
+  return IsQuoted(cell) ? Replaced(text, "\"\"", "\"") : text;
+}
+
+/// Moves to the next line that the readers do not ignore, and takes it from `rest`; false if there
+/// is none.
+bool FindLine(std::string_view& rest, Line& line) {
+  while (!rest.empty()) {
+    line.text = TakeLine(rest);
+    ++line.number;
+    if (!line.text.empty() && !line.text.starts_with('#')) return true;
+  }
+  return false;
+}
+
+std::string_view WithoutByteOrderMark(std::string_view text) {
+  constexpr std::string_view kMark = "\xef\xbb\xbf";
+  if (text.starts_with(kMark)) text.remove_prefix(kMark.size());
+  return text;
+}
+
+/// A text as a cell: Printable, which keeps the row on one line, and in quotes if necessary.
+std::string CellOf(std::string_view given) {
+  const std::string text = Printable(given);
+  if (text.find_first_of(",\"") == text.npos) return text;
+  return Concat("\"", Replaced(text, "\"", "\"\""), "\"");
+}
+
+}  // namespace
+
+std::vector<std::string> CsvNames(std::string_view text, const std::string& where) {
+  text = WithoutByteOrderMark(text);
+  Line line{{}, where};
+  std::vector<std::string_view> cells;
+  if (FindLine(text, line)) FindCells(line, cells);
+  std::vector<std::string> names;
+  for (const std::string_view cell : cells) names.push_back(TextOf(cell));
+  return names;
+}
+
+std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::string>& names,
+                               const std::string& where) {
+  text = WithoutByteOrderMark(text);
+  std::vector<CsvColumn> columns;
+  for (const std::string& name : names) columns.push_back({name, {}});
+  Line line{{}, where};
+  std::vector<std::string_view> cells;
+  if (!FindLine(text, line)) return columns;
+  FindCells(line, cells);
+  const size_t width = cells.size();
+  std::vector<size_t> places;  // indices of the wanted columns in a row
+  for (const std::string& name : names) {
+    const auto found = std::ranges::find(cells, name, TextOf);
+    if (found == cells.end()) {
+      throw line.Bad(Concat("expected a column \"", name, "\", got \"", line.text, "\""));
+    }
+    const auto times = std::ranges::count(cells, name, TextOf);
+    if (times > 1) {
+      throw line.Bad(Concat("expected one column \"", Printable(name), "\", got ", times));
+    }
+    places.push_back(static_cast<size_t>(found - cells.begin()));
+  }
+  while (FindLine(text, line)) {
+    FindCells(line, cells);
+    if (cells.size() != width) {
+      throw line.Bad(Concat("expected ", width, " columns, got ", cells.size()));
+    }
+    for (size_t i = 0; i < places.size(); ++i) {
+      const std::string_view cell = WithoutQuotes(cells[places[i]]);
+      const auto number = ParseNumber(cell);
+      if (!number || !std::isfinite(*number)) {
+        throw line.Bad(Concat(names[i], ": expected a finite number, got \"", cell, "\""));
+      }
+      columns[i].values.push_back(*number);
+    }
+  }
+  return columns;
+}
+
+void CsvTable::Add(std::string_view name, std::string_view text) {
+  if (first_) names_ += CellOf(name) + ',';
+  rows_ += CellOf(text) + ',';
+}
+
+void CsvTable::EndRow() {
+  if (first_) names_.back() = '\n';
+  rows_.back() = '\n';
+  first_ = false;
+}
+
+}  // namespace upswing

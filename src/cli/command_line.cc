@@ -1,0 +1,354 @@
+#include "cli/command_line.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <iterator>
+#include <sstream>
+#include <utility>
+
+#include "base/error.h"
+#include "base/text.h"
+#include "cli/progress.h"
+#include "cli/say.h"
+#include "os/command.h"
+
+namespace upswing {
+namespace {
+
+/// The placeholder of a setting's value in --help.
+std::string TypeName(const Option& option) {
+  constexpr std::array kNames{"", "INTEGER", "NUMBER", "TEXT", "LIST"};  // in the order of Target
+  return option.name == "model" ? "FILE" : kNames.at(option.target.index());
+}
+
+/// A function that receives a flag's value.
+using TakeValue = std::function<void(const std::string&)>;
+
+/// Adds the flag of one setting. If the flag is repeated, the last value counts.
+void AddFlag(CLI::App& app, const Option& option, const std::string& group, const TakeValue& take) {
+  const std::string help = option.about_with_default();
+  if (std::holds_alternative<bool*>(option.target)) {
+    app.add_flag_function(
+           option.flag() + ",!--no-" + option.flag().substr(2),
+           [take](int64_t on) { take(on > 0 ? "true" : "false"); }, help)
+        ->group(group)
+        ->disable_flag_override();
+    return;
+  }
+  app.add_option_function<std::string>(option.flag(), take, help)
+      ->group(group)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
+      ->type_name(TypeName(option));
+}
+
+CLI::Validator NotEmpty(std::string_view what) {
+  return {[what = std::string(what)](const std::string& text) -> std::string {
+            return text.empty() ? Concat("expected ", what, ", got an empty text") : "";
+          },
+          ""};
+}
+
+/// `text` with its prose wrapped to HelpColumns(). Indented lines and headings (`Examples:`) keep
+/// their line breaks.
+std::string Reflowed(const std::string& text) {
+  std::string result, prose;
+  const auto end_paragraph = [&] {
+    if (!prose.empty()) result += WrapText(prose, HelpColumns()) + '\n';
+    prose.clear();
+  };
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.empty() || line.starts_with(' ')) {
+      end_paragraph();
+      result += Concat(line, '\n');
+      continue;
+    }
+    const bool heading = prose.empty() && line.ends_with(':');
+    prose += Concat(prose.empty() ? "" : " ", line);
+    if (heading) end_paragraph();
+  }
+  end_paragraph();
+  return result;
+}
+
+/// The text of examples, with the command that starts an installed program.
+std::string WithLaunchCommand(std::string text) {
+  constexpr std::string_view kInRepository = "./upswing ";
+  const std::string command = Concat(LaunchCommand(), " ");
+  for (size_t at = 0; (at = text.find(kInRepository, at)) != std::string::npos;
+       at += command.size()) {
+    text.replace(at, kInRepository.size(), command);
+  }
+  return text;
+}
+
+/// Formats --help within HelpColumns(), without the `{false}` that CLI11 adds to a flag's --no-
+/// form.
+class HelpFormatter : public CLI::Formatter {
+ public:
+  /// `before` is called before help is printed, because help may depend on the other arguments.
+  explicit HelpFormatter(std::function<void()> before = {}) : before_(std::move(before)) {}
+
+  /// Hides the flags that are not shown.
+  void HideFlags() const {
+    if (before_) before_();
+  }
+
+  std::string make_help(const CLI::App* app, std::string name,
+                        CLI::AppFormatMode mode) const override {
+    HideFlags();
+    return CLI::Formatter::make_help(app, std::move(name), mode);
+  }
+
+  std::string make_footer(const CLI::App* app) const override {
+    return Reflowed(WithLaunchCommand(CLI::Formatter::make_footer(app)));
+  }
+
+  std::string make_option_name(const CLI::Option* option, bool is_positional) const override {
+    std::string name = CLI::Formatter::make_option_name(option, is_positional);
+    constexpr std::string_view kNoise = "{false}";
+    const size_t at = name.find(kNoise);
+    return at == std::string::npos ? name : name.erase(at, kNoise.size());
+  }
+
+  std::string make_option_desc(const CLI::Option* option) const override {
+    std::string description = option->get_description();
+    std::ranges::replace(description, '\n', ' ');  // the wrapping below sets the line ends
+    return WrapText(description, HelpColumns() - get_column_width());
+  }
+
+ private:
+  std::function<void()> before_;
+};
+
+std::vector<std::string> FlagsOf(const CLI::Option& option) {
+  std::vector<std::string> flags;
+  for (const std::string& name : option.get_lnames()) flags.push_back("--" + name);
+  return flags;
+}
+
+bool IsHidden(const CLI::Option& option) { return option.get_group().empty(); }
+
+/// All flags of a command that are not hidden, and the names of its subcommands.
+std::vector<std::string> KnownWords(const CLI::App& app) {
+  std::vector<std::string> words;
+  for (const CLI::Option* option : app.get_options()) {
+    if (!IsHidden(*option)) std::ranges::copy(FlagsOf(*option), std::back_inserter(words));
+  }
+  for (const CLI::App* sub : app.get_subcommands({})) words.push_back(sub->get_name());
+  return words;
+}
+
+/// Suggests a similar flag for an unknown one, or explains why this command lacks it.
+std::string ExplainFlag(const CLI::App& app, const std::string& word) {
+  if (const auto* help = dynamic_cast<const HelpFormatter*>(app.get_formatter().get())) {
+    help->HideFlags();
+  }
+  if (std::string meant = DidYouMean(word, KnownWords(app)); !meant.empty()) return meant;
+  for (const CLI::Option* option : app.get_options()) {
+    const bool near = IsHidden(*option) && !DidYouMean(word, FlagsOf(*option)).empty();
+    if (near) return Concat("; ", option->get_description());
+  }
+  return app.get_option_no_throw("--set") != nullptr ? "; --set NAME=VALUE changes the plant" : "";
+}
+
+/// The message for `got`, a word that is not a command.
+std::string ExplainCommands(const CLI::App& program, const std::string& got) {
+  std::vector<std::string> names;
+  for (const CLI::App* sub : program.get_subcommands({})) names.push_back(sub->get_name());
+  return Concat("expected a command, one of ", Join(names, ", "), "; got ", got);
+}
+
+/// The message for a missing argument.
+std::string ExplainMissing(const CLI::App& program, const CLI::App& app) {
+  if (&app == &program) return ExplainCommands(program, "none");
+  for (const CLI::Option* option : app.get_options()) {
+    if (!option->get_required() || option->count() > 0) continue;
+    return Concat(app.get_name(), ": expected ", option->get_type_name(), " (",
+                  option->get_description(), "), got none");
+  }
+  return Concat(app.get_name(), ": expected another argument, got none");
+}
+
+/// The message for a wrong number of values of a flag. CLI11 names the flag only at the beginning
+/// of its message, such as `--gamma: 1 required NUMBER missing`.
+std::string ExplainValues(const std::string& message) {
+  if (message.find("flag override") != std::string::npos) {
+    return Concat("--", message.substr(0, message.find(' ')), ": expected no value, got one");
+  }
+  const std::string flag = message.substr(0, message.find_first_of(": "));
+  const bool several = message.find("received") != std::string::npos;
+  return Concat(flag, ": expected a value, got ", several ? "several" : "none");
+}
+
+/// Explains the first word that `app`, the program or one of its commands, does not know; empty if
+/// it knows all.
+std::string ExplainUnknown(const CLI::App& program, const CLI::App& app) {
+  const std::vector<std::string> unknown = app.remaining();
+  if (unknown.empty()) return "";
+  const std::string word = unknown.front().substr(0, unknown.front().find('='));
+  if (word.starts_with("-")) return Concat("unknown flag ", word, ExplainFlag(app, word));
+  std::string meant = DidYouMean(word, KnownWords(app));
+  if (&app == &program) return ExplainCommands(program, Concat("\"", word, "\"", meant));
+  if (meant.empty()) {
+    const bool has_agents = app.get_option_no_throw("--agent") != nullptr;
+    meant = Concat("; a value follows its flag, as in --",
+                   has_agents ? Concat("agent ", word) : std::string("seed 1"));
+  }
+  return Concat(app.get_name(), ": expected no argument ", word, meant);
+}
+
+/// The message for a wrong command line, in one line.
+std::string Explain(const CLI::App& program, const CLI::ParseError& error) {
+  const auto chosen = program.get_subcommands();
+  const CLI::App& app = chosen.empty() ? program : *chosen.front();
+  for (const CLI::App* asked : {&program, &app}) {
+    if (std::string unknown = ExplainUnknown(program, *asked); !unknown.empty()) return unknown;
+  }
+  if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) {
+    return ExplainMissing(program, app);
+  }
+  if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr) {
+    return ExplainValues(error.what());
+  }
+  return error.what();
+}
+
+/// Adds a text argument; `Target` is std::string, an optional string or a vector.
+template <typename Target>
+CLI::Option* AddText(CLI::App& app, std::string_view name, Target& target, std::string_view type,
+                     std::string_view help, std::string_view what) {
+  CLI::Option* option = app.add_option(std::string(name), target, std::string(help));
+  if (!type.empty()) option->type_name(std::string(type));
+  if (!what.empty()) option->check(NotEmpty(what));
+  return option;
+}
+
+}  // namespace
+
+size_t HelpColumns() { return static_cast<size_t>(std::clamp(TerminalWidth(100), 80, 100)); }
+
+void CommandLine::Text(std::string_view name, std::string& target, std::string_view type,
+                       std::string_view help, std::string_view what) {
+  AddText(app_, name, target, type, help, what);
+}
+
+void CommandLine::Text(std::string_view name, std::optional<std::string>& target,
+                       std::string_view type, std::string_view help, std::string_view what) {
+  AddText(app_, name, target, type, help, what);
+}
+
+void CommandLine::Texts(std::string_view name, std::vector<std::string>& target,
+                        std::string_view type, std::string_view help) {
+  AddText(app_, name, target, type, help, kPath);
+}
+
+void CommandLine::Repeated(std::string_view name, std::vector<std::string>& target,
+                           std::string_view type, std::string_view help, std::string_view group) {
+  CLI::Option* option = AddText(app_, name, target, type, help, "");
+  option->take_all()->allow_extra_args(false);
+  if (!group.empty()) option->group(std::string(group));
+}
+
+void CommandLine::Require(std::string_view name) { app_.get_option(std::string(name))->required(); }
+
+void CommandLine::Flag(std::string_view name, bool& target, std::string_view help) {
+  app_.add_flag(std::string(name), target, std::string(help))->disable_flag_override();
+}
+
+void CommandLine::Arguments(const Options& options) {
+  for (const Option& option : options.all()) {
+    AddFlag(app_, option, "Options",
+            [option](const std::string& text) { option.Set(text, option.flag()); });
+  }
+}
+
+void CommandLine::Settings(const Options& options, std::vector<FlagValue>& flags) {
+  // CLI11 applies flags in this order. Aliases come first, so that the more specific flag wins.
+  for (const auto& alias : options.aliases()) {
+    Option as_one = *options.Find(alias.name, alias.name).front();
+    as_one.help = alias.help;
+    app_.add_option_function<std::string>(
+            alias.flag(),
+            [&flags, name = alias.name](const std::string& text) {
+              flags.push_back({name, text});
+            },
+            as_one.about())
+        ->group(alias.section)
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
+        ->type_name("NUMBER");
+  }
+  for (const Option& option : options.all()) {
+    AddFlag(app_, option, option.section, [&flags, name = option.name](const std::string& text) {
+      flags.push_back({name, text});
+    });
+  }
+}
+
+void CommandLine::ShowSettings(std::function<void(const ShowOptions&)> shown) {
+  const auto show = [this](const Options& every, const Options& options) {
+    for (const Option& option : every.all()) {
+      CLI::Option* flag = app_.get_option(option.flag());
+      const Option* found = options.Get(option.name);
+      flag->group(found == nullptr ? "" : found->section);
+      flag->description(found == nullptr ? options.WhyMissing(option.name)
+                                         : found->about_with_default());
+    }
+  };
+  app_.formatter(
+      std::make_shared<HelpFormatter>([shown = std::move(shown), show] { shown(show); }));
+}
+
+void CommandLine::Footer(const std::string& text) { app_.footer(text); }
+
+void CommandLine::Check(std::function<void()> check) { checks_.push_back(std::move(check)); }
+
+bool CommandLine::Has(std::string_view name) const { return app_.count(std::string(name)) > 0; }
+
+std::string CommandLine::Last(std::string_view name) const {
+  const std::vector<std::string> values = app_.get_option(std::string(name))->results();
+  return values.empty() ? "" : values.back();
+}
+
+int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> commands,
+               const std::string& footer) {
+  CLI::App program(
+      "Upswing trains, compares, explains and deploys controllers that swing up and\n"
+      "balance a double pendulum with one motor.",
+      "upswing");
+  program.set_version_flag("--version", "upswing " UPSWING_VERSION);
+  program.require_subcommand(1);
+  const auto formatter = std::make_shared<HelpFormatter>();
+  constexpr size_t kCommandColumns = 14;
+  formatter->column_width(kCommandColumns);
+  program.formatter(formatter);
+  program.footer(footer);
+  std::vector<std::unique_ptr<CommandLine>> lines;
+  const CommandLine* chosen = nullptr;
+  const bool installed = IsInstalled();
+  for (const CommandEntry& command : commands) {
+    if (command.declare == nullptr && installed) continue;  // only the repository has it
+    CLI::App* app = program.add_subcommand(command.name, command.help);
+    app->formatter(std::make_shared<HelpFormatter>());
+    CommandLine& line = *lines.emplace_back(new CommandLine(*app));
+    if (command.declare != nullptr) command.declare(line);
+    app->callback([&line, &chosen] {
+      for (const auto& check : line.checks_) check();
+      chosen = &line;
+    });
+  }
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::Success& request) {  // --help and --version
+    if (const std::string unknown = ExplainUnknown(program, program); !unknown.empty()) {
+      throw BadInput(unknown);
+    }
+    return program.exit(request);
+  } catch (const CLI::ParseError& error) {
+    throw BadInput(Explain(program, error));
+  }
+  return chosen->run_();
+}
+
+}  // namespace upswing

@@ -1,0 +1,105 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include "agents/config.h"
+#include "base/options.h"
+
+namespace CLI {
+class App;
+}
+
+/// The program's command line. Only command_line.cc knows the library that parses it.
+namespace upswing {
+
+/// Description of an argument whose value must not be empty. An unset shell variable gives an empty
+/// one.
+inline constexpr std::string_view kPath = "a path";
+
+/// One command: declares its arguments, then runs it with their values.
+class CommandLine {
+ public:
+  explicit CommandLine(CLI::App& app) : app_(app) {}
+
+  /// Adds a text: a flag if the name begins with `--`, else a positional argument. --help shows
+  /// `type` for the value. `what` names the expected value in the error for an empty one; an empty
+  /// `what` allows empty values.
+  void Text(std::string_view name, std::string& target, std::string_view type,
+            std::string_view help, std::string_view what = kPath);
+  void Text(std::string_view name, std::optional<std::string>& target, std::string_view type,
+            std::string_view help, std::string_view what = kPath);
+  /// Adds a positional argument that takes any number of texts.
+  void Texts(std::string_view name, std::vector<std::string>& target, std::string_view type,
+             std::string_view help);
+  /// Adds a flag that can be repeated, each time with one text.
+  void Repeated(std::string_view name, std::vector<std::string>& target, std::string_view type,
+                std::string_view help, std::string_view group = "");
+  /// Makes an argument that was added required.
+  void Require(std::string_view name);
+  /// Adds a flag without a value.
+  void Flag(std::string_view name, bool& target, std::string_view help);
+
+  /// Adds a flag for each of the command's own numbers and choices. Parsing the flag sets the value
+  /// immediately; see Option::Set.
+  void Arguments(const Options& options);
+  /// Adds a flag for each setting and alias, in the order of their descriptions. Given values are
+  /// appended to `flags`.
+  void Settings(const Options& options, std::vector<FlagValue>& flags);
+  /// Sets the function that chooses the settings in --help. It calls its argument with all added
+  /// settings and with the settings to show, whose values are the defaults. A misspelt flag gets
+  /// suggestions from the shown settings; a hidden setting's flag gets its WhyMissing as the
+  /// message.
+  using ShowOptions = std::function<void(const Options& every, const Options& options)>;
+  void ShowSettings(std::function<void(const ShowOptions&)> shown);
+
+  /// Adds the text below the arguments in --help.
+  void Footer(const std::string& text);
+  /// Adds a check that runs once all arguments are known, before anything else.
+  void Check(std::function<void()> check);
+  /// Sets the function that runs the command and returns the exit code. Returns the arguments that
+  /// the function will get; the caller declares them.
+  template <typename Arguments>
+  std::remove_cvref_t<Arguments>& Runs(int (*run)(Arguments)) {
+    const auto arguments = std::make_shared<std::remove_cvref_t<Arguments>>();
+    run_ = [arguments, run] { return run(*arguments); };
+    return *arguments;
+  }
+
+  /// Whether the argument was given.
+  bool Has(std::string_view name) const;
+  /// The last value given for a flag; empty: none.
+  std::string Last(std::string_view name) const;
+
+ private:
+  friend int RunProgram(int argc, const char* const* argv,
+                        std::span<const struct CommandEntry> commands, const std::string& footer);
+
+  CLI::App& app_;
+  std::vector<std::function<void()>> checks_;
+  std::function<int()> run_;
+};
+
+/// A row of the table of commands.
+struct CommandEntry {
+  const char* name;
+  const char* help;               // one line
+  void (*declare)(CommandLine&);  // null: the command is a separate program
+};
+
+/// Parses the command line, runs the command and returns its exit code. `footer` ends the program's
+/// --help. Throws BadInput with a message of one line if the command line is wrong.
+int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> commands,
+               const std::string& footer);
+
+/// Largest number of columns in a line of --help: the terminal's, limited to 80 to 100; without a
+/// terminal 100.
+size_t HelpColumns();
+
+}  // namespace upswing

@@ -1,0 +1,348 @@
+#!/usr/bin/env python3
+"""Tests of the command line: help, numbers, `-` for standard streams, and error messages."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import unittest
+
+from testing import ROOT, UPSWING, ProgramTest, small, train_once
+
+COMMANDS = ("train", "eval", "simulate", "map", "plot", "info", "compare", "study", "export",
+            "realaigym", "bench")
+# Phrases of the command-line library that must not appear in our messages.
+FOREIGN = ("not in range", "Could not convert", "is required", "required but received", "missing",
+           "Value ", "RequiredError", "At Most", "The following argument")
+
+
+class HelpTest(ProgramTest):
+    def test_lines_are_within_100_columns(self):
+        for command in ([], *([name] for name in COMMANDS)):
+            for line in self.succeed(*command, "--help").splitlines():
+                with self.subTest(command=command, line=line):
+                    self.assertLessEqual(len(line), 100)
+
+    def help_of(self, flag, *arguments):
+        """The help lines of a flag, joined into one."""
+        text = self.succeed(*arguments, "--help")
+        found = re.search(rf"(?m)^  {flag}\b.*\n(?: {{30}}.*\n)*", text)
+        self.assertIsNotNone(found, flag)
+        return " ".join(found[0].split())
+
+    def test_defaults_are_those_of_the_agent_and_of_the_file(self):
+        self.assertIn("default 256,256)", self.help_of("--hidden", "train"))
+        self.assertIn("default 48,32)", self.help_of("--hidden", "train", "--agent", "fast"))
+        self.assertIn("(default fast)", self.help_of("--agent", "train", "--agent", "fast"))
+        self.assertIn("; default closed-form)", self.help_of("--physics", "train", "--agent=fast"))
+        self.write("s.toml", '[train]\nagent = "dqn"\n[agent]\ngamma = 0.9\n')
+        self.assertIn("(0 to 1; default 0.9)", self.help_of("--gamma", "train", "--config", "s.toml"))
+        self.assertIn("(default false)", self.help_of("--double", "train", "--config", "s.toml"))
+        self.refuse(["train", "--agent", "quick", "--help"], "got \"quick\"")
+
+    def test_ranges_and_units(self):
+        self.assertIn("[s] (0.02 to 1000000 in steps of 0.02; default 4)",
+                      self.help_of("--episode-seconds", "train"))
+        self.assertIn("(1 to 1000000; default 100)", self.help_of("--episodes", "eval"))
+        self.assertIn("(1 to 4096; default one per processor)", self.help_of("--jobs", "study"))
+        self.assertRegex(self.help_of("--randomize", "train"), r"± this share.* \(0 to 0.99\)")
+        self.assertIn("(0.01 to 100)", self.help_of("--mass", "train"))
+
+    def test_lines_end_only_where_the_width_asks_for_it(self):
+        for command in COMMANDS:
+            lines = self.succeed(command, "--help").split("\n\nExamples")[0].splitlines()
+            for line, after in zip(lines, lines[1:]):
+                if not re.match(r" {30}\S", line) or not re.match(r" {30}\S", after):
+                    continue
+                with self.subTest(command=command, line=line, after=after):
+                    self.assertGreater(len(line) + 1 + len(after.split()[0]), 100)
+
+    def test_agents_are_described_to_the_end(self):
+        text = " ".join(self.succeed("train", "--help").split())
+        self.assertIn("with a memory: many plants, and few updates for each d3qn-small", text)
+
+
+class NumberTest(ProgramTest):
+    """All commands parse and refuse numbers in the same way."""
+
+    def refuse_numbers(self, *cases):
+        for arguments, message in cases:
+            with self.subTest(arguments=arguments):
+                done = self.run_here(*arguments)
+                self.assert_one_line(done, 2, message)
+                for words in FOREIGN:
+                    self.assertNotIn(words, done.stderr)
+
+    def test_wording(self):
+        self.refuse_numbers(
+            (["eval", "x", "--episodes", "many"],
+             '--episodes: expected an integer in [1, 1000000], got "many"'),
+            (["eval", "x", "--episodes", "2e6"],
+             '--episodes: expected an integer in [1, 1000000], got "2e6"'),
+            (["eval", "x", "--seed", "-1"],
+             '--seed: expected an integer in [0, 9000000000000000], got "-1"'),
+            (["map", "x", "--threads", "1.5"], '--threads: expected an integer in [0, 256]'),
+            (["map", "x", "--check", "2"], '--check: expected a number in [0, 1], got "2"'),
+            (["plot", "x", "--seconds", "nan"],
+             '--seconds: expected a multiple of 0.02 in [0.1, 1000], got "nan"'),
+            (["bench", "--threads", "1,x"],
+             '--threads: expected a list of integers in [0, 256], got "1,x"'),
+            (["bench", "--repetitions", "0"],
+             '--repetitions: expected an integer in [1, 1000], got "0"'),
+            (["bench", "--network", "cnn"], '--network: expected one of plain, dueling, got "cnn"'),
+            (["train", "--seeds", "3", "--jobs", "0"],
+             '--jobs: expected an integer in [1, 4096], got "0"'),
+            (["train", "--seeds", ""], "--seeds: expected a number of seeds or a list"),
+            (["study", "x", "--seeds", ""], "--seeds: expected a number of seeds or a list"))
+
+    def test_what_is_missing_or_too_much(self):
+        self.refuse_numbers(
+            ([], "expected a command, one of train, eval, "),
+            (["evla"], 'got "evla" (did you mean eval?)'),
+            (["evaluate"], 'got "evaluate" (did you mean eval?)'),
+            (["tets"], 'got "tets" (did you mean test?)'),
+            (["pyhton"], 'got "pyhton" (did you mean python?)'),
+            (["demos"], 'got "demos" (did you mean demo?)'),
+            (["doc", "--help"], 'expected a command, one of train, '),
+            (["doc", "train"], 'got "doc"'),
+            (["--help", "doc"], 'got "doc"'),
+            (["--version", "x"], 'got "x"'),
+            (["eval"], "eval: expected POLICY|RUN (policy.safetensors, a run folder or a controller "
+                       "(energy, hybrid, lqr, mpc, pfl, tvlqr)), got none"),
+            (["compare"], "compare: expected RUN|FOLDER"),
+            (["study"], "study: expected FILE.toml"),
+            (["train", "--gamma"], "--gamma: expected a value, got none"),
+            (["train", "--out", "a", "--out", "b"], "--out: expected a value, got several"),
+            (["eval", "a", "b"], "expected no argument b"),
+            (["eval", "a", "--json=3"], "--json: expected no value, got one"))
+
+    def test_integers_may_have_an_exponent(self):
+        self.succeed(*small(steps="4e1", eval_every="2e1", eval_episodes="1e0"))
+        config = (self.folder / "run/config.toml").read_text(encoding="utf-8")
+        self.assertIn("\nsteps = 40 ", config)
+        self.assertIn("1 of 1", self.succeed("train", *small(steps=8, out=None)[1:],
+                                             "--seeds", "1", "--jobs", "1e0"))
+
+    def test_seconds_are_whole_control_periods(self):
+        self.refuse(["simulate", "--seconds", "0.03"],
+                    '--seconds: expected a multiple of 0.02 in [0, 100000], got "0.03"; '
+                    "the nearest are 0.02 and 0.04")
+        self.refuse(["train", "--episode-seconds", "0.05"], "the nearest are 0.04 and 0.06")
+        self.assertEqual(len(self.succeed("simulate", "--seconds", "0.04").splitlines()), 1 + 3)
+
+    def test_a_setting_in_no_section(self):
+        self.write("s.toml", "steps = 100\n")
+        self.refuse(["train", "--config", "s.toml"], "s.toml:1: steps: expected in section [train]")
+        self.write("s.toml", "mass = 1\n")
+        self.refuse(["train", "--config", "s.toml"], "s.toml:1: mass: expected in section [plant]")
+        self.write("s.toml", "seeds = 1\nsteps = 100\n[variants.a]\n")
+        self.refuse(["study", "s.toml"], "s.toml:2: steps: expected in [settings]")
+
+    def test_names_of_an_axis(self):
+        policy = train_once(type(self), steps=8, eval_episodes=1)
+        for text in ("foo", "foo=0:1"):
+            self.refuse(["map", policy, "--x", text], "--x", "mass1", "sensor_noise", "delay",
+                        "q1", "w2", "damping")
+
+
+class SettingsTest(ProgramTest):
+    def test_print_config_is_a_file_for_config(self):
+        text = self.succeed("train", "--agent", "fast", "--gamma", "0.98", "--print-config")
+        self.assertRegex(text, r"(?m)^gamma = 0.98  # discount factor per control step \(0 to 1\)$")
+        self.assertRegex(text, r"(?m)^hidden = \[48, 32\]  # ")
+        self.assertRegex(text, r'(?m)^agent = "fast"  # ')
+        self.assertEqual(list(self.folder.iterdir()), [])
+        self.write("s.toml", text)
+        self.assertEqual(self.succeed("train", "--config", "s.toml", "--print-config"), text)
+        # --print-config prints the same text that a run writes.
+        changes = {"agent": "fast", "steps": 8}
+        printed = self.succeed(*small(**changes), "--print-config")
+        self.succeed(*small(**changes))
+        self.assertEqual((self.folder / "run/config.toml").read_text(encoding="utf-8"), printed)
+        self.assertEqual(self.succeed("train", "--resume", "run", "--print-config"), printed)
+
+    def test_settings_that_cannot_learn_are_refused(self):
+        self.refuse(small(batch=128, replay=100, learning_starts=50),
+                    "batch: expected at most 100 transitions", "(replay)", "got 128")
+        self.refuse(small(replay=1), "batch: expected at most 1 transitions", "(replay)")
+        self.refuse(small(replay=200, learning_starts=201), "learning_starts: expected at most 200",
+                    "(replay)", "got 201")
+        self.write("s.toml", "[agent]\nreplay = 100\n")
+        self.refuse(["train", "--config", "s.toml"], "s.toml: batch: expected at most")
+
+    def test_settings_that_hardly_learn_are_warned_of(self):
+        for changes, words in (({"learning_starts": 5000}, "learning_starts is 5,000"),
+                               ({"updates_per_step": 0}, "updates_per_step is 0"),
+                               ({"learning_rate": 0, "learning_rate_end": 0}, "learning_rate and learning_rate_end are 0"),
+                               ({"tau": 0}, "tau is 0"),
+                               ({name + "_weight": 0 for name in ("energy", "height", "balance",
+                                                                  "velocity", "torque")},
+                                "every reward weight is 0")):
+            with self.subTest(changes=changes):
+                out = f"run{len(list(self.folder.iterdir()))}"
+                settings = {"steps": 400, "learning_starts": 200, "eval_episodes": 1} | changes
+                self.assertIn("  Warning: " + words, self.succeed(*small(**settings, out=out)))
+        self.assertNotIn("Warning", self.succeed(*small(steps=400, out="good")))
+        self.assertNotIn("Warning", self.succeed(*small(steps=400, out="copied", tau=0,
+                                                        target_period=10)))
+        # A run with 32 environments ends at step 416.
+        rounded = {"envs": 32, "steps": 400, "learning_starts": 400, "eval_episodes": 1}
+        self.assertNotIn("Warning", self.succeed(*small(**rounded, out="rounded")))
+        none = rounded | {"learning_starts": 416}
+        self.assertIn("has only 416 steps: the agent learns nothing", self.succeed(*small(**none, out="none")))
+
+    @unittest.skipIf("UPSWING_SANITIZED" in os.environ, "a sanitizer reserves the address space")
+    def test_a_network_that_does_not_fit_into_memory_leaves_nothing(self):
+        script = 'ulimit -v 4000000; exec "$@"'
+        command = [UPSWING, *small(hidden=",".join(["4096"] * 8))]
+        done = subprocess.run(["sh", "-c", script, "sh", *command], cwd=self.folder, check=False,
+                              capture_output=True, encoding="utf-8")
+        self.assert_one_line(done, 2, "expected at most ", "GB of memory", ", got 6.",
+                             "--hidden")
+        self.assertEqual(list(self.folder.iterdir()), [])
+
+    def test_a_solved_run_says_so_and_how_to_go_on(self):
+        self.succeed(*small())
+        output = self.succeed("train", "--resume", "run")
+        self.assertIn("Nothing to do: the run has all 4,000 steps", output)
+        self.assertIn("./upswing train --resume run --steps 8000", output)
+
+
+class StreamTest(ProgramTest):
+    def test_dash_is_standard_output(self):
+        csv = self.succeed("simulate", "--seconds", "0.1")
+        self.assertEqual(self.succeed("simulate", "--seconds", "0.1", "--csv", "-"), csv)
+        self.succeed("simulate", "--seconds", "0.1", "--csv", "out.csv")
+        self.assertEqual((self.folder / "out.csv").read_text(encoding="utf-8"), csv)
+        (self.folder / "out.csv").unlink()
+        vectors = self.succeed("export", "--test-vectors", "-")
+        self.assertTrue(json.loads(vectors))
+        text = self.succeed("bench", "replay", "--seconds", "0.001", "--repetitions", 1,
+                            "--json", "-")
+        self.assertEqual(len(json.loads(text)["benchmarks"]), 2)
+        self.assertEqual(list(self.folder.iterdir()), [])
+
+    def feed(self, text, *arguments):
+        return subprocess.run([UPSWING, *map(str, arguments)], cwd=self.folder, check=False,
+                              input=text, capture_output=True, encoding="utf-8")
+
+    def test_dash_is_standard_input(self):
+        done = self.feed('\ufeff"torque"\n1\n2\n', "simulate", "--torque", "-")
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        rows = done.stdout.splitlines()
+        torque = rows[0].split(",").index("torque")
+        self.assertEqual([row.split(",")[torque] for row in rows[1:]], ["1", "2", "0"])
+        self.assert_one_line(self.feed("t\n1\n", "simulate", "--torque", "-"), 2,
+                             'standard input:1: expected a column "torque", got "t"')
+        settings = "[agent]\ngamma = 0.5\n"
+        done = self.feed(settings, "train", "--config", "-", "--print-config")
+        self.assertIn("\ngamma = 0.5 ", done.stdout)
+        self.assert_one_line(self.feed("[agent]\ngama = 1\n", "train", "--config", "-"), 2,
+                             "standard input:2:")
+
+    def test_a_reader_that_has_seen_enough_ends_it_quietly(self):
+        policy = train_once(type(self), steps=8, eval_episodes=1)
+        for arguments in (["simulate", "--seconds", 200], ["train", "--help"],
+                          ["export", "--test-vectors", "-"], ["train", "--print-config"],
+                          ["info", policy]):
+            with self.subTest(arguments=arguments):
+                read_end, write_end = os.pipe()
+                os.close(read_end)
+                done = subprocess.run([UPSWING, *map(str, arguments)], cwd=self.folder, check=False,
+                                      stdout=write_end, stderr=subprocess.PIPE, encoding="utf-8")
+                os.close(write_end)
+                self.assertEqual((done.returncode, done.stderr), (-signal.SIGPIPE, ""))
+
+    def test_a_training_goes_on_without_a_reader(self):
+        # More lines than any buffer holds.
+        settings = small(eval_every=8, eval_episodes=1, steps=2000, out="unread")
+        read_end, write_end = os.pipe()
+        os.close(read_end)
+        done = subprocess.run([UPSWING, *settings], cwd=self.folder, check=False, stdout=write_end,
+                              stderr=subprocess.PIPE, encoding="utf-8")
+        os.close(write_end)
+        self.assertEqual((done.returncode, done.stderr), (-signal.SIGPIPE, ""))
+        self.assertIn("finished at step 2000",
+                      (self.folder / "unread/log.txt").read_text(encoding="utf-8"))
+
+    def test_a_file_that_bench_could_not_write_is_refused_before_it_measures(self):
+        self.write("file", "")
+        for path in ("nodir/x.json", "file/x.json", "/proc/x.json"):
+            with self.subTest(path=path):
+                self.refuse(["bench", "--seconds", "1000", "--json", path], "--json", path)
+
+
+class LauncherTest(ProgramTest):
+    """Tests of ./upswing in a folder that only looks like the repository: nothing is installed or
+    built."""
+
+    def setUp(self):
+        super().setUp()
+        (self.folder / "upswing").write_bytes((ROOT / "upswing").read_bytes())
+        (self.folder / "upswing").chmod(0o755)
+        (self.folder / "tools").symlink_to(ROOT / "tools")
+        (self.folder / "src").symlink_to(ROOT / "src")
+        program = self.folder / "build/release/bin/upswing"
+        program.parent.mkdir(parents=True)
+        program.write_text('#!/bin/sh\necho "ran: $*"\n')
+        program.chmod(0o755)
+        (self.folder / "build/release/build.ninja").touch()
+
+    def launch(self, *arguments, **more):
+        return subprocess.run([self.folder / "upswing", *arguments], check=False,
+                              capture_output=True, encoding="utf-8", **more)
+
+    def test_no_setup_in_the_wrong_place_or_misspelt(self):
+        for words in (["info", "--no-setup"], ["info", "--nosetup"], ["test", "-R", "x",
+                                                                      "--no-setup"]):
+            with self.subTest(words=words):
+                self.assert_one_line(self.launch(*words), 2,
+                                     f"expected before the command: ./upswing --no-setup {words[0]}")
+        self.assert_one_line(self.launch("--nosetup", "info"), 2, "unknown flag --nosetup",
+                             "expected --no-setup or a command")
+        self.assertEqual(self.launch("--no-setup", "info", "x").stdout, "ran: info x\n")
+
+    def test_its_help_lists_the_commands_of_the_program(self):
+        def commands(text, title):
+            return re.findall(r"(?m)^  (\w+) +(\S.*)$", text.split(f"{title}:\n")[1].split("\n\n")[0])
+
+        listed = commands(self.launch("--no-setup", "help").stdout, "Commands")
+        self.assertEqual(listed, commands(self.succeed("--help"), "Subcommands"))
+        self.assertIn(("realaigym", "Score a policy by the rules of RealAIGym, or search for one"), listed)
+        self.assertEqual(self.launch("--no-setup", "help", "info").stdout, "ran: info --help\n")
+
+    def test_words_that_ctest_would_ignore(self):
+        for words in (["--cluster", "foo"], ["foo"], ["--preset", "debug", "foo"]):
+            with self.subTest(words=words):
+                self.assert_one_line(self.launch("--no-setup", "test", *words), 2,
+                                     "expected flags of ctest, such as -R dqn, got foo")
+        self.assert_one_line(self.launch("--no-setup", "test", "--preset=debug", "--cluster"), 2,
+                             "expected --cluster")
+
+    def test_tests_that_are_not_built(self):
+        done = self.launch("--no-setup", "test", "-R", "rl.Dqn")
+        self.assert_one_line(done, 1, "the tests in build/release are not built (only the program",
+                             "without --no-setup")
+
+    @unittest.skipIf(os.geteuid() != 0, "only root can become somebody else")
+    def test_a_second_user_runs_what_is_built(self):
+        os.chmod(self.folder, 0o755)
+        nobody = {"user": 65534, "group": 65534, "extra_groups": []}
+        done = self.launch("info", "x", **nobody)
+        self.assertEqual((done.returncode, done.stdout), (0, "ran: info x\n"), done)
+        self.assertEqual(len(done.stderr.splitlines()), 1, done.stderr)
+        self.assertIn("may not write to", done.stderr)
+        (self.folder / "build/release/bin/upswing").unlink()
+        done = self.launch("info", "x", **nobody)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("the program is not built", done.stderr)
+        (self.folder / "build/release/bin/base_test").write_text("")
+        (self.folder / "build/release/bin/base_test").chmod(0o755)
+        done = self.launch("test", **nobody)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("tests write to", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

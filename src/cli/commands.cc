@@ -1,0 +1,92 @@
+#include "cli/commands.h"
+
+#include "agents/arguments.h"
+#include "agents/controllers.h"
+#include "base/text.h"
+#include "runs/find_policy.h"
+#include "runs/plant_file.h"
+
+namespace upswing {
+
+void AddPolicy(CommandLine& line, PolicyArguments& a) {
+  line.Text("policy", a.name, "POLICY|RUN",
+            Concat("policy.safetensors, a run folder or a controller (",
+                   Join(ControllerNames(), ", "), ")"));
+  AddControllers(line, a);
+}
+
+void AddControllers(CommandLine& line, PolicyArguments& a) {
+  const ControllerConfig defaults;
+  line.Settings(OptionsOf(defaults), a.flags);
+  line.Repeated("--made-for", a.made_for, "NAME=VALUE|FILE",
+                "change of the controller's design plant, such as mass2=1.2, or a plant file as in "
+                "--plant (repeatable)",
+                "controller");
+}
+
+void AddSeed(CommandLine& line, int64_t& seed, const std::string& what) {
+  Options options;
+  DescribeSeed(options, &seed, what);
+  line.Arguments(options);
+}
+
+void AddThreads(CommandLine& line, int64_t& threads) {
+  Options options;
+  DescribeThreads(options, &threads);
+  line.Arguments(options);
+}
+
+void AddPhysics(CommandLine& line, std::string& physics) {
+  Options options;
+  DescribePhysics(options, &physics);
+  line.Arguments(options);
+}
+
+void AddManyOptions(CommandLine& line, std::string& seeds, int64_t& jobs) {
+  line.Text("--seeds", seeds, "SEEDS",
+            "seeds, one run each: 10 for 1 to 10, or a list such as 3,5,8-12",
+            "a number of seeds or a list such as 3,5,8-12");
+  Options options;
+  options.Add(&jobs, "jobs", {1, 4096}, "", "number of runs at a time").usual = "one per processor";
+  line.Arguments(options);
+}
+
+void AddSet(CommandLine& line, std::vector<std::string>& set, const std::string& help) {
+  line.Repeated("--set", set, "NAME=VALUE", help + " (repeatable)");
+}
+
+void AddPlant(CommandLine& line, std::string& plant) {
+  line.Text("--plant", plant, "FILE|NAME",
+            Concat("plant file (TOML with a table [plant]) or shipped plant (",
+                   Join(ShippedPlants(), ", "), "), which other flags change"));
+}
+
+void AddUnknownPlant(CommandLine& line, bool& unknown_plant) {
+  line.Flag("--unknown-plant", unknown_plant,
+            "scale observed energy and height by the training's plant, not the episode's");
+}
+
+void AddTrialOptions(CommandLine& line, TrialArguments& a, const std::string& seed_of) {
+  AddSeed(line, a.seed, seed_of);
+  AddPlant(line, a.plant);
+  AddSet(line, a.set, "change of the plant, such as mass2=1.2");
+  line.Text("--model", a.model, "FILE", "MJCF file that replaces the policy's model");
+  AddPhysics(line, a.physics);
+  AddUnknownPlant(line, a.unknown_plant);
+  const TrialConditions defaults;
+  line.Settings(OptionsOf(defaults), a.flags);
+  // Mistakes on the command line are reported before any file is read.
+  line.Check([&a] { (void)ConditionsOf(a.flags); });
+}
+
+void AddEpisodeOptions(CommandLine& line, TrialArguments& a) {
+  line.Text("--start", a.start, "q1,q2,w1,w2",
+            "start state [rad, rad/s] (default 0,0,0,0: hanging)", "");
+  Options own;
+  own.Add(&a.episode, "episode", {0, 999999}, "",
+          "index of the episode of `eval` with the same flags")
+      .usual = "none";
+  line.Arguments(own);
+}
+
+}  // namespace upswing

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "cli/command_line.h"
+#include "judge/trial.h"
+#include "runs/find_policy.h"
+
+namespace upswing {
+
+// Declarations of the commands; each has a source file with its name.
+void AddTrain(CommandLine& line);
+void AddBounds(CommandLine& line);
+void AddEval(CommandLine& line);
+void AddSimulate(CommandLine& line);
+void AddMap(CommandLine& line);
+void AddPlot(CommandLine& line);
+void AddInfo(CommandLine& line);
+void AddCompare(CommandLine& line);
+void AddStudy(CommandLine& line);
+void AddExport(CommandLine& line);
+void AddView(CommandLine& line);
+void AddRealAiGym(CommandLine& line);
+void AddMachine(CommandLine& line);
+void AddRun(CommandLine& line);
+void AddFake(CommandLine& line);
+void AddDemo(CommandLine& line);
+
+/// Adds the policy argument (a file, a run folder or a controller) and the controllers' settings.
+void AddPolicy(CommandLine& line, PolicyArguments& a);
+
+/// Adds the settings of controllers and --made-for.
+void AddControllers(CommandLine& line, PolicyArguments& a);
+
+/// Adds --seed, the seed of `what`.
+void AddSeed(CommandLine& line, int64_t& seed, const std::string& what);
+
+/// Adds --threads, the argument of ResolveThreads.
+void AddThreads(CommandLine& line, int64_t& threads);
+
+/// Adds --physics, the argument of FindEngine.
+void AddPhysics(CommandLine& line, std::string& physics);
+
+/// Adds --seeds and --jobs, for many runs; 0 jobs: one per processor.
+void AddManyOptions(CommandLine& line, std::string& seeds, int64_t& jobs);
+
+/// Adds --set, the argument of ApplyChanges.
+void AddSet(CommandLine& line, std::vector<std::string>& set, const std::string& help);
+
+/// Adds --plant, the argument of ReadPlantFile.
+void AddPlant(CommandLine& line, std::string& plant);
+
+/// Adds --unknown-plant: on another plant, observations are still scaled as in training.
+void AddUnknownPlant(CommandLine& line, bool& unknown_plant);
+
+/// Adds --plant, --set, --model, --physics, --seed (of `seed_of`), --unknown-plant, and the
+/// settings of Disturbance and Randomization: the conditions of `eval`, `simulate` and `plot`.
+void AddTrialOptions(CommandLine& line, TrialArguments& a, const std::string& seed_of);
+
+/// Adds --start and --episode: the single episode of `simulate`, `plot` and `view`.
+void AddEpisodeOptions(CommandLine& line, TrialArguments& a);
+
+}  // namespace upswing

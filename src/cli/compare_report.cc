@@ -1,0 +1,264 @@
+#include "cli/compare_report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "base/format.h"
+#include "base/json.h"
+#include "base/text.h"
+#include "cli/eval_table.h"
+#include "runs/seeds.h"
+
+namespace upswing {
+namespace {
+
+using nlohmann::ordered_json;
+
+/// Formats a number of the table; infinity means that too few runs reached it.
+using Formatter = std::string (*)(double);
+
+std::string Seconds(double x) { return std::isfinite(x) ? FormatDuration(x) : "not solved"; }
+std::string Steps(double x) { return std::isfinite(x) ? FormatCount(x) : "not solved"; }
+std::string Torque(double x) { return std::isfinite(x) ? fmt::format("{:.3g}", x) : "not known"; }
+std::string Whole(double x) { return FormatCount(x); }
+std::string Percent(double x) { return fmt::format("{:.1f}%", 100 * x); }
+std::string Share(double x) { return fmt::format("{:.2f}", x); }
+std::string Signed(double x) { return fmt::format("{:+.1f}", x); }
+
+/// `18.7 s (95% 17.0 s to 22.3 s)`.
+std::string EstimateText(const Estimate& e, Formatter format) {
+  if (!e.interval) return format(e.value) + " (no interval)";
+  return fmt::format("{} (95% {} to {})", format(e.value), format(e.interval->low),
+                     format(e.interval->high));
+}
+
+/// A probability over pairs of runs.
+std::string PairsText(const Estimate& e) {
+  const char* agreement = e.value == 1   ? ", in every pair of runs"
+                          : e.value == 0 ? ", in no pair of runs"
+                                         : "";
+  return Concat("with probability ", EstimateText(e, Share), e.interval ? agreement : "");
+}
+
+void PrintScores(const char* name, const Scores& s, Formatter format, const std::string& unit) {
+  if (s.low == s.high) {
+    fmt::print("  {:<16}{}{}{}\n", name, format(s.low), unit,
+               s.values.size() > 1 ? " in every run" : "");
+    return;
+  }
+  fmt::print("  {:<16}median {}, IQM {}, range {} to {}{}\n", name, format(s.median),
+             EstimateText(s.iqm, format), format(s.low), format(s.high), unit);
+}
+
+void PrintStability(const GroupSummary& summary) {
+  const Stability& s = summary.stability;
+  if (summary.solved == 0) return;
+  if (s.runs == 0) {
+    fmt::print("  {:<16}no later evaluations: each run stopped when solved\n", "once solved");
+    return;
+  }
+  fmt::print(
+      "  {:<16}{} of {} seeds reach {:.0f}% success in every later evaluation, as do {} of {} "
+      "evaluations; lowest {}\n",
+      "once solved", s.steady_runs, s.runs, 100 * kSteadyRate, s.steady_evaluations, s.evaluations,
+      Percent(s.lowest));
+}
+
+/// Prints a figure over the runs of a group if at least one run has it.
+void PrintFigure(const RunFigure& figure, const Scores& scores, const std::string& torque_unit) {
+  if (!std::isfinite(scores.low)) return;
+  if (figure.kind == RunFigure::Kind::kRatio && !std::isfinite(scores.high)) return;
+  using enum RunFigure::Kind;
+  static const std::map<RunFigure::Kind, Formatter> kFormats{
+      {kSeconds, Seconds}, {kSteps, Steps},       {kReturn, Whole}, {kShare, Percent},
+      {kTorque, Torque},   {kTorqueRate, Torque}, {kRatio, Share}};
+  std::string unit;
+  if (figure.kind == kTorque) unit = " " + torque_unit;
+  if (figure.kind == kTorqueRate) unit = Concat(" ", torque_unit, "/s");
+  PrintScores(figure.label, scores, kFormats.at(figure.kind), unit);
+  if (figure.kind == kRatio && ValueIsOff(scores.median, 1)) {
+    fmt::print("  {:<16}the estimate is off by more than a quarter\n", "");
+  }
+}
+
+void PrintGroup(const RunGroup& group, const std::string& task) {
+  const GroupSummary& s = group.summary;
+  std::vector<int64_t> seeds;
+  for (const RunRecord& run : group.runs) seeds.push_back(run.config.train.seed);
+  fmt::print("{}\n", Printable(group.label));
+  if (!task.empty()) fmt::print("  {:<16}{}\n", "task", Printable(task));
+  if (!group.differences.empty()) {
+    fmt::print("  {:<16}{}\n", "settings", Printable(group.differences));
+  }
+  fmt::print("  {:<16}{} ({})\n", "seeds", group.runs.size(), SeedsText(seeds));
+  fmt::print("  {:<16}{} of {} (95% {} to {})\n", "solved", s.solved, group.runs.size(),
+             Percent(s.solved_interval.low), Percent(s.solved_interval.high));
+  const EnvSpec spec = group.runs.front().config.Spec();
+  for (const RunFigure& figure : RunFigures()) {
+    const bool upright = figure.scores == &GroupSummary::upright_variation;
+    if (upright && spec.evaluation.by_return()) continue;
+    PrintFigure(figure, s.*figure.scores, spec.action_unit);
+  }
+  PrintStability(s);
+  fmt::print("\n");
+}
+
+void PrintPair(const Comparison& comparison, const PairSummary& pair) {
+  fmt::print("{} against {}\n", Printable(comparison.groups[pair.a].label),
+             Printable(comparison.groups[pair.b].label));
+  fmt::print("  {:<16}{}", "solves sooner", PairsText(pair.sooner));
+  if (pair.seconds_difference) {
+    fmt::print("; difference of IQMs [s]: {}", EstimateText(*pair.seconds_difference, Signed));
+  }
+  fmt::print("\n  {:<16}{}; difference of IQMs: {}\n\n", "higher return",
+             PairsText(pair.higher_return), EstimateText(pair.return_difference, Signed));
+}
+
+/// Prints the figures of a policy, which has no seeds.
+void PrintPolicy(const JudgedPolicy& policy, const std::string& task) {
+  const Evaluation& e = policy.figures;
+  const auto print = [](const char* name, const std::string& text) {
+    fmt::print("  {:<16}{}\n", name, text);
+  };
+  fmt::print("{}\n", Printable(policy.name));
+  if (!task.empty()) print("task", Printable(task));
+  print("episodes", fmt::format("{}, from the final evaluations of {}", FormatCount(e.episodes),
+                                policy.runs == 1 ? "one run" : Concat(policy.runs, " runs")));
+  print("success", EstimateText({e.success_rate(), e.success_interval}, Percent));
+  const bool upright = policy.upright();
+  if (upright) print("swing-up time", QuartilesText(e.swing_up_seconds));
+  print("return", MomentsText(e.reward_sum));
+  const std::string& unit = policy.spec.action_unit;
+  print("rms torque", Concat(Torque(e.rms_torque.mean), ' ', unit));
+  print("torque change", Concat(Torque(e.torque_variation.mean), ' ', unit, "/s"));
+  if (upright) print("  once upright", Concat(Torque(e.goal_variation.mean), ' ', unit, "/s"));
+  fmt::print("\n");
+}
+
+void PrintAgainst(const Comparison& comparison, const AgainstPolicy& against) {
+  const RunGroup& group = comparison.groups[against.group];
+  fmt::print("{} against {}\n", Printable(group.label),
+             Printable(comparison.policies[against.policy].name));
+  fmt::print("  {:<16}in {} of {} runs (95% {} to {}); IQM minus the policy's return: {}\n\n",
+             "higher return", against.higher, group.runs.size(),
+             Percent(against.higher_interval.low), Percent(against.higher_interval.high),
+             EstimateText(against.difference, Signed));
+}
+
+/// JSON writes null for a number that is not finite, such as the time to solve of an unsolved run.
+ordered_json EstimateJson(const Estimate& e) {
+  ordered_json j{{"value", e.value}, {"interval_95", nullptr}};
+  if (e.interval) j["interval_95"] = {e.interval->low, e.interval->high};
+  return j;
+}
+
+ordered_json ScoresJson(const Scores& s) {
+  return {{"median", s.median},
+          {"iqm", EstimateJson(s.iqm)},
+          {"range", {s.low, s.high}},
+          {"values", s.values}};
+}
+
+ordered_json GroupJson(const RunGroup& group) {
+  const GroupSummary& s = group.summary;
+  ordered_json j;
+  j["group"] = group.label;
+  for (const RunRecord& run : group.runs) {
+    j["runs"].push_back({{"path", run.path.string()},
+                         {"seed", run.config.train.seed},
+                         {"steps", run.evaluations.back().step},
+                         {"seconds", run.evaluations.back().seconds},
+                         {"finished", Finished(run)}});
+  }
+  j["solved"] = s.solved;
+  j["solved_interval_95"] = {s.solved_interval.low, s.solved_interval.high};
+  for (const RunFigure& figure : RunFigures()) j[figure.name] = ScoresJson(s.*figure.scores);
+  j["once_solved"] = {
+      {"seeds", s.stability.runs},
+      {"steady_seeds", s.stability.steady_runs},
+      {"evaluations", s.stability.evaluations},
+      {"steady_evaluations", s.stability.steady_evaluations},
+      {"lowest_success",
+       s.stability.evaluations > 0 ? ordered_json(s.stability.lowest) : ordered_json()}};
+  j["settings"] = group.differences;
+  j["task"] = group.task + 1;
+  return j;
+}
+
+}  // namespace
+
+void PrintComparison(const Comparison& comparison) {
+  const auto task_text = [&](int task) {
+    if (NumTasks(comparison) == 1) return std::string();
+    return fmt::format("{} ({})", task + 1, comparison.task_texts[static_cast<size_t>(task)]);
+  };
+  for (const RunGroup& group : comparison.groups) PrintGroup(group, task_text(group.task));
+  for (const JudgedPolicy& policy : comparison.policies) {
+    PrintPolicy(policy, task_text(policy.task));
+  }
+  for (const PairSummary& pair : comparison.pairs) PrintPair(comparison, pair);
+  for (const AgainstPolicy& against : comparison.against) PrintAgainst(comparison, against);
+  for (const std::string& note : comparison.notes) fmt::print("Note: {}\n", Printable(note));
+  const bool fewer = std::ranges::any_of(comparison.groups, [](const RunGroup& group) {
+    return ResamplesOf({std::vector<double>(group.runs.size())}) < kResamples;
+  });
+  fmt::print(
+      "Intervals: Wilson for shares, Newcombe if all pairs of runs agree, else percentile "
+      "bootstrap "
+      "with\n{}{} resamples of the runs.\n",
+      fewer ? "at most " : "", FormatCount(kResamples));
+  if (!comparison.policies.empty()) {
+    fmt::print(
+        "A policy has no seeds: its return is the mean ± the standard deviation over episodes. "
+        "Intervals of\ndifferences to it cover only the spread of the runs.\n");
+  }
+}
+
+void PrintWritten(const Comparison& comparison, const std::filesystem::path& folder) {
+  std::string curves;
+  for (int task = 0; task < NumTasks(comparison); ++task) {
+    curves += fmt::format(", {0}.svg, {0}.png", CurvesName(task));
+  }
+  fmt::print("Written: summary.csv, runs.csv{}{} in {}\n",
+             comparison.policies.empty() ? "" : ", policies.csv", curves,
+             Printable(folder.string()));
+}
+
+std::string ComparisonJson(const Comparison& comparison) {
+  ordered_json j;
+  j["resamples"] = kResamples;
+  j["notes"] = comparison.notes;
+  for (const RunGroup& group : comparison.groups) j["groups"].push_back(GroupJson(group));
+  j["pairs"] = ordered_json::array();
+  for (const PairSummary& pair : comparison.pairs) {
+    j["pairs"].push_back(
+        {{"group", comparison.groups[pair.a].label},
+         {"against", comparison.groups[pair.b].label},
+         {"solves_sooner", EstimateJson(pair.sooner)},
+         {"solve_seconds_difference",
+          pair.seconds_difference ? EstimateJson(*pair.seconds_difference) : ordered_json()},
+         {"higher_return", EstimateJson(pair.higher_return)},
+         {"return_difference", EstimateJson(pair.return_difference)}});
+  }
+  j["policies"] = ordered_json::array();
+  for (const JudgedPolicy& policy : comparison.policies) {
+    ordered_json p{{"policy", policy.name}, {"task", policy.task + 1}, {"runs", policy.runs}};
+    AddFigures(policy.figures, policy.spec, false, p);
+    j["policies"].push_back(p);
+  }
+  j["against_policies"] = ordered_json::array();
+  for (const AgainstPolicy& against : comparison.against) {
+    j["against_policies"].push_back(
+        {{"group", comparison.groups[against.group].label},
+         {"policy", comparison.policies[against.policy].name},
+         {"higher_return", against.higher},
+         {"higher_return_interval_95", {against.higher_interval.low, against.higher_interval.high}},
+         {"return_difference", EstimateJson(against.difference)}});
+  }
+  return PrintableJson(j);
+}
+
+}  // namespace upswing

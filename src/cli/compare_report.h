@@ -1,0 +1,20 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "runs/compare.h"
+
+namespace upswing {
+
+/// Prints a comparison as tables.
+void PrintComparison(const Comparison& comparison);
+
+/// Prints which files were written to a folder.
+void PrintWritten(const Comparison& comparison, const std::filesystem::path& folder);
+
+/// A comparison as JSON, with every run's figures. A figure that is not reached (the time to solve
+/// of an unsolved run) is null.
+std::string ComparisonJson(const Comparison& comparison);
+
+}  // namespace upswing

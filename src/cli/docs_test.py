@@ -1,0 +1,333 @@
+#!/usr/bin/env python3
+"""Compares the documentation with the program and the repository."""
+
+import csv
+import io
+import math
+import os
+import re
+import shutil
+import subprocess
+import sys
+import unittest
+from pathlib import Path
+
+from testing import ROOT, UPSWING, ProgramTest, read_csv, train_once
+
+sys.path.insert(0, str(ROOT / "tools"))
+import program  # noqa: E402
+import prose  # noqa: E402
+import results  # noqa: E402
+from pages import pages, without_code  # noqa: E402
+
+PAGES = pages()
+DOCUMENTS = [*sorted(ROOT.glob("*.md")), *PAGES[1:], ROOT / "tools/peers/README.md"]
+# Pages written when the site is built: tools/docs.py.
+GENERATED = {f"docs/reference/{name}.md"
+             for name in ("command-line", "settings", "cpp-api", "python-api")}
+
+
+def text_of(name):
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
+def first_column(markdown):
+    """The text in backticks at the beginning of each table row."""
+    return re.findall(r"^\| `([^`]+)`", markdown, re.MULTILINE)
+
+
+class RunFolder(ProgramTest):
+    PAGE = "docs/reference/run-folder.md"
+
+    @classmethod
+    def setUpClass(cls):
+        cls.run_path = train_once(cls)
+        cls.sections = dict(re.findall(r"^## (\S+\.csv)\n(.*?)(?=^## |\Z)", text_of(cls.PAGE),
+                                       re.MULTILINE | re.DOTALL))
+
+    @staticmethod
+    def header(path):
+        with open(path, encoding="utf-8", newline="") as file:
+            return next(csv.reader(file))
+
+    def test_every_column_is_explained(self):
+        self.assertEqual(set(self.sections), {path.name for path in self.run_path.glob("*.csv")})
+        for name in self.sections.keys() - {"metrics.csv"}:
+            self.assertEqual(first_column(self.sections[name]), self.header(self.run_path / name), name)
+
+    def test_every_metric_is_explained(self):
+        common, *parts = re.split(r"^### (DQN|SAC|PPO)\n", self.sections["metrics.csv"],
+                                  flags=re.MULTILINE)
+        dqn = {"head": None, "learning_starts": None, "updates_per_step": None}
+        runs = {"DQN": self.run_path, "SAC": train_once(self, agent="sac-fast", head=None),
+                "PPO": train_once(self, agent="ppo", **dqn)}
+        self.assertEqual(parts[::2], list(runs))
+        for algorithm, text in zip(parts[::2], parts[1::2]):
+            self.assertEqual(sorted(first_column(common) + first_column(text)),
+                             sorted(self.header(runs[algorithm] / "metrics.csv")), algorithm)
+
+    def test_every_file_is_named(self):
+        files = first_column(text_of(self.PAGE).split("## ", maxsplit=1)[0])
+        self.assertEqual(set(files) - {"model.xml"}, {path.name for path in self.run_path.iterdir()})
+
+    def test_terms_add_up_to_the_return(self):
+        for row in read_csv(self.run_path / "episodes.csv"):
+            terms = [row[name] for name in first_column(self.sections["episodes.csv"])[-5:]]
+            self.assertAlmostEqual(math.fsum(terms), row["return"], delta=1e-9)
+
+
+def reward_terms(q1, q2, w1, w2, tau, m1=1, m2=1, l1=0.5, l2=0.5, g=9.81):
+    """The reward of docs/reference/task.md in Python."""
+    pe = (-m1 * g * l1 / 2 * math.cos(q1)
+          - m2 * g * (l1 * math.cos(q1) + l2 / 2 * math.cos(q1 + q2)))
+    ke = (m1 * l1**2 / 12 * w1**2 / 2 + m2 * l2**2 / 12 * (w1 + w2)**2 / 2
+          + m1 * (l1 / 2)**2 * w1**2 / 2
+          + m2 / 2 * (l1**2 * w1**2 + (l2 / 2)**2 * (w1 + w2)**2
+                      + l1 * l2 * math.cos(q2) * w1 * (w1 + w2)))
+    target = m1 * g * l1 / 2 + m2 * g * (l1 + l2 / 2)
+    energy = (ke + pe + target) / (2 * target)
+    height = -(l1 * math.cos(q1) + l2 * math.cos(q1 + q2)) / (l1 + l2)
+    inverted = max(math.cos(q1), math.cos(q1 + q2)) <= -math.cos(math.radians(30))
+    return {"energy": min(max(energy, 0), 1.5), "height": (height + 1) / 2,
+            "balance": 5 if inverted else 0,
+            "velocity_penalty": -0.01 * (w1**2 + w2**2) if inverted else 0,
+            "torque_penalty": -(0.05 if inverted else 0.01) * tau**2}
+
+
+class Task(ProgramTest):
+    def test_reward(self):
+        rows = self.succeed("simulate", ROOT / "web/public/agents/d3qn.safetensors", "--seconds",
+                            5, "--physics", "closed-form")
+        seen = set()
+        names = first_column(text_of("docs/reference/task.md").split("## Reward")[1].split("##")[0])
+        for row in csv.DictReader(io.StringIO(rows)):
+            x = {name: float(text) for name, text in row.items()}
+            # A row's torque acts from its state on, and the reward's terms use both.
+            terms = reward_terms(x["qpos0"], x["qpos1"], x["qvel0"], x["qvel1"], x["torque"])
+            self.assertEqual(names, list(terms))
+            for name in names:
+                column = name if name.endswith("penalty") else f"{name}_reward"
+                self.assertAlmostEqual(terms[name], x[column], delta=1e-9, msg=(name, row))
+            seen.add(terms["balance"])
+        self.assertEqual(seen, {0, 5})
+
+
+def anchors(markdown):
+    """The anchors of the headings, as GitHub and MyST generate them."""
+    found = set()
+    for heading in re.findall(r"^#+ +(.*?)\s*$", without_code(markdown), re.MULTILINE):
+        text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).lower()
+        slug = re.sub(r"[^\w\- ]", "", text).replace(" ", "-")
+        found.add(next(name for name in [slug, *(f"{slug}-{k}" for k in range(1, 99))]
+                       if name not in found))
+    return found
+
+
+def commands_in(markdown):
+    """[command, words] of each `./upswing …` in fenced blocks and inline code."""
+    blocks = re.findall(r"^```[^\n]*\n(.*?)^```", markdown, re.MULTILINE | re.DOTALL)
+    codes = re.findall(r"`([^`\n]+)`", without_code(markdown)) + [
+        line for block in blocks for line in block.replace("\\\n", " ").splitlines()]
+    for line in codes:
+        for words in re.findall(r"\./upswing((?: +[^\s|&;#<>()]+)+)", line.split(" #")[0]):
+            words = [word for word in words.split() if word != "--no-setup"]
+            if words and re.fullmatch("[a-z]+", words[0]):
+                yield words[0], words[1:]
+
+
+class Documents(ProgramTest):
+    def test_links_lead_somewhere(self):
+        for path in DOCUMENTS:
+            text = path.read_text(encoding="utf-8")
+            seen = without_code(text)
+            for target in re.findall(r'\]\(([^)\s]+)\)|src="([^"]+)"', seen):
+                target = "".join(target)
+                if re.match(r"[a-z]+:", target):
+                    continue
+                place, _, anchor = target.partition("#")
+                there = Path(os.path.normpath(path.parent / place)) if place else path
+                name = str(there.relative_to(ROOT))
+                with self.subTest(page=path.name, target=target):
+                    self.assertTrue(there.exists() or name in GENERATED)
+                    if anchor and there.suffix == ".md" and name not in GENERATED:
+                        self.assertIn(anchor, anchors(there.read_text(encoding="utf-8")))
+
+    def test_commands_and_flags_exist(self):
+        known = set(program.commands())
+        for path in PAGES:
+            for command, words in commands_in(path.read_text(encoding="utf-8")):
+                with self.subTest(page=path.name, command=command):
+                    self.assertIn(command, known | {"help"})
+                    flags = {word.split("=")[0] for word in words if re.match("--[a-z]", word)}
+                    if command == "test" or "--" in words or command == "python":
+                        continue  # the rest is for ctest or Python
+                    self.assertLessEqual(flags, program.flags(command) | {"--help"})
+
+    def test_tables_and_values_are_up_to_date(self):
+        done = subprocess.run([sys.executable, "-B", ROOT / "tools/results.py", "check"],
+                              check=False, stdout=subprocess.PIPE, encoding="utf-8")
+        self.assertEqual((done.returncode, done.stdout), (0, ""))
+
+    def test_a_wrong_table_or_value_is_found(self):
+        path = next(path for path in results.DATA.glob("*.json") if path.stem != "machines")
+        table = results.load(path.stem)
+        name, column = table["rows"][0][0].replace("`", ""), len(table["columns"]) - 1
+        shown = f"<!-- table: {path.stem} -->\n{results.render('table', path.stem)}<!-- end -->\n"
+        value = f"<!-- value: {path.stem} {name} {column} -->{{}}<!-- end -->\n"
+        right = value.format(table["rows"][0][column])
+        self.assertEqual(list(results.problems_of(shown + right)), [])
+        self.assertEqual(len(list(results.problems_of(shown.replace("|---", "|----", 1)))), 1)
+        self.assertEqual(len(list(results.problems_of(value.format("12345.678")))), 1)
+        self.assertEqual(len(list(results.problems_of("<!-- table: no-such -->\n<!-- end -->"))), 1)
+        self.assertEqual(results.rendered(shown.replace("|---", "|----", 1)), shown)
+
+    def test_plain_english(self):
+        for path in PAGES:
+            for sentence, fault in prose.faults(path.read_text(encoding="utf-8")):
+                with self.subTest(page=path.name, fault=fault):
+                    self.fail(sentence)
+
+    def test_the_patterns_find_faults(self):
+        # Sentences of the README of version 0.4.0 and similar ones.
+        for sentence in (
+                "Nobody has tried Ubuntu yet.",
+                "learning_md says what is in a file.",
+                "or `pip install .` into an environment of one's own.",
+                "our scores beside the published ones",
+                "A controller is made anew for the plant of each episode.",
+                "Then one is the motor oneself.",
+                "copy the target every so many instead",
+                "It costs so much that nothing is left.",
+                "Units such as those of the plant are kept.",
+                "the same of the second link",
+                "*Everything* has all there is: drag the pendulum with mouse or finger, shove it, pause, "
+                "go step by step or ten times slower, change masses, lengths, dampings, gravity, the "
+                "motor, blur the sensors, delay the torque; compare two agents side by side."):
+            with self.subTest(sentence):
+                self.assertNotEqual(list(prose.faults(sentence)), [])
+        for text in ("What is a plant?", "```text\nnobody\n```", "`anew`",
+                     "The motor swings the pendulum up.", "| beside_x | 1 |"):
+            with self.subTest(text):
+                self.assertEqual(list(prose.faults(text)), [])
+
+    def test_blocks_marked_as_tests_succeed(self):
+        launcher = self.folder / "launcher"
+        launcher.write_text(f'#!/bin/sh\nexec "{UPSWING}" "$@"\n', encoding="utf-8")
+        launcher.chmod(0o755)
+        for path in PAGES:
+            blocks = re.findall(r"^```sh test\n(.*?)^```", path.read_text(encoding="utf-8"),
+                                re.MULTILINE | re.DOTALL)
+            if not blocks:
+                continue
+            # The blocks of a page run in order, in a folder that looks like a fresh checkout.
+            here = self.folder / "page"
+            here.mkdir()
+            for entry in ROOT.iterdir():
+                if entry.name not in {"upswing", "build", "runs", ".git"}:
+                    (here / entry.name).symlink_to(entry)
+            (here / "upswing").symlink_to(launcher)
+            for block in blocks:
+                with self.subTest(page=path.name, block=block):
+                    done = subprocess.run(["sh", "-eu"], input=block, cwd=here, check=False,
+                                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                          encoding="utf-8")
+                    self.assertEqual(done.returncode, 0, done.stdout)
+            shutil.rmtree(here)
+
+    def test_the_post_is_named_where_it_is_mentioned(self):
+        for path in DOCUMENTS:
+            text = " ".join(path.read_text(encoding="utf-8").split())
+            if re.search(r"\bthe post\b|\bpost's\b", text, re.IGNORECASE):
+                self.assertTrue("Balancing a Double Pendulum with DQN and MuJoCo" in text, path.name)
+
+    def test_map_of_the_code_has_every_folder(self):
+        built = {"build", "runs", "node_modules"}
+        folders = {str(path.relative_to(ROOT)) for place in (".", "src", "extras")
+                   for path in (ROOT / place).iterdir()
+                   if path.is_dir() and not path.name.startswith((".", "__"))} - built
+        code_map = text_of("CONTRIBUTING.md").split("## The map")[1].split("\n## ")[0]
+        for folder in sorted(folders):
+            self.assertIn(f"`{folder}/`", code_map)
+
+    def test_one_version(self):
+        version = re.search(r"project\(upswing VERSION (\S+)", text_of("CMakeLists.txt"))[1]
+        self.assertIn(f"\nversion: {version}\n", text_of("CITATION.cff"))
+        self.assertEqual(re.search(r"^## \[(\d\S*)\]", text_of("CHANGELOG.md"), re.MULTILINE)[1],
+                         version)
+
+    def test_security_names_every_fuzzing_target_and_tests_that_exist(self):
+        text = text_of("SECURITY.md")
+        self.assertEqual(set(re.findall(r"(\w+_fuzz)`", text)),
+                         {path.stem for path in (ROOT / "tools/fuzz").glob("*_fuzz.cc")})
+        for name in re.findall(r"`([\w/]+_test\.\w+)`", text):
+            self.assertTrue((ROOT / name).exists(), name)
+
+    def test_launcher_and_readme_name_the_same_systems(self):
+        for name in ("README.md", "upswing"):
+            self.assertIn("Debian 12 ", text_of(name))
+            self.assertRegex(text_of(name), r"Debian 12 (and|or) 13")
+        self.assertIn('"debian 12 "* | "debian 13 "*', text_of("upswing"))
+
+    def test_shipped_policies_can_be_evaluated_as_the_docs_say(self):
+        policy = re.search(r"upswing eval (web/public/agents/\S+)",
+                           text_of("docs/tutorials/exercises.md"))[1]
+        self.assertIn("success", self.succeed("eval", ROOT / policy, "--episodes", 2, "--physics",
+                                              "closed-form"))
+
+
+class Site(ProgramTest):
+    """Tests of the documentation as HTML, built by ./upswing docs in build/docs-venv."""
+
+    def setUp(self):
+        super().setUp()
+        self.python = ROOT / "build/docs-venv/bin/python"
+        if not self.python.exists() or not shutil.which("doxygen"):
+            if os.environ.get("UPSWING_REQUIRE_DOCS"):
+                self.fail("build/docs-venv or Doxygen is missing: run ./upswing docs")
+            self.skipTest("run ./upswing docs once, which installs Sphinx and Doxygen")
+
+    def test_builds_without_a_warning_and_needs_no_network(self):
+        site = self.folder / "site"
+        done = subprocess.run([self.python, "-B", ROOT / "tools/docs.py", "build", site],
+                              check=False, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                              stderr=subprocess.STDOUT, encoding="utf-8")
+        self.assertEqual((done.returncode, done.stdout), (0, ""))
+        self.assertTrue((site / "searchindex.js").exists())
+        for page in site.rglob("*.html"):
+            text = page.read_text(encoding="utf-8")
+            loaded = re.findall(r'<(?:script|link|img)\b[^>]*?(?:src|href)="([^"]+)"', text)
+            for address in loaded:
+                self.assertFalse(re.match(r"(?:[a-z]+:)?//", address), f"{page.name}: {address}")
+            self.assertNotIn('href="/', text, page.name)
+        landing = text_of("docs/landing/index.html")
+        for target in re.findall(r'href="docs/([^"]+)"', landing):
+            self.assertTrue((site / target).exists(), target)
+        for header in ("base/env.h", "rl/dqn.h"):
+            page = site / "reference/cpp-api" / f"{header.split('/', maxsplit=1)[0]}.html"
+            self.assertIn(header, page.read_text(encoding="utf-8"))
+        self.assertIn("Dqn", (site / "reference/cpp-api/rl.html").read_text(encoding="utf-8"))
+
+
+class Launcher(ProgramTest):
+    """Tests of the errors of ./upswing docs."""
+
+    def test_bad_input_is_refused_in_one_line(self):
+        (self.folder / "full").mkdir()
+        (self.folder / "full/file").touch()
+        for arguments, *words in ((["--sreve"], "--sreve", "--help"),
+                                  (["--site"], "--site"), (["--site="], "--site"),
+                                  (["--site", "full"], "full", "empty"),
+                                  (["--site", "no/where"], "no"),
+                                  (["--serve", "--site", "new"], "--serve"),
+                                  (["page"], "page")):
+            with self.subTest(arguments=arguments):
+                done = subprocess.run([ROOT / "upswing", "--no-setup", "docs", *arguments],
+                                      cwd=self.folder, stdin=subprocess.DEVNULL, check=False,
+                                      stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                      encoding="utf-8")
+                self.assert_one_line(done, 2, "docs: ", *words)
+                self.assertEqual(done.stdout, "")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,106 @@
+#include <fmt/format.h>
+
+#include <functional>
+
+#include "agents/arguments.h"
+#include "agents/config.h"
+#include "agents/loaded_policy.h"
+#include "base/error.h"
+#include "base/text.h"
+#include "base/thread_pool.h"
+#include "cli/commands.h"
+#include "cli/eval_table.h"
+#include "cli/progress.h"
+#include "os/machine.h"
+#include "os/streams.h"
+#include "runs/find_policy.h"
+
+namespace upswing {
+namespace {
+
+struct EvalArguments {
+  PolicyArguments policy;
+  std::string episodes_csv;
+  TrialArguments trial;
+  int64_t episodes = 100, threads = 0;
+  bool as_json = false;
+};
+
+int RunEval(const EvalArguments& a) {
+  const bool to_output = IsStandardStream(a.episodes_csv);
+  if (to_output && a.as_json) {
+    throw BadInput(
+        "--json: expected a file for --episodes-csv, got - (standard output), where the JSON goes");
+  }
+  if (!a.episodes_csv.empty()) CheckWritable("--episodes-csv", a.episodes_csv);
+  const LoadedPolicy loaded = GetPolicy(a.policy);
+  ThreadPool pool(ResolveThreads(a.threads), a.threads == 0);
+  const EvalReport report = [&] {
+    EpisodeProgress progress(a.as_json);  // removed before the table is printed
+    return EvaluatePolicy(loaded, a.trial, a.episodes, pool, std::ref(progress));
+  }();
+  if (!a.episodes_csv.empty()) WriteOutput(a.episodes_csv, EpisodesCsv(report));
+  if (to_output) return 0;  // only the rows, for another program
+  if (a.as_json) {
+    fmt::print("{}\n", EvalJson(report));
+  } else {
+    PrintEvalTable(report);
+  }
+  if (!a.episodes_csv.empty() && !a.as_json) {
+    fmt::print("  written        {}\n", Printable(a.episodes_csv));
+  }
+  return 0;
+}
+
+}  // namespace
+
+void AddEval(CommandLine& line) {
+  EvalArguments& a = line.Runs(RunEval);
+  AddPolicy(line, a.policy);
+  line.Require("policy");
+  Options own;
+  DescribeEvalEpisodes(own, &a.episodes);
+  line.Arguments(own);
+  line.Text("--episodes-csv", a.episodes_csv, "FILE",
+            "CSV file to write, a row per episode: start, plant and results; -: standard output, "
+            "instead of the table");
+  AddTrialOptions(line, a.trial, "start states, noise and random plants");
+  line.Flag("--known-plant", a.trial.known_plant,
+            "design a controller again for the plant of each episode, as if it knew the plant");
+  AddThreads(line, a.threads);
+  line.Flag("--json", a.as_json, "print JSON instead of a table");
+  line.Footer(fmt::format(
+      "An episode of the double pendulum starts hanging, with normal noise of 0.1 (rad,\n"
+      "rad/s), and lasts {} s. It succeeds if both links are within 30° of upright\n"
+      "throughout the last {} s. The return is the undiscounted sum of the reward, with\n"
+      "the standard weights, over the first {} s. A link within 9° of upright is settled.\n"
+      "Steady tilt, chatter and torque once upright are means over successful episodes.\n\n"
+      "Examples:\n"
+      "  ./upswing eval runs/d3qn-seed1\n"
+      "  ./upswing eval policy.safetensors --episodes 1000 --seed 7 --json\n"
+      "  ./upswing eval runs/d3qn-seed1 --set mass2=1.05 --set gravity=9.7\n"
+      "  ./upswing eval runs/d3qn-seed1 --plant realaigym\n"
+      "  ./upswing eval runs/d3qn-seed1 --sensor-noise 0.02 --delay 0.02\n"
+      "  ./upswing eval runs/d3qn-seed1 --randomize 0.25 --episodes 1000\n"
+      "  ./upswing eval runs/d3qn-seed1 --randomize 0.25 --episodes-csv episodes.csv\n"
+      "  ./upswing plot runs/d3qn-seed1 --randomize 0.25 --episode 17\n"
+      "  ./upswing eval mpc --randomize 0.25 --known-plant\n\n"
+      "Controllers:\n"
+      "  lqr     holds the pendulum upright and does not swing it up\n"
+      "  tvlqr   follows a planned swing-up\n"
+      "  mpc     plans again at each decision\n"
+      "  pfl     pumps energy by partial feedback linearisation until lqr catches\n"
+      "  energy  pumps energy by energy shaping until lqr catches\n"
+      "  hybrid  lets lqr catch what --swing-up POLICY swings up\n\n"
+      "--set takes mass1, mass2, length1, length2, damping1, damping2, gravity,\n"
+      "torque_limit, actuated_joint, rotor_inertia, gear_ratio, coulomb1 and coulomb2 (dry "
+      "friction),\n"
+      "center1, center2, inertia1, inertia2, armature, and mass, length and damping for both\n"
+      "links. A plant file of --plant has the same names. With --randomize each episode\n"
+      "draws its plant from a box around the nominal one. Observed energy and\n"
+      "height are scaled by the episode's plant, which reveals the plant to the policy.\n"
+      "With --unknown-plant they are scaled by the plant of the training.\n",
+      kEvaluationSeconds, kHoldSeconds, kReturnSeconds));
+}
+
+}  // namespace upswing

@@ -1,0 +1,128 @@
+#include "cli/eval_table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "base/format.h"
+#include "base/text.h"
+
+namespace upswing {
+namespace {
+
+/// Length of the episodes: the common length, or the mean if some end earlier.
+std::string LengthText(const Moments& seconds) {
+  constexpr double kSame = 1e-6;  // s
+  if (seconds.deviation < kSame) return fmt::format("{:.6g} s", seconds.mean);
+  return fmt::format("{} s per episode", MomentsText(seconds));
+}
+
+/// The condition of success, such as `a return of -100 or more`.
+std::string SuccessText(const EvaluationRule& rule) {
+  if (rule.by_return()) return fmt::format("a return of {:.6g} or more", rule.solved_return);
+  return fmt::format("the goal held throughout the last {} of {} s", rule.hold_seconds,
+                     rule.seconds);
+}
+
+/// Prints figures over successful episodes, for a task whose goal has to be held.
+void PrintSuccesses(const Evaluation& e) {
+  if (e.successes == 0) {
+    fmt::print("  swing-up time  none: no episode stays upright\n");
+    return;
+  }
+  fmt::print("  swing-up time  {}\n", QuartilesText(e.swing_up_seconds));
+  if (e.tilt.empty()) return;  // the task has no bodies that lean
+  const std::string within = fmt::format("{:.0f}° of upright", kSettledTilt * kDegrees);
+  if (e.settled > 0) {
+    fmt::print("  settling time  {}, within {}: {} of {}\n", QuartilesText(e.settling_seconds),
+               within, e.settled, e.successes);
+  } else {
+    fmt::print("  settling time  none: no episode stays within {}\n", within);
+  }
+  std::vector<std::string> tilts;
+  for (const Moments& tilt : e.tilt) {
+    tilts.push_back(fmt::format("link {} {}°", tilts.size() + 1, MomentsText(tilt, kDegrees)));
+  }
+  fmt::print("  steady tilt    {}   in the last {} s\n", Join(tilts, ", "), kSteadyTiltSeconds);
+}
+
+void PrintTorques(const Evaluation& e, const EnvSpec& spec) {
+  const std::string& unit = spec.action_unit;
+  fmt::print("  torque         peak {:.4g} {}, rms {} {}\n", e.peak_torque, unit,
+             MomentsText(e.rms_torque), unit);
+  fmt::print("  torque change  {} {}/s", MomentsText(e.torque_variation), unit);
+  const bool upright = !spec.evaluation.by_return() && e.successes > 0;
+  if (upright) fmt::print("; {} {}/s once upright", MomentsText(e.goal_variation), unit);
+  fmt::print("\n");
+  if (upright) {
+    fmt::print("  chatter        {} torque changes per second once upright\n",
+               MomentsText(e.goal_changes));
+  }
+}
+
+}  // namespace
+
+bool ValueIsOff(double expected, double attained) {
+  return std::abs(expected - attained) > 0.25 * std::abs(attained);
+}
+
+std::string MomentsText(const Moments& m, double scale) {
+  constexpr double kLeast = 1e-6;  // smaller deviations are rounding errors
+  const double mean = scale * m.mean, deviation = scale * m.deviation;
+  if (deviation < kLeast) return fmt::format("{:.4g} ± 0", mean);
+  const int decimals = std::max(0, 1 - static_cast<int>(std::floor(std::log10(deviation))));
+  return fmt::format("{:.{}f} ± {:.{}f}", mean, decimals, deviation, decimals);
+}
+
+std::string QuartilesText(const Quartiles& q) {
+  return fmt::format("{:.2f} s   (median; middle half {:.2f} to {:.2f} s)", q.median, q.low,
+                     q.high);
+}
+
+void PrintEvalTable(const EvalReport& report) {
+  const Evaluation& e = report.figures;
+  fmt::print("{}\n", Printable(report.policy));
+  const EvaluationRule& rule = report.spec.evaluation;
+  if (HasPlant(report.spec.task)) {
+    fmt::print("  plant          {}, physics {}\n", PlantText(report.env.plant(0)),
+               report.env.engine->name);
+  } else {
+    fmt::print("  task           {}, success is {}\n", report.spec.task, SuccessText(rule));
+  }
+  if (report.model) fmt::print("  {:<15}{}\n", "model", report.model->Text());
+  const std::string changes = ChangesText(report.env);
+  if (!changes.empty()) fmt::print("  {:<15}{}\n", "with", changes);
+  if (report.known_plant) {
+    fmt::print(
+        "  designed for   the plant of each episode; {} of {} plants have no such controller\n",
+        e.episodes - NumDesigned(report), e.episodes);
+  }
+  if (report.only_balances) {
+    fmt::print(
+        "  note           the controller balances and does not swing up; episodes start hanging\n");
+  }
+  fmt::print("  success        {} of {} = {:.1f}%   (95% interval {:.1f}% to {:.1f}%)\n",
+             e.successes, e.episodes, 100 * e.success_rate(), 100 * e.success_interval.low,
+             100 * e.success_interval.high);
+  if (!rule.by_return()) PrintSuccesses(e);
+  fmt::print("  return         {}   in the first {} s\n", MomentsText(e.reward_sum),
+             rule.return_seconds);
+  for (size_t k = 0; k < e.term_means.size(); ++k) {
+    fmt::print("    {:<18}{:8.2f}\n", report.spec.term_names[k], e.term_means[k]);
+  }
+  if (report.knows_values) {
+    fmt::print("  value at start {:.4g} expected, {:.4g} attained (discounted reward)\n", e.value,
+               e.discounted_return);
+    if (ValueIsOff(e.value, e.discounted_return)) {
+      fmt::print("                 the estimate is off by more than a quarter\n");
+    }
+  }
+  fmt::print("  energy used    {} J   in {}\n", MomentsText(e.work), LengthText(e.seconds));
+  PrintTorques(e, report.spec);
+  fmt::print("  ± is the standard deviation over the episodes\n");
+}
+
+}  // namespace upswing

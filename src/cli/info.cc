@@ -1,0 +1,210 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <optional>
+
+#include "agents/config.h"
+#include "agents/controllers.h"
+#include "agents/loaded_policy.h"
+#include "base/error.h"
+#include "base/format.h"
+#include "base/simd.h"
+#include "base/text.h"
+#include "cli/commands.h"
+#include "control/lqr_catch.h"
+#include "mujoco/model.h"
+#include "nn/network_policy.h"
+#include "os/machine.h"
+#include "pendulum/double_pendulum.h"
+#include "pendulum/upright_modes.h"
+#include "runs/config_files.h"
+#include "runs/find_policy.h"
+#include "runs/model_info.h"
+#include "runs/run_folder.h"
+#include "runs/tensor_file.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A text from a file on one line; "unknown" if the file lacks it.
+std::string Known(const std::string& text) { return text.empty() ? "unknown" : Printable(text); }
+std::string Known(std::optional<int64_t> count) {
+  return count ? std::to_string(*count) : "unknown";
+}
+
+/// The observation of a double pendulum policy.
+std::string ObservationText(const LoadedPolicy& loaded) {
+  std::string text = fmt::format("{} numbers for the motion", kObservationSize);
+  if (loaded.identifies()) {
+    text += fmt::format(", {} for the identified plant", kIdentifiedSize);
+  }
+  const int steps = loaded.memory();
+  if (steps > 0) {
+    text +=
+        fmt::format(", {} for {}", kMemorySize,
+                    steps == 1 ? "the last step" : fmt::format("each of the last {} steps", steps));
+  }
+  return text;
+}
+
+/// The result of the evaluation at which the policy was the best.
+std::string EvaluationText(const PolicyInfo& info) {
+  if (!info.success_rate || !info.mean_return) return "unknown";
+  // Without a return that counts as success, every episode of a foreign task fails.
+  if (IsForeign(info.task)) return fmt::format("mean return {:.4g}", *info.mean_return);
+  return fmt::format("success {:.0f}%, mean return {:.0f}", 100 * *info.success_rate,
+                     *info.mean_return);
+}
+
+void PrintSelfCheck(const SelfCheck& check) {
+  fmt::print("  self-check  passed, largest difference {:.1e} (allowed {:.1e})\n", check.error,
+             check.tolerance);
+  if (check.has_checksum) {
+    fmt::print("  checksum    correct\n");
+    return;
+  }
+  fmt::print(
+      "  checksum    none: a changed weight goes unnoticed if it moves no output of the "
+      "samples\n"
+      "              by more than allowed\n");
+}
+
+/// Prints a controller, which has neither a file nor a training.
+void PrintController(const LoadedPolicy& loaded) {
+  const Policy& policy = *loaded.policy;
+  fmt::print("{}\n", Printable(loaded.name));
+  fmt::print("  what        {}\n", policy.description());
+  fmt::print("  torques     up to ±{} N·m, every {} s\n", loaded.plant.torque_limit,
+             *policy.info().control_period);
+  fmt::print("  plant       {}\n", PlantText(loaded.plant));
+  const UprightModes modes = ModesOf(loaded.plant);
+  fmt::print(
+      "  modes       unstable upright, grow at {:.3g}/s and {:.3g}/s (ratio {:.3g}), delta "
+      "{:.2f}\n",
+      modes.faster, modes.slower, modes.slower / modes.faster, modes.delta);
+  if (const auto* regulator = dynamic_cast<const LqrPolicy*>(&policy)) {
+    fmt::print("  region      of attraction, by simulation: x'Px < {:.4g}\n",
+               RegionOfAttraction(regulator->lqr(), loaded.plant));
+  }
+}
+
+/// Prints the actions that a policy may choose. `learned` is the policy, if it is a network's.
+void PrintActions(const LoadedPolicy& loaded, const NetworkPolicy* learned) {
+  std::span<const double> levels, limits;
+  if (learned != nullptr) levels = learned->parts().torques;
+  if (learned != nullptr) limits = learned->parts().action_limit;
+  if (IsForeign(loaded.task)) {
+    fmt::print("  actions     {}\n", levels.empty()
+                                         ? fmt::format("within ±{}", fmt::join(limits, ", ±"))
+                                         : fmt::format("one of {}", fmt::join(levels, ", ")));
+    return;
+  }
+  EnvConfig env;
+  env.task = loaded.task;
+  fmt::print("  torques     {}, every {} s\n",
+             levels.empty()
+                 ? "any within the torque limit"
+                 : fmt::format("{} {}", fmt::join(levels, ", "), SpecOf(env).action_unit),
+             *loaded.policy->info().control_period);
+}
+
+void PrintPolicy(const LoadedPolicy& loaded) {
+  const Policy& policy = *loaded.policy;
+  const PolicyInfo& info = policy.info();
+  fmt::print("{}\n", Printable(loaded.name));
+  fmt::print("  what        {}, {} parameters\n", policy.description(),
+             FormatCount(policy.num_parameters()));
+  if (!HasPlant(loaded.task)) fmt::print("  task        {}\n", loaded.task);
+  const auto* learned = dynamic_cast<const NetworkPolicy*>(&policy);
+  PrintActions(loaded, learned);
+  fmt::print("  made by     agent {}, seed {}, step {}, upswing {}\n", Known(info.agent),
+             Known(info.seed), Known(info.step), Known(info.upswing_version));
+  fmt::print("  evaluated   {}\n", EvaluationText(info));
+  if (HasPlant(loaded.task)) {
+    fmt::print("  observes    {}\n", ObservationText(loaded));
+    fmt::print("  plant       {}\n", PlantText(loaded.plant));
+  }
+  const std::optional<ModelInfo> model = InfoOfModel(loaded.mjcf, "");
+  if (model) fmt::print("  model       {}\n", model->Text());
+  if (learned != nullptr) PrintSelfCheck(learned->self_check());
+}
+
+void PrintRun(const fs::path& path, bool has_policy) {
+  const Tensors checkpoint = LoadTensors(RunFolder::CheckpointPath(path));
+  const Config config = ReadRunConfig(path);
+  const EnvSpec spec = config.Spec();
+  TrainState state(spec.num_envs, static_cast<int>(spec.term_names.size()));
+  state.State(Archive::Loader(checkpoint).In("train"));
+  fmt::print("{}\n", Printable(path.string()));
+  fmt::print("  agent       {}, seed {}, upswing {}\n", config.agent, config.train.seed,
+             Printable(checkpoint.Metadata("upswing_version")));
+  const std::optional<ModelInfo> model = InfoOfModel(config.mjcf, config.model);
+  if (model) fmt::print("  model       {}\n", model->Text());
+  fmt::print("  checkpoint  step {} of {}, {} episodes, {} of training\n", FormatCount(state.steps),
+             FormatCount(config.train.steps), FormatCount(state.episodes),
+             FormatDuration(state.seconds));
+  if (std::isinf(spec.evaluation.solved_return)) {
+    fmt::print("  task        {}, never solved, as no solved_return was given\n", spec.task);
+  } else if (state.solved) {
+    fmt::print("  solved      at step {}, after {} of training\n", FormatCount(state.streak_step),
+               FormatDuration(state.streak_seconds));
+  } else {
+    fmt::print("  solved      not yet; last success rate {}\n", state.last_success_rate);
+  }
+  if (has_policy) return;
+  fmt::print("  policy      {}\n", state.best_step == 0
+                                       ? "none yet; the first evaluation writes one"
+                                       : fmt::format("the best one, from step {}, no longer exists",
+                                                     FormatCount(state.best_step)));
+}
+
+/// Prints the program's version, and the libraries and hardware that it uses on this machine.
+void PrintProgram() {
+  fmt::print("upswing {}\n", UPSWING_VERSION);
+  fmt::print("  physics     MuJoCo {}\n", MuJoCoVersion());
+  fmt::print("  threads     {} by default\n", ResolveThreads(0));
+  fmt::print("  vectors     {} (this processor supports: {})\n", SimdPath(),
+             fmt::join(SimdPaths(), ", "));
+}
+
+int RunInfo(const PolicyArguments& a) {
+  if (a.empty()) {
+    PrintProgram();
+    return 0;
+  }
+  if (IsController(a.name) || a.has_settings()) {
+    PrintController(GetPolicy(a));
+    return 0;
+  }
+  const std::string& path = a.name;
+  const bool is_run = fs::exists(fs::path(path) / RunFolder::kConfig);
+  const fs::path run_policy = fs::path(path) / RunFolder::kPolicy;
+  try {
+    if (is_run) PrintRun(path, fs::exists(run_policy));
+  } catch (const Error& error) {
+    if (!fs::exists(run_policy)) throw;
+    throw Error(
+        error.exit_code(),
+        Concat(error.what(), " (its policy is a separate file: ", run_policy.string(), ")"));
+  }
+  if (!is_run || fs::exists(run_policy)) PrintPolicy(GetPolicy(a));
+  return 0;
+}
+
+}  // namespace
+
+void AddInfo(CommandLine& line) {
+  PolicyArguments& a = line.Runs(RunInfo);
+  AddPolicy(line, a);
+  line.Footer(
+      "Examples:\n"
+      "  ./upswing info runs/d3qn-seed1\n"
+      "  ./upswing info policy.safetensors\n"
+      "  ./upswing info lqr --made-for mass2=1.2\n"
+      "  ./upswing info               threads and vector instructions on this machine\n");
+}
+
+}  // namespace upswing

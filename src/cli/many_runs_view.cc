@@ -1,0 +1,337 @@
+#include "cli/many_runs_view.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <optional>
+
+#include "agents/config_checks.h"
+#include "base/error.h"
+#include "base/format.h"
+#include "base/sample.h"
+#include "base/text.h"
+#include "cli/progress.h"
+#include "cli/say.h"
+#include "cli/signals.h"
+#include "runs/lease.h"
+#include "runs/seeds.h"
+#include "runs/slurm.h"
+
+namespace upswing {
+namespace {
+
+constexpr size_t kMostRows = 50;  // per variant in the table
+constexpr double kNever = std::numeric_limits<double>::infinity();
+
+std::string CountOrDash(double value) { return std::isfinite(value) ? FormatCount(value) : "-"; }
+std::string DurationOrDash(double value) {
+  return std::isfinite(value) ? FormatDuration(value) : "-";
+}
+
+void PrintRow(const std::string& name, double step, double seconds, double success, double reward,
+              const std::string& remark) {
+  Say("  {:<12} {:>11}  {:>12}  {:>6.0f}%  {:>8.0f}{}{}\n", name, CountOrDash(step),
+      DurationOrDash(seconds), 100 * success, reward, remark.empty() ? "" : "  ", remark);
+}
+
+/// The printed view of many runs: a progress line, a line per finished run, a table. Signals stop
+/// the runs.
+class ManyRunsView : public ManyRunsObserver {
+ public:
+  /// The plan must outlive the view.
+  explicit ManyRunsView(const ManyRuns& many) : many_(many) {}
+
+  void Prepare() override { InstallSignalHandlers(kStoppingTraining); }
+  /// Prints variants, seeds and folder. From here on, the rate counts steps.
+  void Begin(const std::vector<SeedRun>& runs) override {
+    runs_ = &runs;
+    steps_before_ = Measure().steps;
+    Announce();
+  }
+
+  void Watch(const std::vector<const SeedRun*>& running) override {
+    running_ = running;
+    if (!line_.due()) return;
+    const Standing standing = Measure();
+    std::vector<std::string> fields{
+        fmt::format("{} of {} runs", standing.done, runs_->size()), standing.time_left,
+        fmt::format("{} steps/s", FormatCount(std::max(0.0, standing.steps_per_second)))};
+    for (const SeedRun* run : running) {
+      const auto all = static_cast<double>(run->variant->config.train.steps);
+      fields.push_back(
+          fmt::format("{} {:.0f}%", run->name, 100 * static_cast<double>(run->Steps()) / all));
+    }
+    line_.Show(standing.share, fields);
+  }
+
+  void End(const SeedRun& run) override {
+    if (!run.problem.empty()) {
+      return line_.Print(fmt::format("  {:<20} failed: {} (log: {})", run.name,
+                                     Printable(run.problem), Printable(run.log().string())));
+    }
+    if (!run.state)
+      return line_.Print(fmt::format("  {:<20} stopped before its first step", run.name));
+    const TrainState& s = *run.state;
+    const Standing standing = Measure();
+    line_.Print(fmt::format("  {:<20} {:>11} steps  {:>12}  {:<22}  {} of {} runs done{}", run.name,
+                            FormatCount(s.steps), FormatDuration(s.seconds),
+                            s.solved       ? "solved at " + FormatCount(s.streak_step)
+                            : run.finished ? "done, not solved"
+                                           : "stopped",
+                            standing.done, runs_->size(),
+                            standing.left > 0 ? ", " + standing.time_left : ""));
+  }
+
+  /// Prints all results and the next command to type.
+  void Finish() override {
+    const bool stopped = StopSignal() != 0;
+    line_.Clear();
+    for (const Variant& variant : many_.plan.variants) PrintTable(variant);
+    const size_t done = Measure().done;
+    Say("\nSuccess and return: evaluation of each run's best policy.\n");
+    if (stopped) SayStopped(done);
+    const bool can_be_typed = Printable(many_.plan.folder.string()) == many_.plan.folder.string();
+    if (can_be_typed && (done < runs_->size() || !many_.compared)) {
+      Say("Next:\n  {} compare {}{}\n", LaunchCommand(), ShellQuoted(many_.plan.folder.string()),
+          done < runs_->size() ? " --unfinished" : "");
+    }
+    std::fflush(stdout);
+  }
+
+  TrainRequest Poll() override { return PollSignals(); }
+  int stop_signal() const override { return StopSignal(); }
+
+ protected:
+  /// Prints how to continue after a signal to stop.
+  virtual void SayStopped(size_t done) const {
+    Say("Stopped with {} of {} runs done; the same command resumes the others.\n", done,
+        runs_->size());
+  }
+
+  /// Runs that are neither done nor failed.
+  size_t Left() const {
+    return static_cast<size_t>(std::ranges::count_if(
+        *runs_, [](const SeedRun& run) { return !run.finished && run.problem.empty(); }));
+  }
+
+  const ManyRuns& many_;
+  ProgressLine line_;
+
+ private:
+  /// Progress over all runs.
+  struct Standing {
+    size_t done = 0;             // finished runs
+    double steps = 0, left = 0;  // made; at most to be made
+    double share = 0;            // of the work, 0 to 1
+    double steps_per_second = 0;
+    std::string time_left;  // such as `at most 3 min 20 s left`
+  };
+
+  Standing Measure() const {
+    Standing standing;
+    for (const SeedRun& run : *runs_) {
+      // Reads only the files of running runs, because there may be thousands of others.
+      const bool runs_now = std::ranges::find(running_, &run) != running_.end();
+      const auto steps = static_cast<double>(runs_now    ? run.Steps()
+                                             : run.state ? run.state->steps
+                                                         : 0);
+      standing.steps += steps;
+      standing.done += run.finished ? 1 : 0;
+      if (run.finished || !run.problem.empty()) continue;
+      standing.left += std::max(0.0, static_cast<double>(run.variant->config.train.steps) - steps);
+    }
+    const double all = standing.steps + standing.left;
+    standing.share = all > 0 ? standing.steps / all : 1;
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin_;
+    standing.steps_per_second = (standing.steps - steps_before_) / std::max(1e-3, elapsed.count());
+    const bool may_end_early = std::ranges::any_of(
+        *runs_, [](const SeedRun& run) { return run.variant->config.train.stop_when_solved; });
+    standing.time_left = fmt::format("{} {} left", may_end_early ? "at most" : "about",
+                                     standing.steps_per_second > 0
+                                         ? FormatDuration(standing.left / standing.steps_per_second)
+                                         : "?");
+    return standing;
+  }
+
+  void Announce() const {
+    const size_t variants = many_.plan.variants.size();
+    Say("Training {} in {}\n", Printable(many_.what), Printable(many_.plan.folder.string()));
+    Say("  {}seed{} {}: {}{}\n", variants == 1 ? "" : fmt::format("{} variants, ", variants),
+        many_.plan.seeds.size() == 1 ? "" : "s", SeedsText(many_.plan.seeds),
+        Counted(std::ssize(*runs_), "run"),
+        many_.jobs == 0 ? "" : fmt::format(", {} at a time", many_.jobs));
+    for (const Variant& variant : many_.plan.variants) {
+      for (const std::string& warning : Warnings(variant.config)) {
+        Say("  Warning: {}{}{}\n", Printable(variant.name), variant.name.empty() ? "" : ": ",
+            warning);
+      }
+    }
+    const auto begun =
+        std::ranges::count_if(*runs_, [](const SeedRun& run) { return run.state.has_value(); });
+    if (begun > 0) {
+      const size_t done = Measure().done;
+      Say("  {} already done, resuming {}\n", done, static_cast<size_t>(begun) - done);
+    }
+    const auto reduced = std::ranges::count_if(
+        *runs_, [](const SeedRun& run) { return !run.finished && run.IsReduced(); });
+    if (reduced > 0) {
+      Say("  {} finished with fewer steps: trained again from the start, because no checkpoint is "
+          "kept\n",
+          reduced);
+    }
+    for (const SeedRun& run : *runs_) {
+      if (!run.problem.empty()) Say("  {:<20} failed: {}\n", run.name, Printable(run.problem));
+    }
+    std::fflush(stdout);
+  }
+
+  void PrintTable(const Variant& variant) const {
+    Say("\n{}\n", Printable(variant.name.empty() ? many_.what : variant.name));
+    std::vector<double> steps, seconds, success, reward;
+    int64_t solved = 0, not_judged = 0, failed = 0;
+    for (const SeedRun& run : *runs_) {
+      if (run.variant != &variant) continue;
+      if (!run.state || run.state->best_step == 0) {
+        ++(run.problem.empty() ? not_judged : failed);
+        continue;
+      }
+      if (steps.empty()) {
+        Say("  {:<12} {:>11}  {:>12}  {:>7}  {:>8}\n", "", "solved at", "after", "success",
+            "return");
+      }
+      const TrainState& s = *run.state;
+      solved += s.solved ? 1 : 0;
+      steps.push_back(s.solved ? static_cast<double>(s.streak_step) : kNever);
+      seconds.push_back(s.solved ? s.streak_seconds : kNever);
+      success.push_back(s.best_success_rate);
+      reward.push_back(s.best_return);
+      if (steps.size() > kMostRows) continue;
+      PrintRow(fmt::format("seed {}", run.seed), steps.back(), seconds.back(), success.back(),
+               reward.back(),
+               !run.problem.empty() ? "failed"
+               : run.finished       ? ""
+                                    : fmt::format("at step {}", FormatCount(s.steps)));
+    }
+    if (steps.size() > kMostRows) Say("  and {} more\n", steps.size() - kMostRows);
+    if (!steps.empty()) {
+      PrintRow("median", QuartilesOf(steps).median, QuartilesOf(seconds).median,
+               QuartilesOf(success).median, QuartilesOf(reward).median,
+               fmt::format("{} of {} solved", solved, steps.size()));
+    }
+    if (not_judged > 0) Say("  {} not evaluated yet\n", Counted(not_judged, "run"));
+    if (failed > 0) Say("  {} failed\n", Counted(failed, "run"));
+  }
+
+  const std::vector<SeedRun>* runs_ = nullptr;
+  std::vector<const SeedRun*> running_;
+  double steps_before_ = 0;  // made before this process began
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+};
+
+/// The view of many runs whose workers are the tasks of a job array: queues the array, or finds the
+/// queued one, and shows progress. A signal to stop ends the view; the jobs continue.
+class SlurmView : public ManyRunsView {
+ public:
+  /// The plan must outlive the view; many.jobs is 0.
+  SlurmView(const ManyRuns& many, SlurmRequest request)
+      : ManyRunsView(many), request_(std::move(request)) {}
+
+  void Prepare() override { InstallSignalHandlers("\nthe jobs continue\n"); }
+
+  /// Throws Failure if the array cannot be queued.
+  void Begin(const std::vector<SeedRun>& runs) override {
+    ManyRunsView::Begin(runs);
+    if (Left() == 0) return;
+    array_ = SlurmArray::LastOf(many_.plan.folder);
+    const auto queued = array_ ? array_->TasksLeft() : 0;
+    if (!queued) {
+      throw Failure(Concat("squeue: expected the state of job array ", array_->number(),
+                           " of this study, got none"));
+    }
+    if (*queued > 0) {
+      Say("  Following job array {}: {} left, output in {}\n", array_->number(),
+          Counted(*queued, "task"), Logs());
+    } else {
+      const std::string script = SlurmScriptFor(many_.plan, runs, request_);
+      array_ = SlurmArray::Submit(many_.plan.folder, script);
+      Say("  Queued as job array {}, output in {}\n", array_->number(), Logs());
+    }
+    std::fflush(stdout);
+    ask_at_ = Clock::now() + kAskEvery;
+  }
+
+  /// Throws Failure if unfinished runs have no worker.
+  void Watch(const std::vector<const SeedRun*>& running) override {
+    ManyRunsView::Watch(running);
+    const auto now = Clock::now();
+    if (array_ && now >= ask_at_ && Left() > 0) CheckQueue(running, now);
+  }
+
+ protected:
+  void SayStopped(size_t done) const override {
+    if (!array_) return ManyRunsView::SayStopped(done);
+    Say("Job array {} continues; the same command follows it again, `{}` cancels it.\n",
+        array_->number(), array_->CancelCommand());
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::chrono::seconds kAskEvery{15};  // each squeue loads a shared daemon
+
+  void CheckQueue(const std::vector<const SeedRun*>& running, Clock::time_point now) {
+    const auto tasks = array_->TasksLeft();
+    const bool are_none = tasks == 0;
+    // The files of the last task may not be visible yet.
+    const bool were_none = std::exchange(none_left_, are_none);
+    ask_at_ = now + (are_none ? std::chrono::seconds(2) : kAskEvery);
+    if (!are_none || !were_none) return;
+    // Other workers may be running, or the claims of a lost worker may not have expired yet.
+    for (const SeedRun* run : running) {
+      const auto lease = ReadLease(run->claim());
+      if (lease && !lease->lost) return;
+    }
+    line_.Clear();
+    throw Failure(Concat("job array ", array_->number(), " has ended, but ", Left(),
+                         " runs are not done (output: ", Logs(),
+                         "); the same command queues them again"));
+  }
+
+  /// Path of the array's output.
+  std::string Logs() const {
+    return Printable((SlurmFolder(many_.plan.folder) / (array_->number() + "_*.log")).string());
+  }
+
+  SlurmRequest request_;
+  std::optional<SlurmArray> array_;
+  Clock::time_point ask_at_{};
+  bool none_left_ = false;  // result of the last query
+};
+
+}  // namespace
+
+std::string SlurmScriptFor(const StudyPlan& plan, const std::vector<SeedRun>& runs,
+                           const SlurmRequest& request) {
+  int64_t tasks = request.tasks;
+  if (tasks == 0) {
+    const int64_t left =
+        std::ranges::count_if(runs, [](const SeedRun& run) { return !run.finished; });
+    tasks = std::clamp<int64_t>(left, 1, kMostSlurmTasks);
+  }
+  return SlurmScript(plan, request.options, tasks);
+}
+
+int TrainManyAndShow(const ManyRuns& many) {
+  ManyRunsView view(many);
+  return TrainMany(many, view);
+}
+
+int TrainOnSlurmAndShow(const ManyRuns& many, const SlurmRequest& request) {
+  SlurmView view(many, request);
+  return TrainMany(many, view);
+}
+
+}  // namespace upswing

@@ -1,0 +1,136 @@
+#include <fmt/format.h>
+
+#include <optional>
+
+#include "agents/config.h"
+#include "agents/loaded_policy.h"
+#include "base/text.h"
+#include "cli/commands.h"
+#include "judge/plot_figures.h"
+#include "judge/rollout.h"
+#include "os/file.h"
+#include "report/figure.h"
+#include "runs/find_policy.h"
+#include "runs/model_info.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct PlotArguments {
+  PolicyArguments policy;
+  std::string out;
+  TrialArguments trial;
+  double seconds = -1;  // negative: not given
+};
+
+/// Start (s) of the last upright stretch, which lasts to the end; negative if the end is not
+/// upright.
+double UprightSince(const std::vector<RolloutRow>& rows) {
+  double since = -1;
+  for (const RolloutRow& row : rows) {
+    if (!row.at_goal) since = -1;
+    if (row.at_goal && since < 0) since = row.t;
+  }
+  return since;
+}
+
+/// The caption below the title: the episode, and how it differs from the training.
+std::string Caption(const PlotArguments& a, const RolloutConfig& config, const Rollout& rollout,
+                    const LoadedPolicy& loaded) {
+  std::vector<std::string> parts;
+  if (a.trial.is_of_eval()) parts.push_back(Concat("episode ", a.trial.episode, " of eval"));
+  const bool pendulum = HasPlant(config.env.task);
+  const char* usual = TaskNamed(config.env.task).usual_start;
+  if (!a.trial.is_of_eval()) {
+    parts.push_back(
+        Concat("start ", a.trial.start.value_or(usual != nullptr ? usual : "of its own")));
+  }
+  parts.push_back(Concat("seed ", a.trial.seed));
+  if (!pendulum) return Join(parts, "; ");
+  parts.push_back(a.trial.physics);
+  for (const std::string& text :
+       {PlantChangesText(rollout.plant, loaded), ChangesText(config.env)}) {
+    if (!text.empty()) parts.push_back(text);
+  }
+  return Join(parts, "; ");
+}
+
+int RunPlot(const PlotArguments& a) {
+  const LoadedPolicy loaded = GetPolicy(a.policy);
+  RolloutConfig config = TrialEpisode(a.trial, &loaded);
+  const EnvSpec spec = SpecOf(config.env);
+  const bool pendulum = HasPlant(spec.task);
+  const double usual = a.trial.is_of_eval() || !pendulum ? spec.evaluation.seconds : 10;
+  config.seconds = a.seconds < 0 ? usual : a.seconds;
+  config.estimates = true;
+  const std::optional<ModelInfo> model = InfoOfModel(config.env.mjcf, a.trial.model);
+  const fs::path folder = FigureFolder(a.out, loaded, "plot");
+  CheckCanDraw();
+  const Rollout rollout = RunRollout(config);
+
+  MakeNewFolder(folder);
+  std::vector<std::pair<std::string, Figure>> figures{
+      {"episode", EpisodeFigure(rollout, *loaded.policy)}};
+  if (pendulum) figures.emplace_back("phase", PhaseFigure(rollout));
+  std::vector<std::string> files;
+  for (auto& [name, figure] : figures) {
+    figure.title = WithModel(loaded.name, model);
+    figure.caption = Caption(a, config, rollout, loaded);
+    for (const char* ending : {".svg", ".png"}) {
+      const fs::path file = folder / Concat(name, ending);
+      Draw(figure, file);
+      files.push_back(Printable(file.string()));
+    }
+  }
+  fmt::print("{}\n", Printable(loaded.name));
+  if (pendulum) {
+    fmt::print("  plant      {}, physics {}\n", EpisodeText(rollout), a.trial.physics);
+  } else {
+    fmt::print("  task       {}\n", spec.task);
+  }
+  if (model) fmt::print("  model      {}\n", model->Text());
+  // In other tasks, a row has the state after its step.
+  const double later = pendulum ? 0 : spec.step_seconds;
+  const double since = UprightSince(rollout.rows);
+  fmt::print("  {}    {}\n", pendulum ? "upright" : "at goal",
+             since < 0 ? "not at the end" : fmt::format("from {:.2f} s to the end", since + later));
+  fmt::print("  torque     {}\n", TorqueText(rollout));
+  if (a.trial.is_of_eval()) {
+    fmt::print("  episode    {} of eval: {}\n", a.trial.episode,
+               JudgementText(*loaded.policy, config.env));
+  }
+  fmt::print("  written    {}\n", Join(files, ", "));
+  return 0;
+}
+
+}  // namespace
+
+void AddPlot(CommandLine& line) {
+  PlotArguments& a = line.Runs(RunPlot);
+  AddPolicy(line, a.policy);
+  line.Require("policy");
+  AddEpisodeOptions(line, a.trial);
+  Options own;
+  Option& seconds = own.Add(&a.seconds, "seconds", {0.1, 1000}, "s", "length of the episode");
+  seconds.step = kControlPeriod;
+  seconds.usual = "10; 20 with --episode";
+  line.Arguments(own);
+  AddTrialOptions(line, a.trial, "noise, random plants and the start of --episode");
+  line.Text("--out", a.out, "FOLDER", "new folder for the figures (default RUN/plot)");
+  line.Footer(
+      "episode.svg and .png show angles, velocities, energy, torque, reward terms and the\n"
+      "policy's estimates over time: Q-values, or the actor's mean torque with its central\n"
+      "68% interval, and V. phase.svg and .png show velocity over angle for both joints.\n"
+      "`simulate` writes the same episode as a table.\n\n"
+      "Without --out, the figures go into plot in the run folder, or into runs/plot-NAME for\n"
+      "another policy file; the next figures into plot-2.\n\n"
+      "Examples:\n"
+      "  ./upswing plot runs/d3qn-seed1\n"
+      "  ./upswing plot runs/d3qn-seed1 --start 3.0,0,0,0 --seconds 5 --out caught\n"
+      "  ./upswing plot runs/d3qn-seed1 --set mass2=1.3\n"
+      "  ./upswing plot runs/d3qn-seed1 --randomize 0.25 --episode 17\n");
+}
+
+}  // namespace upswing

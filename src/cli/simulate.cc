@@ -1,0 +1,131 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <optional>
+#include <span>
+
+#include "agents/loaded_policy.h"
+#include "base/csv.h"
+#include "base/error.h"
+#include "base/text.h"
+#include "cli/commands.h"
+#include "judge/rollout.h"
+#include "os/streams.h"
+#include "runs/find_policy.h"
+
+namespace upswing {
+namespace {
+
+struct SimulateArguments {
+  PolicyArguments policy;
+  std::string torque, csv = "-";
+  TrialArguments trial;
+  double seconds = -1;  // negative: not given
+};
+
+/// Whether a column has times: `t`, `time`, `timestamp` or `seconds`, also with a unit, such as
+/// `Time [s]`, `t_ms` and `time(s)`.
+bool IsTime(std::string_view name) {
+  const std::string_view word = Trim(name.substr(0, name.find_first_of("[(_")));
+  constexpr std::array kNames{"t",         "time",      "Time",    "TIME",
+                              "timestamp", "Timestamp", "seconds", "sec"};
+  return std::ranges::find(kNames, word) != kNames.end();
+}
+
+/// The column `torque` of a CSV file with a row per `step` (s). Throws BadInput with the line
+/// number, and if a column of times has other steps.
+std::vector<double> ReadTorqueFile(const std::string& path, double step) {
+  const std::string where = InputName(path), text = ReadInput(path);
+  std::vector<std::string> names{"torque"};
+  std::ranges::copy_if(CsvNames(text, where), std::back_inserter(names), IsTime);
+  const std::vector<CsvColumn> columns = ReadCsv(text, names, where);
+  if (columns.front().values.empty())
+    throw BadInput(Concat(where, ": expected at least one row of torques, got none"));
+  constexpr size_t kMostRows = 1'000'000;  // over five hours; a step takes more memory than a row
+  if (columns.front().values.size() > kMostRows) {
+    throw BadInput(Concat(where, ": expected at most ", kMostRows, " rows of torques, got ",
+                          columns.front().values.size()));
+  }
+  constexpr double kLargestTime = 1e10;  // s; the steps of larger ones are lost in rounding
+  for (const CsvColumn& time : std::span(columns).subspan(1)) {
+    for (size_t k = 0; k < time.values.size(); ++k) {
+      const double expected = time.values.front() + static_cast<double>(k) * step;
+      if (std::abs(expected) < kLargestTime && std::abs(time.values[k] - expected) < 1e-3 * step) {
+        continue;
+      }
+      throw BadInput(Concat(where, ": row ", k + 1, ": ", Printable(time.name), ": expected ",
+                            FormatNumber(expected), " s, because each torque acts for ",
+                            FormatNumber(step), " s, got ", FormatNumber(time.values[k])));
+    }
+  }
+  return columns.front().values;
+}
+
+int RunSimulate(const SimulateArguments& a) {
+  if (!a.policy.empty() && !a.torque.empty()) {
+    throw BadInput("simulate: expected a policy or --torque FILE, got both");
+  }
+  std::optional<LoadedPolicy> loaded;
+  if (!a.policy.empty()) loaded.emplace(GetPolicy(a.policy));
+  RolloutConfig config = TrialEpisode(a.trial, loaded ? &*loaded : nullptr);
+  const EnvSpec spec = SpecOf(config.env);
+  if (!a.torque.empty()) config.schedule = ReadTorqueFile(a.torque, spec.step_seconds);
+
+  // The requested number of steps, or one step for each row of the schedule.
+  const double scheduled = static_cast<double>(config.schedule.size()) * spec.step_seconds;
+  const double usual = config.schedule.empty() ? spec.evaluation.seconds : scheduled;
+  config.seconds = a.seconds < 0 ? usual : a.seconds;
+  if (!config.schedule.empty() &&
+      RolloutSteps(spec, config.seconds) > static_cast<int64_t>(config.schedule.size())) {
+    throw BadInput(Concat("--seconds: expected at most ", FormatNumber(scheduled),
+                          " s, the length of ", InputName(a.torque), ", got ",
+                          FormatNumber(config.seconds)));
+  }
+  const Rollout rollout = RunRollout(config);
+
+  WriteOutput(a.csv, RolloutCsv(rollout));
+  if (IsStandardStream(a.csv)) return 0;
+  fmt::print("{}: {} rows\n", Printable(a.csv), rollout.rows.size());
+  if (HasPlant(spec.task)) fmt::print("  plant      {}\n", EpisodeText(rollout));
+  fmt::print("  torque     {}\n", TorqueText(rollout));
+  if (loaded && a.trial.is_of_eval()) {
+    fmt::print("  episode    {} of eval: {}\n", a.trial.episode,
+               JudgementText(*loaded->policy, config.env));
+  }
+  return 0;
+}
+
+}  // namespace
+
+void AddSimulate(CommandLine& line) {
+  SimulateArguments& a = line.Runs(RunSimulate);
+  AddPolicy(line, a.policy);
+  line.Text(
+      "--torque", a.torque, "FILE",
+      "CSV file with a column `torque` [N·m], a row per 0.02 s; -: standard input. Times in a "
+      "column `t` or `time` [s] must be 0.02 s apart");
+  AddEpisodeOptions(line, a.trial);
+  Options own;
+  Option& seconds = own.Add(&a.seconds, "seconds", {0, 1e5}, "s", "length of the rollout");
+  seconds.step = kControlPeriod;
+  seconds.usual = "20, or the length of the file of --torque";
+  line.Arguments(own);
+  AddTrialOptions(line, a.trial, "noise, random plants and the start of --episode");
+  line.Text("--csv", a.csv, "FILE", "CSV file to write; -: standard output (default -)");
+  line.Footer(
+      "Columns: t [s], qpos0, qpos1 [rad], qvel0, qvel1 [rad/s], torque [N·m], energy [J],\n"
+      "height of the tip [m], inverted (0 or 1), the reward and its five terms. The torque\n"
+      "is what the motor applies over the next 0.02 s, after its delay and within its\n"
+      "limit. The reward is that of the row's state and torque.\n\n"
+      "Examples:\n"
+      "  ./upswing simulate runs/d3qn-seed1 --csv rollout.csv\n"
+      "  ./upswing simulate --torque torques.csv --start 0.1,-0.05,0,0 --seconds 10\n"
+      "  ./upswing simulate --start 3.0,0,0,0 --set damping=0      no motor: it falls\n"
+      "  ./upswing eval runs/d3qn-seed1 --randomize 0.25 --episodes-csv episodes.csv\n"
+      "  ./upswing simulate runs/d3qn-seed1 --randomize 0.25 --episode 17 --csv e.csv\n");
+}
+
+}  // namespace upswing

@@ -1,0 +1,220 @@
+// The command `study`: variants of the settings, each trained with many seeds.
+#include <algorithm>
+
+#include "agents/config_checks.h"
+#include "base/error.h"
+#include "base/text.h"
+#include "cli/commands.h"
+#include "cli/compare_report.h"
+#include "cli/many_runs_view.h"
+#include "cli/say.h"
+#include "cli/study_work.h"
+#include "os/file.h"
+#include "os/machine.h"
+#include "report/figure.h"
+#include "runs/many_runs.h"
+#include "runs/seeds.h"
+#include "runs/slurm.h"
+#include "runs/study_file.h"
+#include "runs/study_worker.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kStudyName = "study.toml";  // in a study's folder
+
+/// The arguments of `study`.
+struct StudyArguments {
+  std::string file, out, seeds, keep, work;
+  int64_t jobs = 0;  // 0: one per processor
+  bool status = false, prepare = false;
+  SlurmRequest slurm;
+  bool on_slurm = false, print = false;
+
+  fs::path folder() const {
+    return out.empty() ? fs::path("runs") / fs::path(file).stem() : fs::path(out);
+  }
+};
+
+/// Throws if the folder belongs to another study, which this one would replace: another title, or a
+/// variant that this study lacks. TrainMany compares the settings.
+void CheckSameStudy(const StudyPlan& plan, const std::string& title) {
+  const fs::path file = plan.folder / kStudyName;
+  const std::string where = file.string();
+  if (!IsFile(file)) return;
+  const StudyOutline before = ParseStudyOutline(ReadOwnFile(file), where);
+  if (before.title != title) {
+    throw BadInput(Concat(where, ": made with title \"", before.title, "\", but the study has \"",
+                          title, "\"; choose another --out"));
+  }
+  for (const std::string& name : before.variants) {
+    if (std::ranges::find(plan.variants, name, &Variant::name) != plan.variants.end()) continue;
+    throw BadInput(Concat(where, ": made with a variant \"", name,
+                          "\", which the study lacks; choose another --out"));
+  }
+}
+
+ManyRuns ReadStudy(const StudyArguments& arguments) {
+  const fs::path file = arguments.file;
+  const std::string text = ReadOwnFile(file);
+  StudyFile study = ParseStudy(text, file.string());
+
+  ManyRuns many;
+  many.what = study.title.empty() ? file.stem().string() : Concat("\"", study.title, "\"");
+  many.mark_file = kStudyName;
+  many.mark_text = text;
+  many.more_steps = many.compared = true;
+  StudyPlan& plan = many.plan;
+  plan.folder = arguments.folder();
+  plan.variants = std::move(study.variants);
+  plan.keep = !arguments.keep.empty() ? ParseKeep(arguments.keep, "--keep")
+              : study.keep            ? *study.keep
+                                      : KeepOf(plan.folder);
+  CheckSameStudy(plan, study.title);
+  plan.seeds =
+      arguments.seeds.empty() ? std::move(study.seeds) : ParseSeeds(arguments.seeds, "--seeds");
+  if (plan.seeds.empty()) {
+    throw BadInput(
+        Concat(file.string(), ": expected a line such as seeds = 10, or --seeds, got neither"));
+  }
+  many.jobs = arguments.jobs;
+  if (arguments.on_slurm) return many;
+  if (many.jobs == 0) many.jobs = DefaultJobs(plan.variants.front().config.train.threads);
+  for (const Variant& variant : plan.variants)
+    CheckMemory(variant.config, AvailableMemory(), many.jobs);
+  return many;
+}
+
+/// Compares the finished runs of a study.
+int CompareStudy(const StudyPlan& plan) {
+  CompareRequest request;
+  request.root = plan.folder;
+  request.different_tasks = true;
+  for (const SeedRun& run : RunsOf(plan)) request.paths.push_back(run.path);
+  const Comparison comparison = Compare(request);
+  WriteComparison(comparison, plan.folder);
+  WriteEvaluations(plan);
+  Say("All evaluations of all runs: evaluations.csv\n");
+  PrintComparison(comparison);
+  PrintWritten(comparison, plan.folder);
+  return 0;
+}
+
+/// Prints the script that --slurm would submit.
+int PrintSlurmScript(const StudyPlan& plan, const SlurmRequest& request) {
+  std::vector<SeedRun> runs = RunsOf(plan);
+  for (SeedRun& run : runs) run.Read();
+  Say("{}", SlurmScriptFor(plan, runs, request));
+  return 0;
+}
+
+int RunStudy(const StudyArguments& arguments) {
+  if (!arguments.work.empty()) return WorkOnStudy(arguments.work);
+  if (arguments.status) {
+    const bool is_folder = fs::is_directory(arguments.file);
+    const fs::path folder = is_folder ? fs::path(arguments.file) : arguments.folder();
+    if (!Exists(arguments.file) && !Exists(folder)) {
+      throw BadInput(
+          Concat(arguments.file, ": no such file or folder; expected a study's file or folder"));
+    }
+    return PrintStudyStatus(folder);
+  }
+  const ManyRuns many = ReadStudy(arguments);
+  if (arguments.prepare) {
+    Prepare(many);
+    Say("Prepared {}. Next, on any host that shares the folder:\n  {} study --work {}\n",
+        Printable(many.plan.folder.string()), LaunchCommand(),
+        ShellQuoted(Printable(many.plan.folder.string())));
+    return 0;
+  }
+  if (arguments.print) return PrintSlurmScript(many.plan, arguments.slurm);
+  CheckCanDraw();  // fail before hours of training, not after
+  if (arguments.on_slurm) CheckSlurm();
+  const int exit_code =
+      arguments.on_slurm ? TrainOnSlurmAndShow(many, arguments.slurm) : TrainManyAndShow(many);
+  return exit_code != 0 ? exit_code : CompareStudy(many.plan);
+}
+
+/// Throws if the arguments contradict each other.
+void CheckArguments(const CommandLine& line, const StudyArguments& arguments) {
+  if (arguments.work.empty() == arguments.file.empty()) {
+    throw BadInput(arguments.file.empty()
+                       ? "study: expected FILE.toml or --work FOLDER, got neither"
+                       : "--work: expected no FILE.toml with it");
+  }
+  const auto alone = [&](bool given, const char* what, std::initializer_list<const char*> others) {
+    for (const std::string other : others) {
+      if (given && line.Has(other)) {
+        throw BadInput(Concat(what, ": expected no ", other, " with it"));
+      }
+    }
+  };
+  alone(!arguments.work.empty(), "--work",
+        {"--out", "--seeds", "--jobs", "--keep", "--status", "--prepare", "--slurm"});
+  alone(arguments.status, "--status", {"--seeds", "--jobs", "--keep", "--prepare"});
+  for (const std::string flag : {"--tasks", "--print"}) {
+    if (!arguments.on_slurm && line.Has(flag)) {
+      throw BadInput(Concat(flag, ": expected --slurm with it, got none"));
+    }
+  }
+  alone(arguments.on_slurm, "--slurm", {"--jobs", "--status", "--prepare"});
+  CheckSlurmOptions(arguments.slurm.options);
+}
+
+}  // namespace
+
+void AddStudy(CommandLine& line) {
+  StudyArguments& arguments = line.Runs(RunStudy);
+  line.Text("file", arguments.file, "FILE.toml", "study file: variants, settings and seeds");
+  line.Text("--out", arguments.out, "FOLDER", "folder of the study (default runs/FILE)");
+  AddManyOptions(line, arguments.seeds, arguments.jobs);
+  line.Text("--keep", arguments.keep, "WHAT",
+            "files of a finished run to keep; all; policy: policy, settings, evaluations and log; "
+            "tables: none, only its rows in the study's tables (default all, or FILE's value)",
+            "all, policy or tables");
+  line.Flag(
+      "--status", arguments.status,
+      "print how many runs are done, running and lost, and exit; also takes the study's folder");
+  line.Flag("--prepare", arguments.prepare, "prepare the folder for workers, and exit");
+  line.Text("--slurm", arguments.slurm.options, "OPTIONS",
+            "run the study on a Slurm cluster: queue a job array of workers with these options of "
+            "sbatch ('' for none), follow it, and compare at the end",
+            "");
+  Options slurm;
+  slurm.Add(&arguments.slurm.tasks, "tasks", {1, 100'000}, "", "number of workers in the job array")
+      .usual = Concat("one per run, at most ", kMostSlurmTasks);
+  line.Arguments(slurm);
+  line.Flag("--print", arguments.print, "print the script for sbatch, and exit");
+  line.Text("--work", arguments.work, "FOLDER",
+            "work on the study in this folder, on any host that shares it: claim and train runs "
+            "until none is left");
+  line.Footer(
+      "A study file:\n"
+      "  title = \"What does layer normalisation do?\"\n"
+      "  seeds = 10                   # 1 to 10, or \"3,5,8-12\"\n"
+      "  [settings]                   # for all variants, as in a configuration file\n"
+      "  agent = \"d3qn-small\"\n"
+      "  steps = 300000\n"
+      "  [variants.with]\n"
+      "  [variants.without]\n"
+      "  layer_norm = false\n"
+      "\nExamples:\n"
+      "  ./upswing study configs/studies/post.toml\n"
+      "  ./upswing study configs/studies/post.toml --seeds 3 --out runs/short\n"
+      "  ./upswing study configs/studies/post.toml --status\n"
+      "  ./upswing study --work runs/post          one more worker, on any host\n"
+      "  ./upswing study configs/studies/post.toml \\\n"
+      "    --slurm '--partition=short --time=2:00:00'\n"
+      "\nThe folder of a run is FOLDER/VARIANT/seedN, its log is FOLDER/VARIANT/seedN.log. The\n"
+      "same command resumes stopped and killed runs; finished runs stay unchanged.\n"
+      "Exit code 0: done; 1: a run failed; 2: bad usage or input; 130 or 143: stopped. A\n"
+      "worker that a signal stops has exit code 75; any worker can resume its run.\n");
+  line.Check([&line, &arguments] {
+    arguments.on_slurm = line.Has("--slurm");
+    CheckArguments(line, arguments);
+  });
+}
+
+}  // namespace upswing

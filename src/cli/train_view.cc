@@ -1,0 +1,214 @@
+#include "cli/train_view.h"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <optional>
+
+#include "agents/config_checks.h"
+#include "base/format.h"
+#include "base/text.h"
+#include "cli/eval_table.h"
+#include "cli/progress.h"
+#include "cli/say.h"
+#include "cli/signals.h"
+#include "mujoco/engines.h"
+#include "os/file.h"
+#include "runs/model_info.h"
+#include "runs/run_folder.h"
+
+namespace upswing {
+namespace {
+
+/// The printed view of a training: a progress line, a line per evaluation, a summary.
+class TrainView : public TrainObserver {
+ public:
+  /// Shows a training, which must outlive the view, from its current step on.
+  explicit TrainView(const Training& training)
+      : training_(training),
+        begin_step_(training.state().steps),
+        since_step_(training.state().steps),
+        since_updates_(training.agent().updates()),
+        since_seconds_(training.state().seconds) {}
+
+  /// Prints agent, sizes and folder.
+  void Announce(const std::filesystem::path& run) const {
+    const Config& config = training_.config();
+    Say("Training {} (seed {}) in {}\n", config.agent, config.train.seed, Printable(run.string()));
+    Say("  {}, {} parameters; {}, {}\n", config.learner().Text(),
+        FormatCount(training_.policy()->num_parameters()),
+        Counted(config.train.envs, "environment"), Counted(training_.threads(), "thread"));
+    if (!HasPlant(config.task)) Say("  task {}\n", config.task);
+    if (config.physics != kMuJoCo.name) Say("  physics {}\n", config.physics);
+    const std::optional<ModelInfo> model = InfoOfModel(config.mjcf, config.model);
+    if (model) Say("  model {}\n", model->Text());
+    const TrainingSize size = SizeOf(config);
+    constexpr double kGigabyte = 1e9;
+    if (size.memory > kGigabyte) {
+      Say("  up to {:.1f} GB of memory and {:.1f} GB of disk for the checkpoint\n",
+          size.memory / kGigabyte, size.checkpoint / kGigabyte);
+    }
+    for (const std::string& warning : Warnings(config)) Say("  Warning: {}\n", warning);
+    if (since_step_ > 0) Say("  resuming at step {}\n", FormatCount(since_step_));
+    std::fflush(stdout);
+  }
+
+  void OnMetrics(const TrainState& s, const Metrics& metrics) override {
+    metrics_ = metrics;
+    UpdateRates(s);
+  }
+
+  void OnEvaluation(const TrainState& s, const Evaluation& e) override {
+    value_ = e.value;
+    discounted_return_ = e.discounted_return;
+    line_.Print(
+        fmt::format("{:>9} steps  {:>11}  {:>6} updates/s  {}  return {:6.0f}  success {:3}/{}",
+                    FormatCount(s.steps), FormatDuration(s.seconds), UpdatesText(),
+                    Join(AgentTexts(), "  "), e.reward_sum.mean, e.successes, e.episodes));
+  }
+
+  /// Updates the progress line if it is due. Returns the request of a signal.
+  TrainRequest Poll() {
+    if (line_.due()) ShowProgress(training_.state());
+    return PollSignals();
+  }
+
+  /// Prints the result and the next commands to type. `finished`: the training was not stopped.
+  void Summarize(const std::filesystem::path& run, bool finished) {
+    const TrainState& s = training_.state();
+    const TrainConfig& config = training_.config().train;
+    line_.Clear();
+    PrintOutcome(finished);
+    const std::filesystem::path policy = run / RunFolder::kPolicy;
+    const bool has_policy = s.best_step > 0 && Exists(policy);
+    if (has_policy) {
+      const bool unconfirmed =
+          IsScreened(training_.config()) && !s.solved && s.best_success_rate == 1;
+      Say("Best policy: {} (step {}, success {:.0f}%{}, return {:.0f})\n",
+          Printable(policy.string()), FormatCount(s.best_step), 100 * s.best_success_rate,
+          unconfirmed ? " in closed-form physics" : "", s.best_return);
+    } else if (s.best_step > 0) {
+      Say("Best policy: from step {}, but {} no longer exists\n", FormatCount(s.best_step),
+          Printable(policy.string()));
+    }
+    if (s.solved && !training_.config().learner().HasSoftValues() &&
+        ValueIsOff(value_, discounted_return_)) {
+      Say("Warning: at the last evaluation the agent expected a discounted return of {:.4g} and\n"
+          "got {:.4g}; the estimate is off by more than a quarter.\n",
+          value_, discounted_return_);
+    }
+    if (Printable(run.string()) != run.string()) return;  // such a name cannot be typed
+    const std::string folder = ShellQuoted(run.string());
+    Say("Next:\n");
+    if (has_policy) {
+      if (HasPlant(training_.config().task)) Say("  {} demo {}\n", LaunchCommand(), folder);
+      Say("  {0} eval {1}\n  {0} info {1}\n", LaunchCommand(), folder);
+    }
+    std::string how;
+    if (finished && s.solved && config.stop_when_solved) how += " --no-stop-when-solved";
+    if (finished && s.steps >= config.steps) how += fmt::format(" --steps {}", 2 * s.steps);
+    Say("  {} train --resume {}{}\n", LaunchCommand(), folder, how);
+  }
+
+ private:
+  void UpdateRates(const TrainState& s) {
+    const double elapsed = s.seconds - since_seconds_;
+    const bool is_long = elapsed >= 0.5;
+    if (elapsed <= 0 || (rates_settled_ && !is_long)) return;
+    const int64_t updates = training_.agent().updates();
+    steps_per_second_ = static_cast<double>(s.steps - since_step_) / elapsed;
+    updates_per_second_ = static_cast<double>(updates - since_updates_) / elapsed;
+    if (!is_long) return;
+    rates_settled_ = true;
+    since_step_ = s.steps;
+    since_updates_ = updates;
+    since_seconds_ = s.seconds;
+  }
+
+  /// The rate of updates; a dash before it is known.
+  std::string UpdatesText() const {
+    return steps_per_second_ > 0 ? FormatCount(updates_per_second_) : "-";
+  }
+
+  /// The agent's metrics, such as `eps 0.05` and `loss 0.0012`.
+  std::vector<std::string> AgentTexts() const {
+    const bool learned = training_.agent().updates() > 0;
+    std::vector<std::string> texts;
+    for (const auto& [name, value] : metrics_) {
+      if (name == "alpha") texts.push_back(fmt::format("alpha {:.3f}", value));
+      if (name == "epsilon") texts.push_back(fmt::format("eps {:.2f}", value));
+      if (name == "std") texts.push_back(fmt::format("std {:.2f}", value));
+      if (name == "loss") {
+        texts.push_back(learned ? fmt::format("loss {:.4f}", value) : "loss      -");
+      }
+    }
+    return texts;
+  }
+
+  void ShowProgress(const TrainState& s) {
+    const int64_t steps_in_all = training_.config().train.steps;
+    const auto steps_left = static_cast<double>(steps_in_all - s.steps);
+    std::vector<std::string> fields{fmt::format("success {:.0f}%", 100 * s.last_success_rate),
+                                    fmt::format("return {:.0f}", s.mean_return())};
+    if (steps_per_second_ > 0) {
+      fields.insert(fields.begin(),
+                    fmt::format("at most {} left", FormatDuration(steps_left / steps_per_second_)));
+      fields.push_back(fmt::format("{} steps/s", FormatCount(steps_per_second_)));
+      fields.push_back(fmt::format("{} updates/s", UpdatesText()));
+    }
+    for (const std::string& text : AgentTexts()) fields.push_back(text);
+    line_.Show(static_cast<double>(s.steps) / static_cast<double>(steps_in_all), fields);
+  }
+
+  /// Prints the outcome in one sentence.
+  void PrintOutcome(bool finished) const {
+    const TrainState& s = training_.state();
+    const TrainConfig& config = training_.config().train;
+    const bool did_nothing = begin_step_ > 0 && s.steps == begin_step_ && finished;
+    const bool all_steps_done = s.steps >= config.steps;
+    if (did_nothing && all_steps_done) {
+      Say("Nothing to do: the run has all {} steps (--steps is the total){}.\n",
+          FormatCount(config.steps), s.solved ? " and is solved" : "");
+    } else if (did_nothing) {
+      Say("Nothing to do: the run was solved at step {} after {} of training. With\n"
+          "--no-stop-when-solved it continues to step {} (--steps).\n",
+          FormatCount(s.streak_step), FormatDuration(s.streak_seconds), FormatCount(config.steps));
+    } else if (s.solved) {
+      Say("Solved after {} of training, at step {} (in all {}, {} steps).\n",
+          FormatDuration(s.streak_seconds), FormatCount(s.streak_step), FormatDuration(s.seconds),
+          FormatCount(s.steps));
+    } else {
+      Say("{} at step {} after {} of training; not solved yet.\n", finished ? "Done" : "Stopped",
+          FormatCount(s.steps), FormatDuration(s.seconds));
+    }
+  }
+
+  const Training& training_;
+  ProgressLine line_;
+  int64_t begin_step_;                        // of the training in this view
+  Metrics metrics_;                           // last reported
+  double value_ = 0, discounted_return_ = 0;  // of the last evaluation
+
+  // Training rates between two reports at least half a second apart. Until there are two such
+  // reports, the rates over all reports; 0 before the first report.
+  double steps_per_second_ = 0, updates_per_second_ = 0;
+  bool rates_settled_ = false;
+  int64_t since_step_, since_updates_;
+  double since_seconds_;
+};
+
+}  // namespace
+
+bool TrainAndShow(TrainingRun& run, const std::function<void()>& check) {
+  TrainView view(run.training());
+  view.Announce(run.path());
+  const bool finished = run.Train(view, [&] {
+    check();
+    return view.Poll();
+  });
+  view.Summarize(run.path(), finished);
+  return finished;
+}
+
+}  // namespace upswing

@@ -1,0 +1,38 @@
+#pragma once
+
+#include "control/controller.h"
+#include "control/riccati.h"
+#include "control/settings.h"
+#include "pendulum/double_pendulum.h"
+
+/// The linear-quadratic regulator about upright: Anderson, Moore, "Optimal Control: Linear
+/// Quadratic Methods" (1990); Tedrake, "Underactuated Robotics", chapter 8. It is the best
+/// controller of the linear model. It controls the pendulum near upright, as long as the torque is
+/// within its limit.
+namespace upswing {
+
+/// The diagonal matrix Q.
+Eigen::Matrix4d WeightsOf(const LqrConfig& config);
+
+/// Solves the regulator problem for a plant and the control period. Throws BadInput if the plant's
+/// motor cannot stabilise it, or if no gain from these weights does.
+Lqr SolveLqr(const LqrConfig& config, const Plant& plant);
+
+/// The controller u = -K x, cut at the torque limit.
+class LqrPolicy : public PendulumController {
+ public:
+  /// Throws as SolveLqr does.
+  LqrPolicy(LqrConfig config, const Plant& plant);
+
+  std::string description() const override;
+
+  const Lqr& lqr() const { return lqr_; }
+
+ private:
+  double Torque(const StateVector& deviation, size_t env, Memory& memory) const override;
+
+  LqrConfig config_;
+  Lqr lqr_;
+};
+
+}  // namespace upswing

@@ -1,0 +1,114 @@
+#include "control/lqr_catch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "base/error.h"
+#include "base/rng.h"
+#include "base/text.h"
+#include "control/linearize.h"
+
+namespace upswing {
+namespace {
+
+constexpr int kSamples = 512;      // states on an ellipsoid
+constexpr double kSettled = 1e-3;  // settled: the cost has fallen to this share
+constexpr double kLargestLean = std::numbers::pi / 3;
+
+/// Control periods in which the regulator's slowest mode makes the cost fall to kSettled, times
+/// 1.5, and at least 5 s.
+int SettleSteps(const Lqr& lqr, const Plant& plant) {
+  const LinearModel model = Discretize(LinearizeUpright(plant), kPhysicsTimestep, kPhysicsSteps);
+  const double slowest = SpectralRadius(model.A - model.B * lqr.K);
+  return static_cast<int>(
+      std::clamp(1.5 * std::log(kSettled) / (2 * std::log(slowest)), 250.0, 2000.0));
+}
+
+/// Random points on the unit sphere in four dimensions.
+std::vector<Eigen::Vector4d> Directions() {
+  std::vector<Eigen::Vector4d> directions(kSamples);
+  Rng rng(1, "directions");
+  for (Eigen::Vector4d& d : directions) {
+    for (int k = 0; k < 4; ++k) d[k] = rng.Normal();
+    d.normalize();
+  }
+  return directions;
+}
+
+/// Whether all states x with x' P x = level, in these directions (rows of P^-1/2 d), settle.
+bool AllSettle(const Lqr& lqr, double level, const std::vector<Eigen::Vector4d>& directions,
+               int steps, PendulumModel& model) {
+  std::vector<StateVector> x;
+  for (const auto& d : directions) x.push_back(FromUpright(std::sqrt(level) * d));
+  std::vector<double> u(x.size());
+  for (int step = 0; step < steps; ++step) {
+    for (size_t i = 0; i < x.size(); ++i) {
+      u[i] = lqr.Torque(UprightDeviation(x[i]), model.plant().torque_limit);
+    }
+    model.Step(x, u);
+  }
+  return std::ranges::all_of(x, [&](const StateVector& end) {
+    return lqr.Cost(UprightDeviation(end)) < kSettled * level;
+  });
+}
+
+}  // namespace
+
+double RegionOfAttraction(const Lqr& lqr, const Plant& plant) {
+  const auto [V, values] = SymmetricModesOf(lqr.P);
+  const Eigen::Matrix4d shape = V * values.cwiseSqrt().cwiseInverse().asDiagonal() * V.transpose();
+  std::vector<Eigen::Vector4d> directions = Directions();
+  for (Eigen::Vector4d& d : directions) d = shape * d;
+
+  PendulumModel model(plant);
+  const int steps = SettleSteps(lqr, plant);
+  const auto all_settle = [&](double level) {
+    return AllSettle(lqr, level, directions, steps, model);
+  };
+  // The first level is the largest at which the torque stays within its limit: max |K x| over x' P
+  // x = level is sqrt(level K P⁻¹ K'). The search changes it by factors of 2 until the result
+  // changes, then bisects.
+  double low = plant.torque_limit * plant.torque_limit / (lqr.K * shape).squaredNorm();
+  int factors = 0;
+  while (!all_settle(low)) {
+    if (++factors > 40) return 0;
+    low /= 2;
+  }
+  double high = 2 * low;
+  while (factors == 0 && all_settle(high) && high < 1e6 * low) high *= 2;
+  if (factors == 0) low = high / 2;
+  for (int halving = 0; halving < 6; ++halving) {
+    const double middle = (low + high) / 2;
+    (all_settle(middle) ? low : high) = middle;
+  }
+  return low;
+}
+
+LqrCatch::LqrCatch(const LqrConfig& config, const Plant& plant)
+    : lqr_(SolveLqr(config, plant)),
+      region_(RegionOfAttraction(lqr_, plant)),
+      steps_(SettleSteps(lqr_, plant) / 2),
+      limit_(plant.torque_limit) {
+  if (region_ > 0) return;
+  const bool dry = plant.coulomb1 > 0 || plant.coulomb2 > 0;
+  throw BadInput(Concat("lqr: found no region of attraction: with these weights ",
+                        dry ? "and dry friction (coulomb1, coulomb2) " : "",
+                        "LQR catches the pendulum only very close to upright, if at all"));
+}
+
+bool LqrCatch::Holds(const StateVector& deviation, PendulumModel& model) const {
+  StateVector x = FromUpright(deviation);
+  for (int step = 0; step < steps_; ++step) {
+    const StateVector d = UprightDeviation(x);
+    const auto [lean1, lean2] = Lean(StateOf(x));
+    if (std::abs(lean1) > kLargestLean || std::abs(lean2) > kLargestLean) return false;
+    if (lqr_.Cost(d) <= region_) return true;
+    const double u = lqr_.Torque(d, limit_);
+    model.Step({&x, 1}, {&u, 1});
+  }
+  return false;
+}
+
+}  // namespace upswing

@@ -1,0 +1,85 @@
+#include "control/mpc.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "base/text.h"
+
+namespace upswing {
+namespace {
+
+/// Iterations for the first plan of an episode, which has no previous plan.
+constexpr int kFirstIterations = 100;
+constexpr double kTolerance = 1e-6;  // relative gain of an iteration
+
+}  // namespace
+
+/// The plans of some environments, and one optimiser for all of them.
+struct MpcPolicy::Plans : Memory {
+  Plans(int num_envs, const Plant& plant)
+      : plans(static_cast<size_t>(num_envs)), optimizer(plant) {}
+
+  struct Plan {
+    Trajectory trajectory;
+    std::vector<Eigen::RowVector4d> K;  // (T)
+  };
+  std::vector<Plan> plans;  // (N)
+  TrajectoryOptimizer optimizer;
+};
+
+MpcPolicy::MpcPolicy(LqrConfig lqr, MpcConfig config, const Plant& plant)
+    : PendulumController("mpc", OptionsOfAll(lqr, config), plant),
+      config_(config),
+      lqr_(SolveLqr(lqr, plant)),
+      cost_(WeightsOf(lqr), lqr.torque, lqr_.P, config.angle_range) {}
+
+std::string MpcPolicy::description() const {
+  return Concat("model predictive control, ", Rounded(config_.seconds), " s ahead, ",
+                config_.iterations, " iterations a decision");
+}
+
+std::unique_ptr<Policy::Memory> MpcPolicy::Start(int num_envs) const {
+  return std::make_unique<Plans>(num_envs, plant());
+}
+
+double MpcPolicy::Torque(const StateVector& deviation, size_t env, Memory& memory) const {
+  auto& plans = static_cast<Plans&>(memory);
+  auto& [trajectory, K] = plans.plans[env];
+  TrajectoryOptimizer& optimizer = plans.optimizer;
+  const auto T = static_cast<size_t>(std::lround(config_.seconds / kControlPeriod));
+  StateVector x = FromUpright(deviation);
+  const bool first = trajectory.u.empty();
+  if (first) {
+    // A range counts turns from hanging at 0. Without one, 0 and 2π are alike.
+    if (config_.angle_range < MpcConfig().angle_range) x[0] = Wrapped(x[0]);
+    trajectory = optimizer.Follow(cost_, x, std::vector<double>(T, 0.0));
+  } else {
+    // Shift the plan by one step; the regulator chooses the new last torque.
+    const StateVector last = UprightDeviation(trajectory.x.back());
+    trajectory.x.erase(trajectory.x.begin());
+    trajectory.u.erase(trajectory.u.begin());
+    K.erase(K.begin());
+    trajectory.u.push_back(lqr_.Torque(last));
+    K.push_back(-lqr_.K);
+    // Count full turns as the plan does.
+    x = trajectory.x[0] + Difference(x, trajectory.x[0]);
+    trajectory = optimizer.Follow(cost_, x, trajectory, K);
+  }
+  // Take the regulator's own trajectory if it costs less. It holds the nearest upright, also one
+  // that is no goal; then its cost is large.
+  const Trajectory upright{std::vector<StateVector>(T + 1, x - UprightDeviation(x)),
+                           std::vector<double>(T, 0.0), 0};
+  Trajectory regulated =
+      optimizer.Follow(cost_, x, upright, std::vector<Eigen::RowVector4d>(T, -lqr_.K));
+  if (regulated.cost < trajectory.cost) trajectory = std::move(regulated);
+  optimizer.Improve(cost_, first ? kTolerance : 0,
+                    first ? kFirstIterations : static_cast<int>(config_.iterations), trajectory);
+  K = optimizer.gains();
+  // A fall may be faster than a few iterations can plan. The share of a torque that accelerates the
+  // motor's joint: 1 up to 2/3 of the velocity, 0 at the velocity, -1 from 4/3 on.
+  const double w = x[plant().actuated_joint == 1 ? 2 : 3], u = trajectory.u[0];
+  return u * w > 0 ? u * std::clamp(3 * (1 - std::abs(w) / config_.velocity), -1.0, 1.0) : u;
+}
+
+}  // namespace upswing

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+
+#include "control/linearize.h"
+#include "pendulum/closed_form.h"
+#include "pendulum/double_pendulum.h"
+
+/// The double pendulum for trajectory optimisation: a step and its derivatives.
+namespace upswing {
+
+/// [q1, q2, w1, w2]: rad and rad/s.
+using StateVector = Eigen::Vector4d;
+inline PendulumState StateOf(const StateVector& x) { return {x[0], x[1], x[2], x[3]}; }
+
+/// x⁺ = f(x, u): one control period of many states at once, with each torque u (N·m) held. Uses the
+/// same kernels as the simulation.
+class PendulumModel {
+ public:
+  explicit PendulumModel(const Plant& plant) : plant_(plant), few_(0), many_(0) {}
+
+  const Plant& plant() const { return plant_; }
+
+  /// Steps states (n) in place, each under its own torque (n). Does not limit the torque.
+  void Step(std::span<StateVector> x, std::span<const double> u);
+
+  /// A = ∂f/∂x and B = ∂f/∂u at each of n points, by central differences of one batch of 10 n
+  /// steps. The relative error is about 1e-9.
+  void Linearize(std::span<const StateVector> x, std::span<const double> u,
+                 std::span<LinearModel> models);
+
+ private:
+  /// Makes room for n pendulums.
+  void Reserve(ClosedFormBatch& batch, size_t n) const;
+
+  Plant plant_;
+  ClosedFormBatch few_, many_;  // batches for Step and for Linearize
+};
+
+}  // namespace upswing

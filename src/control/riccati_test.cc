@@ -1,0 +1,142 @@
+#include "control/riccati.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "base/rng.h"
+#include "control/testing.h"
+
+namespace upswing {
+namespace {
+
+using Eigen::Matrix4d;
+using Eigen::Vector4d;
+
+Matrix4d Drawn(Rng& rng) {
+  Matrix4d A;
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 4; ++j) A(i, j) = rng.Normal();
+  }
+  return A;
+}
+
+/// A system with two states, padded with two zero states.
+LinearModel Two(double a11, double a12, double a21, double a22, double b1, double b2) {
+  LinearModel model{Matrix4d::Zero(), {b1, b2, 0, 0}};
+  model.A.topLeftCorner<2, 2>() << a11, a12, a21, a22;
+  return model;
+}
+
+TEST(Riccati, EqualsSciPy) {
+  int cases = 0;
+  for (const RiccatiCase& c : SciPyCases()) {
+    SCOPED_TRACE(c.name);
+    const auto lqr = SolveDiscreteLqr(c.model, c.Q, c.R);
+    ASSERT_TRUE(lqr.has_value());
+    EXPECT_LT((lqr->P - c.P).norm(), 1e-9 * c.P.norm());
+    EXPECT_LT((lqr->P - lqr->P.transpose()).norm(), 1e-15 * c.P.norm());
+    EXPECT_NEAR(SpectralRadius(c.model.A - c.model.B * lqr->K), c.spectral_radius, 1e-8);
+    ++cases;
+  }
+  EXPECT_EQ(cases, 10);
+}
+
+TEST(Riccati, EqualsTheRecursionOfLongerAndLongerHorizons) {
+  const RiccatiCase c = SciPyCases().front();
+  const auto& [A, B] = c.model;
+  Matrix4d P = c.Q;  // cost of one step; 4,096 more are practically infinitely many
+  for (int step = 0; step < 4096; ++step) {
+    const Eigen::RowVector4d K = B.transpose() * P * A / (c.R + B.dot(P * B));
+    P = (c.Q + A.transpose() * P * (A - B * K)).eval();
+  }
+  const auto lqr = SolveDiscreteLqr(c.model, c.Q, c.R);
+  ASSERT_TRUE(lqr.has_value());
+  EXPECT_LT((lqr->P - P).norm(), 1e-9 * P.norm());
+}
+
+TEST(Riccati, OneStateByHand) {
+  // P = 1 + 4 P - 4 P²/(1 + P) → P² - 4 P - 1 = 0
+  const Matrix4d Q = Vector4d(1, 0, 0, 0).asDiagonal();
+  const auto lqr = SolveDiscreteLqr(Two(2, 0, 0, 0, 1, 0), Q, 1);
+  ASSERT_TRUE(lqr.has_value());
+  EXPECT_NEAR(lqr->P(0, 0), 2 + std::sqrt(5), 1e-14);
+}
+
+TEST(Riccati, ContinuousSolutionIsThatOfTheStableSubspace) {
+  // P = Y X⁻¹ from the stable eigenvectors [X; Y] of the Hamiltonian matrix: Laub, "A Schur method
+  // for solving algebraic Riccati equations" (1979), with eigenvectors instead of Schur vectors.
+  Rng rng(1, "systems");
+  for (int trial = 0; trial < 100; ++trial) {
+    const LinearModel model{3 * Drawn(rng),
+                            {rng.Normal(), rng.Normal(), rng.Normal(), rng.Normal()}};
+    const Matrix4d L = Drawn(rng), Q = L * L.transpose() + 0.1 * Matrix4d::Identity();
+    const double R = std::exp(rng.Uniform(-2, 2));
+    Eigen::Matrix<double, 8, 8> H;
+    H << model.A, -model.B * model.B.transpose() / R, -Q, -model.A.transpose();
+    const EigenSolver solver(H);
+    Eigen::Matrix<std::complex<double>, 8, 4> stable;
+    Eigen::Index found = 0;
+    for (Eigen::Index i = 0; i < 8; ++i) {
+      if (solver.eigenvalues()[i].real() < 0) stable.col(found++) = solver.eigenvectors().col(i);
+    }
+    ASSERT_EQ(found, 4);
+    const Eigen::Matrix4cd X = stable.topRows<4>(), Y = stable.bottomRows<4>();
+    const Matrix4d P = (Y * X.inverse()).real();
+    const auto lqr = SolveContinuousLqr(model, Q, R);
+    ASSERT_TRUE(lqr.has_value());
+    EXPECT_LT((lqr->P - P).norm(), 1e-7 * P.norm()) << trial;
+    EXPECT_LT((lqr->K - model.B.transpose() * P / R).norm(), 1e-7 * lqr->K.norm()) << trial;
+  }
+}
+
+TEST(Riccati, NoSolutionWhereAGrowingModeCannotBeReached) {
+  const Matrix4d Q = Matrix4d::Identity();
+  EXPECT_FALSE(SolveDiscreteLqr(Two(1.1, 0, 0.3, 0.5, 0, 1), Q, 1).has_value());
+  EXPECT_TRUE(SolveDiscreteLqr(Two(0.9, 0, 0.3, 0.5, 0, 1), Q, 1).has_value());  // it decays
+}
+
+TEST(Riccati, NoSolutionWhereAGrowingModeCostsNothing) {
+  const LinearModel model = Two(1.1, 0, 0, 0.5, 1, 1);
+  Matrix4d Q = Vector4d(0, 1, 0, 0).asDiagonal();
+  EXPECT_FALSE(SolveDiscreteLqr(model, Q, 1).has_value());  // the cheapest control is u = 0
+  Q(0, 0) = 1e-6;
+  EXPECT_TRUE(SolveDiscreteLqr(model, Q, 1).has_value());
+}
+
+TEST(Riccati, NoSolutionOfWhatIsNotFinite) {
+  const Matrix4d Q = Matrix4d::Identity();
+  for (const double x :
+       {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
+    EXPECT_FALSE(SolveDiscreteLqr(Two(x, 0, 0, 0, 1, 0), Q, 1));
+    EXPECT_FALSE(SolveContinuousLqr(Two(x, 0, 0, 0, 1, 0), Q, 1));
+  }
+}
+
+TEST(Riccati, SpectralRadiusIsTheLargestEigenvalue) {
+  Rng rng(2, "matrices");
+  for (int trial = 0; trial < 200; ++trial) {
+    const Matrix4d A = std::exp(rng.Uniform(-5, 5)) * Drawn(rng);
+    const double expected = EigenSolver(A, false).eigenvalues().cwiseAbs().maxCoeff();
+    EXPECT_NEAR(SpectralRadius(A), expected, 1e-11 * expected);
+  }
+  Matrix4d nilpotent = Matrix4d::Zero();
+  nilpotent(0, 1) = nilpotent(1, 2) = nilpotent(2, 3) = 5;
+  EXPECT_EQ(SpectralRadius(nilpotent), 0);
+}
+
+TEST(Riccati, SymmetricModesAreTheEigenvectors) {
+  Rng rng(3, "matrices");
+  for (int trial = 0; trial < 200; ++trial) {
+    const Matrix4d L = Drawn(rng),
+                   S = trial % 2 == 0 ? Matrix4d(L + L.transpose()) : Matrix4d(L * L.transpose());
+    const auto [V, values] = SymmetricModesOf(S);
+    EXPECT_LT((V * values.asDiagonal() * V.transpose() - S).norm(), 1e-13 * S.norm());
+    EXPECT_LT((V * V.transpose() - Matrix4d::Identity()).norm(), 1e-14);
+    EXPECT_NEAR(values.minCoeff(), SymmetricEigenSolver(S).eigenvalues()[0], 1e-13 * S.norm());
+  }
+}
+
+}  // namespace
+}  // namespace upswing

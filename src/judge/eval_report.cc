@@ -1,0 +1,214 @@
+#include "judge/eval_report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+
+#include "agents/controllers.h"
+#include "base/csv.h"
+#include "base/error.h"
+#include "base/format.h"
+#include "base/text.h"
+#include "pendulum/upright_modes.h"
+
+namespace upswing {
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json FigureJson(double value) { return value; }
+ordered_json FigureJson(const Moments& m, double scale = 1) {
+  return {{"mean", scale * m.mean}, {"deviation", scale * m.deviation}};
+}
+ordered_json FigureJson(const Quartiles& q) {
+  return {{"median", q.median}, {"quartiles", {q.low, q.high}}};
+}
+
+ordered_json JsonOf(const Option& option) {
+  if (const auto* on = std::get_if<bool*>(&option.target)) return **on;
+  if (const auto* text = std::get_if<std::string*>(&option.target)) return **text;
+  return option.number();
+}
+
+/// Whether a figure has a value to print.
+bool IsKnown(const EvaluationFigure& figure, bool upright, bool settled, bool valued) {
+  using enum EvaluationFigure::Known;
+  return figure.known == kAlways || (figure.known == kUpright && upright) ||
+         (figure.known == kSettled && settled) || (figure.known == kValued && valued);
+}
+
+/// Adds conditions and figures of an episode to its row.
+void AddCells(const EvalReport& report, const JudgedEpisode& episode, CsvTable& csv) {
+  const EnvSpec& spec = report.spec;
+  const EvaluationEpisode& e = episode.result;
+  const auto add = [&](const std::string& name, double value, bool known = true) {
+    csv.Add(name, known ? FormatNumber(value) : "");
+  };
+  for (size_t i = 0; i < episode.start.size(); ++i) add(spec.state_names[i], episode.start[i]);
+  if (HasPlant(spec.task)) {
+    for (const auto& [name, value] : PlantValues(episode.plant)) add(name, value);
+    const double delta = ModesOf(episode.plant).delta;
+    add("delta", delta, std::isfinite(delta));
+    const Options disturbance = OptionsOf(episode.disturbance);
+    for (const Option& option : disturbance.all()) add(option.name, option.number());
+  }
+  add("success", e.success ? 1 : 0);
+  for (size_t body = 0; body < e.tilt.size(); ++body) {
+    add(Concat("tilt", body + 1, "_degrees"), e.tilt[body] * kDegrees);
+  }
+  for (size_t k = 0; k < e.terms.size(); ++k) add(spec.term_names[k], e.terms[k] + 0.0);
+  const bool held = !spec.evaluation.by_return();  // the goal has to be held
+  const bool upright = held && e.swing_up_seconds, settled = held && e.settling_seconds;
+  for (const EvaluationFigure& figure : EvaluationFigures()) {
+    add(figure.name, figure.Of(e).value_or(0),
+        IsKnown(figure, upright, settled, report.knows_values));
+  }
+}
+
+using DesignFor = decltype(LoadedPolicy::design_for);
+
+/// Evaluates the episodes of `config`, each with a controller designed for its plant.
+void JudgeDesigned(const Policy& policy, const DesignFor& design_for, const EnvConfig& config,
+                   const Progress& progress, size_t first, EvalReport& report) {
+  std::mutex mutex;
+  int done = 0;
+  config.pool->ParallelFor(config.num_envs, [&](int i) {
+    JudgedEpisode& episode = report.episodes[first + static_cast<size_t>(i)];
+    std::shared_ptr<const Policy> made;
+    try {
+      made = design_for(episode.plant);
+      episode.for_its_plant = true;
+    } catch (const Error&) {  // no controller holds or swings up this plant
+    }
+    EnvConfig one = config;
+    one.pool = nullptr;
+    episode.result = EvaluateEpisodes(made ? *made : policy, *OneEpisode(one, i)).front();
+    const std::lock_guard lock(mutex);
+    progress(++done, config.num_envs);
+  });
+}
+
+/// Evaluates the episodes of the environments of `config` and appends them to the report. With
+/// `design_for`, each episode has a controller designed for its plant.
+void JudgeEpisodes(const Policy& policy, const DesignFor* design_for, const EnvConfig& config,
+                   const Progress& progress, EvalReport& report) {
+  const std::unique_ptr<VectorEnv> env = MakeEnv(config);
+  const auto first = report.episodes.size();
+  const auto* pendulum = dynamic_cast<const PendulumEnv*>(env.get());
+  for (int i = 0; i < config.num_envs; ++i) {
+    JudgedEpisode& episode = report.episodes.emplace_back();
+    episode.start.resize(report.spec.state_names.size());
+    env->GetState(i, episode.start);
+    if (pendulum == nullptr) continue;
+    episode.plant = pendulum->plant(i);
+    episode.disturbance = pendulum->disturbance(i);
+  }
+  if (design_for) return JudgeDesigned(policy, *design_for, config, progress, first, report);
+  std::vector<EvaluationEpisode> results = EvaluateEpisodes(policy, *env, config.pool, progress);
+  for (size_t i = 0; i < results.size(); ++i) {
+    report.episodes[first + i].result = std::move(results[i]);
+  }
+}
+
+}  // namespace
+
+void AddFigures(const Evaluation& e, const EnvSpec& spec, bool knows_values, ordered_json& j) {
+  const bool upright = !spec.evaluation.by_return() && e.successes > 0;
+  const bool settled = upright && e.settled > 0;
+  j["episodes"] = e.episodes;
+  j["successes"] = e.successes;
+  j["success_rate"] = e.success_rate();
+  j["success_interval_95"] = {e.success_interval.low, e.success_interval.high};
+  j["settled"] = upright ? e.settled : 0;
+  j["steady_tilt_degrees"] = nullptr;
+  if (upright && e.tilt.size() == 2) {
+    j["steady_tilt_degrees"] = {{"link1", FigureJson(e.tilt[0], kDegrees)},
+                                {"link2", FigureJson(e.tilt[1], kDegrees)}};
+  }
+  for (size_t k = 0; k < e.term_means.size(); ++k) {
+    j["reward_terms"][spec.term_names[k]] = e.term_means[k];
+  }
+  for (const EvaluationFigure& figure : EvaluationFigures()) {
+    ordered_json& value = j[figure.name] = nullptr;
+    if (!IsKnown(figure, upright, settled, knows_values)) continue;
+    value = std::visit([&](auto member) { return FigureJson(e.*member); }, figure.summary);
+  }
+}
+
+EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& trial, int64_t episodes,
+                          ThreadPool& pool, const Progress& progress) {
+  if (trial.known_plant && !loaded.design_for) {
+    throw BadInput(Concat("--known-plant: expected a controller, which has a design plant, got ",
+                          loaded.name));
+  }
+  if (trial.known_plant && trial.unknown_plant) {
+    throw BadInput("--known-plant: expected no --unknown-plant with it");
+  }
+  EvalReport report;
+  report.policy = loaded.name;
+  report.known_plant = trial.known_plant;
+  report.env = TrialEnvironments(trial, &loaded);
+  report.model = InfoOfModel(report.env.mjcf, trial.model);
+  report.env.num_envs = static_cast<int>(episodes);
+  report.spec = SpecOf(report.env);
+  report.knows_values = ValueUnitsOf(*loaded.policy).gamma > 0;
+  report.only_balances = OnlyBalances(loaded.policy->kind());
+  constexpr int64_t kAtOnce = 4096;
+  for (int64_t done = 0; done < episodes; done += kAtOnce) {
+    EnvConfig config = report.env;
+    config.pool = &pool;
+    config.first_index += static_cast<uint64_t>(done);
+    config.num_envs = static_cast<int>(std::min(kAtOnce, episodes - done));
+    JudgeEpisodes(
+        *loaded.policy, trial.known_plant ? &loaded.design_for : nullptr, config,
+        [&](double part, double) {
+          if (progress) progress(static_cast<double>(done) + part, static_cast<double>(episodes));
+        },
+        report);
+  }
+  std::vector<EvaluationEpisode> results;
+  for (const JudgedEpisode& episode : report.episodes) results.push_back(episode.result);
+  report.figures = Summarize(results, report.spec.evaluation);
+  return report;
+}
+
+int64_t NumDesigned(const EvalReport& report) {
+  return std::ranges::count(report.episodes, true, &JudgedEpisode::for_its_plant);
+}
+
+std::string EvalJson(const EvalReport& report) {
+  ordered_json j;
+  j["policy"] = report.policy;
+  j["seed"] = report.env.seed;
+  j["physics"] = nullptr;
+  if (HasPlant(report.spec.task)) j["physics"] = report.env.engine->name;
+  j["task"] = report.spec.task;
+  if (!HasPlant(report.spec.task)) {
+    AddFigures(report.figures, report.spec, report.knows_values, j);
+    return PrintableJson(j);
+  }
+  for (const auto& [name, value] : PlantValues(report.env.plant(0))) j["plant"][name] = value;
+  j["model"] = report.model ? report.model->Json() : kBuiltIn;
+  j["unknown_plant"] = report.env.assumed_plant.has_value();
+  if (report.known_plant) j["known_plant"] = NumDesigned(report);
+  const TrialConditions conditions{report.env.disturbance(0), report.env.randomization};
+  const Options options = OptionsOf(conditions);
+  for (const Option& option : options.all()) {
+    if (option.name == "posterior" && conditions.randomization.posterior.empty()) continue;
+    j[option.section][option.name] = JsonOf(option);
+  }
+  AddFigures(report.figures, report.spec, report.knows_values, j);
+  return PrintableJson(j);
+}
+
+std::string EpisodesCsv(const EvalReport& report) {
+  CsvTable csv;
+  for (size_t i = 0; i < report.episodes.size(); ++i) {
+    csv.Add("episode", i);
+    AddCells(report, report.episodes[i], csv);
+    csv.EndRow();
+  }
+  return csv.text();
+}
+
+}  // namespace upswing

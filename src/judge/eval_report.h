@@ -1,0 +1,61 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "agents/config.h"
+#include "agents/loaded_policy.h"
+#include "base/json.h"
+#include "judge/trial.h"
+#include "pendulum/pendulum_env.h"
+#include "rl/evaluate.h"
+#include "runs/model_info.h"
+
+/// Evaluations of a policy over many episodes, and their reports.
+namespace upswing {
+
+/// One episode: its conditions and its result.
+struct JudgedEpisode {
+  std::vector<double> start;  // (S)
+  // Of the double pendulum:
+  Plant plant;
+  Disturbance disturbance;
+  bool for_its_plant = false;  // had its own controller (TrialArguments::known_plant)
+  EvaluationEpisode result;
+};
+
+/// A finished evaluation.
+struct EvalReport {
+  std::string policy;              // path
+  std::optional<ModelInfo> model;  // none: the built-in one
+  EnvConfig env;                   // common settings of all episodes
+  EnvSpec spec;
+  std::vector<JudgedEpisode> episodes;
+  Evaluation figures;
+  bool known_plant = false;    // a controller was designed for the plant of each episode
+  bool knows_values = false;   // the policy's file defines the unit of its values
+  bool only_balances = false;  // true for a controller that does not swing up
+};
+
+/// Evaluates a policy over `episodes` episodes of a trial's environments. With trial.known_plant a
+/// controller is designed for each episode's plant; if that fails, the given one is used.
+/// `progress` counts episodes. Throws BadInput.
+EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& trial, int64_t episodes,
+                          ThreadPool& pool, const Progress& progress);
+
+/// Number of episodes with a controller designed for their plant.
+int64_t NumDesigned(const EvalReport& report);
+
+/// Adds the figures of an evaluation to a JSON document.
+void AddFigures(const Evaluation& e, const EnvSpec& spec, bool knows_values,
+                nlohmann::ordered_json& j);
+
+/// The report as a JSON document.
+std::string EvalJson(const EvalReport& report);
+
+/// A row for each episode, counted from 0. A missing figure is empty, such as the swing-up time of
+/// an episode that is not upright at the end.
+std::string EpisodesCsv(const EvalReport& report);
+
+}  // namespace upswing

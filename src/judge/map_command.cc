@@ -1,0 +1,173 @@
+#include "judge/map_command.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <numeric>
+
+#include "agents/config.h"
+#include "base/error.h"
+#include "base/format.h"
+#include "base/text.h"
+#include "mujoco/engines.h"
+#include "os/file.h"
+#include "report/figure.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+constexpr int64_t kMostEpisodes = 10000000;
+
+/// Conditions of a policy's training, or of a controller's design.
+struct DesignConditions {
+  MapPoint point;               // plant and disturbance; starts hanging
+  Randomization randomization;  // around `point`
+  bool known = false;           // whether the file has more than the plant
+  std::string word;             // "training" or "design"
+};
+
+DesignConditions DesignOf(const LoadedPolicy& loaded) {
+  DesignConditions design;
+  design.point.plant = loaded.plant;
+  design.word = loaded.origin();
+  if (loaded.path.empty()) {
+    design.known = true;  // designed without noise, delay and random plants
+    return design;
+  }
+  const std::string& settings = loaded.policy->info().config;
+  if (settings.empty()) return design;
+  try {
+    const Config config = ConfigIn(settings, "config");
+    design.point.disturbance = config.disturbance;
+    design.randomization = config.randomization;
+    design.known = true;
+  } catch (const Error&) {  // NOLINT(bugprone-empty-catch): written by another version
+  }
+  return design;
+}
+
+/// Whether an axis sets this setting.
+bool OnAxis(const MapConfig& config, const Option& option) {
+  MapPoint point;
+  const Options options = OptionsOf(point);
+  return std::ranges::any_of(std::array{&config.x, &config.y}, [&](const MapAxis* axis) {
+    return std::ranges::any_of(options.Find(axis->name, "map"),
+                               [&](const Option* member) { return member->name == option.name; });
+  });
+}
+
+/// Values on no axis that differ from the training, such as `mass1 1.2 kg (training: 1), …`.
+std::string ChangesOf(const MapConfig& config, const DesignConditions& design) {
+  std::vector<std::string> texts;
+  for (const auto& [option, before] :
+       Differences(OptionsOf(config.point), OptionsOf(design.point))) {
+    if (OnAxis(config, option)) continue;
+    texts.push_back(fmt::format("{} {:.4g} {}", option.name, option.number(), option.unit));
+    if (option.section == "start") continue;
+    texts.back() += fmt::format(" ({}: {:.4g})", design.word, before->number());
+  }
+  if (config.env.assumed_plant) texts.emplace_back("the plant unknown to the policy");
+  return Join(texts, ", ");
+}
+
+/// Label of the training's point, if it is on the map.
+std::string DotOf(const MapConfig& config, const DesignConditions& design, bool changed) {
+  const MapAxis &x = config.x, &y = config.y;
+  if (x.start && y.start && !changed) return "hanging";
+  if (design.randomization.any()) return "middle of the training's range";
+  if (!changed && !config.start_given && design.known) {
+    return Concat("as in ", design.word);
+  }
+  const auto piece = [&](const MapAxis& axis) {
+    return Concat(axis.name, axis.start ? " hanging" : Concat(" as in ", design.word));
+  };
+  return Concat(piece(x), ", ", piece(y));
+}
+
+MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
+                   const DesignConditions& design) {
+  MapConfig config;
+  TrialArguments trial = a.trial;
+  trial.set.clear();  // `set` changes config.point, not the environments
+  config.env = TrialEnvironments(trial, &loaded);
+  config.point.plant = config.env.plants.front();
+  config.point.disturbance = config.env.disturbance(0);
+  config.x = ParseMapAxis(a.x, design.point, "--x");
+  config.y = ParseMapAxis(a.y, design.point, "--y");
+  CheckDifferent(config.x, config.y);
+  const Options options = OptionsOf(config.point);
+  for (MapAxis* axis : {&config.x, &config.y}) {
+    const bool in_plant = options.Find(axis->name, "map").front()->section != "disturbance";
+    if (!in_plant && !design.known) axis->at_training.reset();
+  }
+  for (const Option* option : ApplyChanges(options, a.trial.set)) {
+    config.start_given |= option->section == "start";
+    for (const MapAxis* axis : {&config.x, &config.y}) {
+      const auto members = options.Find(axis->name, "map");
+      if (std::ranges::find(members, option) == members.end()) continue;
+      throw BadInput(Concat("--set ", option->name,
+                            ": expected a quantity that is on no axis; the axis ", axis->name,
+                            " sets it"));
+    }
+  }
+  config.start_given |= config.x.start || config.y.start;
+  // Without noise, all episodes from one start are the same.
+  const int usual = config.start_given ? 1 : 10;
+  config.episodes = a.episodes > 0 ? static_cast<int>(a.episodes) : usual;
+  if (config.cells() * config.episodes > kMostEpisodes) {
+    throw BadInput(Concat("map: expected at most ", FormatCount(kMostEpisodes), " episodes, got ",
+                          FormatCount(config.cells()), " cells × ", config.episodes, " episodes"));
+  }
+  return config;
+}
+
+}  // namespace
+
+void MapArguments::Describe(Options& o) {
+  o.Add(&episodes, "episodes", {1, 100000}, "", "number of episodes per cell").usual =
+      "10; 1 if the start is given";
+  o.Add(&check, "check", kUnit, "", "share of cells to repeat in MuJoCo");
+}
+
+MapResult PlanMap(const MapArguments& a, const LoadedPolicy& loaded) {
+  if (!HasPlant(loaded.task)) {
+    throw BadInput(
+        Concat("map: expected a policy of ", kDoublePendulum, ", got one of ", loaded.task));
+  }
+  MapResult map;
+  const DesignConditions design = DesignOf(loaded);
+  map.config = ConfigOf(a, loaded, design);
+  map.changes = ChangesOf(map.config, design);
+  map.dot = DotOf(map.config, design, !map.changes.empty());
+  map.policy = loaded.name;
+  map.model = InfoOfModel(loaded.mjcf, "");
+  return map;
+}
+
+fs::path MapFolder(const MapArguments& a, const LoadedPolicy& loaded, const MapResult& map) {
+  const fs::path folder =
+      FigureFolder(a.out, loaded, Concat("map-", map.config.x.name, "-", map.config.y.name));
+  CheckCanDraw();
+  return folder;
+}
+
+void FillMap(const MapArguments& a, const LoadedPolicy& loaded, ThreadPool& pool,
+             const Progress& progress, MapResult& map) {
+  std::vector<int64_t> all(static_cast<size_t>(map.config.cells()));
+  std::iota(all.begin(), all.end(), int64_t{0});
+  const auto begin = Clock::now();
+  map.cells = RunMap(map.config, *loaded.policy, all, pool, progress);
+  map.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+  if (map.config.env.engine == &kMuJoCo) return;
+  map.checked = DrawCells(map.config, a.check);
+  MapConfig mujoco = map.config;
+  mujoco.env.engine = &kMuJoCo;
+  map.in_mujoco = RunMap(mujoco, *loaded.policy, map.checked, pool, progress);
+}
+
+}  // namespace upswing

@@ -1,0 +1,257 @@
+#include "judge/map_grid.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <mutex>
+#include <numbers>
+#include <numeric>
+
+#include "base/error.h"
+#include "base/text.h"
+#include "rl/evaluate.h"
+
+namespace upswing {
+namespace {
+
+constexpr int64_t kDefaultCells = 31;  // odd: the middle of ±50% is a cell
+constexpr int64_t kMostCells = 1000;
+// Episodes that step together: whole vectors, with network and activations in the L2 cache.
+constexpr int kTaskEpisodes = 64;
+
+/// Consecutive episodes of the map that run together, from one or more cells.
+struct EpisodeRange {
+  int64_t first;
+  int count;
+};
+
+/// Swing-up time (s) of an episode that succeeds.
+using EpisodeResult = std::optional<double>;
+
+/// The common value of the settings; none if they differ.
+std::optional<double> CommonValue(const std::vector<const Option*>& members) {
+  const double first = *std::get<double*>(members.front()->target);
+  for (const Option* member : members) {
+    if (*std::get<double*>(member->target) != first) return std::nullopt;
+  }
+  return first;
+}
+
+/// An end of an axis: a number, or a percentage relative to the training's value.
+double ParseEnd(std::string_view text, const MapAxis& axis, const std::string& where) {
+  const bool percent = text.ends_with('%');
+  if (percent) text.remove_suffix(1);
+  const auto number = ParseNumber(text);
+  if (!number || !std::isfinite(*number)) {
+    throw BadInput(Concat(where, ": expected a number or a percentage, got \"", text, "\""));
+  }
+  if (!percent) return *number;
+  if (!axis.at_training || *axis.at_training == 0) {
+    throw BadInput(Concat(where, ": expected a number, got a percentage of ",
+                          axis.at_training ? "a training value of 0" : "unequal training values"));
+  }
+  return *axis.at_training * (1 + *number / 100);
+}
+
+int64_t ParseCells(std::string_view text, const std::string& where) {
+  const auto cells = ParseInteger(text);
+  if (!cells || *cells < 2 || *cells > kMostCells) {
+    throw BadInput(Concat(where, ": expected 2 to ", kMostCells, " cells, got \"", text, "\""));
+  }
+  return *cells;
+}
+
+std::vector<EpisodeResult> RunRange(const MapConfig& config, const Policy& policy,
+                                    const EpisodeRange& range) {
+  PendulumEnvConfig env_config = config.env;
+  env_config.num_envs = range.count;
+  env_config.stream = "map";
+  env_config.first_index = static_cast<uint64_t>(range.first);
+  env_config.plants.clear();
+  env_config.disturbances.clear();
+  std::vector<PendulumState> starts;
+  for (int i = 0; i < range.count; ++i) {
+    const MapPoint point = config.PointOf((range.first + i) / config.episodes);
+    env_config.plants.push_back(point.plant);
+    env_config.disturbances.push_back(point.disturbance);
+    starts.push_back(point.start());
+  }
+  PendulumEnv env(env_config);
+  for (int i = 0; config.start_given && i < range.count; ++i) {
+    env.SetState(i, starts[static_cast<size_t>(i)]);
+  }
+
+  std::vector<EpisodeResult> results;
+  for (const EvaluationEpisode& episode : EvaluateEpisodes(policy, env)) {
+    results.push_back(episode.success ? episode.swing_up_seconds : std::nullopt);
+  }
+  return results;
+}
+
+/// Splits the episodes of the cells into ranges; neighbouring cells may share a range.
+std::vector<EpisodeRange> RangesOf(std::span<const int64_t> cells, int64_t episodes) {
+  std::vector<EpisodeRange> ranges;
+  for (const int64_t cell : cells) {
+    int64_t first = cell * episodes;
+    const int64_t end = first + episodes;
+    while (first < end) {
+      const bool goes_on = !ranges.empty() && ranges.back().count < kTaskEpisodes &&
+                           ranges.back().first + ranges.back().count == first;
+      if (!goes_on) ranges.push_back({first, 0});
+      const int64_t count = std::min<int64_t>(end - first, kTaskEpisodes - ranges.back().count);
+      ranges.back().count += static_cast<int>(count);
+      first += count;
+    }
+  }
+  return ranges;
+}
+
+MapCell CellOf(std::span<const EpisodeResult> episodes) {
+  std::vector<double> seconds;
+  for (const EpisodeResult& episode : episodes) {
+    if (episode) seconds.push_back(*episode);
+  }
+  const auto successes = static_cast<int64_t>(seconds.size());
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  return {successes, seconds.empty() ? none : QuartilesOf(std::move(seconds)).median};
+}
+
+}  // namespace
+
+void MapPoint::Describe(Options& o) {
+  plant.Describe(o);
+  disturbance.Describe(o);
+  o.Section("start");
+  o.Add(&q1, "q1", {-360, 360}, "°", "start angle of link 1; 0: hanging");
+  o.Add(&q2, "q2", {-360, 360}, "°", "start angle of link 2 relative to link 1");
+  o.Add(&w1, "w1", {-50, 50}, "rad/s", "start velocity of q1");
+  o.Add(&w2, "w2", {-50, 50}, "rad/s", "start velocity of q2");
+}
+
+PendulumState MapPoint::start() const {
+  constexpr double kDegree = std::numbers::pi / 180;
+  return {q1 * kDegree, q2 * kDegree, w1, w2};
+}
+
+std::string MapAxis::label() const { return unit.empty() ? name : Concat(name, " (", unit, ")"); }
+
+MapAxis ParseMapAxis(const std::string& text, const MapPoint& training, const std::string& where) {
+  const size_t equals = text.find('=');
+  const auto pieces = Split(std::string_view(text).substr(std::min(equals, text.size())), ':');
+  if (equals == std::string::npos || pieces.size() < 2 || pieces.size() > 3) {
+    std::vector<std::string> names;
+    MapPoint point;
+    const Options options = OptionsOf(point);
+    for (const Option& option : options.all()) names.push_back(option.name);
+    for (const auto& alias : options.aliases()) names.push_back(alias.name);
+    throw BadInput(Concat(where, ": expected NAME=FROM:TO or NAME=FROM:TO:CELLS, got \"", text,
+                          "\"; NAME is one of ", Join(names, ", ")));
+  }
+  MapAxis axis;
+  axis.name = Trim(std::string_view(text).substr(0, equals));
+  const std::string place = Concat(where, " ", axis.name);
+  MapPoint point = training;
+  const Options options = OptionsOf(point);
+  const std::vector<const Option*> members = options.Find(axis.name, where);
+  axis.unit = members.front()->unit;
+  axis.start = members.front()->section == "start";
+  axis.at_training = CommonValue(members);
+
+  const double from = ParseEnd(pieces[0].substr(1), axis, place);
+  const double to = ParseEnd(pieces[1], axis, place);
+  for (const double end : {from, to}) options.Set(axis.name, FormatNumber(end), place);
+  if (from >= to) {
+    throw BadInput(
+        Concat(place, ": expected FROM < TO, got ", FormatNumber(from), " and ", FormatNumber(to)));
+  }
+  // A setting with steps has a cell per step by default.
+  const double step = members.front()->step;
+  const int64_t usual = step > 0 ? std::llround((to - from) / step) + 1 : kDefaultCells;
+  const int64_t cells = pieces.size() == 3 ? ParseCells(pieces[2], place) : usual;
+  for (int64_t i = 0; i < cells; ++i) {
+    // With these weights, the middle of the axis is exact.
+    const double between =
+        (from * static_cast<double>(cells - 1 - i) + to * static_cast<double>(i)) /
+        static_cast<double>(cells - 1);
+    axis.values.push_back(i == 0 ? from : i == cells - 1 ? to : between);
+    options.Set(axis.name, FormatNumber(axis.values.back()), place);
+  }
+  return axis;
+}
+
+void CheckDifferent(const MapAxis& x, const MapAxis& y) {
+  MapPoint point;
+  const Options options = OptionsOf(point);
+  for (const Option* a : options.Find(x.name, "--x")) {
+    for (const Option* b : options.Find(y.name, "--y")) {
+      if (a != b) continue;
+      throw BadInput(Concat("--x and --y: expected two different quantities, got ", x.name, " and ",
+                            y.name, ", which both set ", a->name));
+    }
+  }
+}
+
+MapPoint MapConfig::PointOf(int64_t cell) const {
+  MapPoint result = point;
+  const Options options = OptionsOf(result);
+  const auto set = [&](const MapAxis& axis, size_t index) {
+    for (const Option* member : options.Find(axis.name, "map")) {
+      *std::get<double*>(member->target) = axis.values[index];
+    }
+  };
+  const auto i = static_cast<size_t>(cell);
+  set(x, i % x.values.size());
+  set(y, i / x.values.size());
+  return result;
+}
+
+std::vector<MapCell> RunMap(const MapConfig& config, const Policy& policy,
+                            std::span<const int64_t> cells, ThreadPool& pool,
+                            const Progress& progress) {
+  const std::vector<EpisodeRange> ranges = RangesOf(cells, config.episodes);
+  std::vector<std::vector<EpisodeResult>> results(ranges.size());
+  std::mutex mutex;
+  double done = 0;
+  const double total = static_cast<double>(cells.size()) * config.episodes;
+  std::atomic<bool> failed = false;  // stops the other ranges
+  pool.ParallelFor(static_cast<int>(ranges.size()), [&](int range) {
+    if (failed) return;
+    const auto i = static_cast<size_t>(range);
+    try {
+      results[i] = RunRange(config, policy, ranges[i]);
+      const std::lock_guard lock(mutex);
+      done += ranges[i].count;
+      if (progress) progress(done, total);
+    } catch (...) {
+      failed = true;
+      throw;
+    }
+  });
+
+  // The ranges follow the order of the cells.
+  std::vector<EpisodeResult> episodes;
+  for (const auto& part : results) episodes.insert(episodes.end(), part.begin(), part.end());
+  std::vector<MapCell> map;
+  const auto count = static_cast<size_t>(config.episodes);
+  for (size_t i = 0; i < cells.size(); ++i) {
+    map.push_back(CellOf(std::span(episodes).subspan(i * count, count)));
+  }
+  return map;
+}
+
+std::vector<int64_t> DrawCells(const MapConfig& config, double share) {
+  if (share == 0) return {};
+  std::vector<int64_t> cells(static_cast<size_t>(config.cells()));
+  std::iota(cells.begin(), cells.end(), int64_t{0});
+  const auto wanted = static_cast<size_t>(
+      std::max<int64_t>(1, std::llround(share * static_cast<double>(config.cells()))));
+  // The first part of a Fisher-Yates shuffle.
+  Rng rng(config.env.seed, "map: cells to check");
+  for (size_t i = 0; i < wanted; ++i) std::swap(cells[i], cells[i + rng.Below(cells.size() - i)]);
+  cells.resize(wanted);
+  std::ranges::sort(cells);
+  return cells;
+}
+
+}  // namespace upswing

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/policy.h"
+#include "base/progress.h"
+#include "base/thread_pool.h"
+#include "pendulum/pendulum_env.h"
+
+/// Maps of a policy's success over two quantities: a grid of cells, with some episodes in each.
+namespace upswing {
+
+/// The conditions that a cell can set: plant, disturbance, and the start of every episode.
+struct MapPoint {
+  Plant plant;
+  Disturbance disturbance;
+  double q1 = 0, q2 = 0;  // degrees
+  double w1 = 0, w2 = 0;  // rad/s
+
+  void Describe(Options& options);
+  PendulumState start() const;
+};
+
+/// One axis of the grid.
+struct MapAxis {
+  std::string name;                   // of a setting of MapPoint, or an alias
+  std::string unit;                   // such as "kg"
+  std::vector<double> values;         // (n) one for each cell, ascending
+  std::optional<double> at_training;  // value in the training, if it is a single number
+  bool start = false;                 // whether it sets where episodes begin
+
+  /// Name and unit, such as "mass2 (kg)".
+  std::string label() const;
+};
+
+/// Parses NAME=FROM:TO[:CELLS]. CELLS defaults to 31, or to one cell per step for a setting with
+/// steps. Both ends may be percentages relative to the value in `training`. Throws BadInput with a
+/// message that begins with `where`.
+MapAxis ParseMapAxis(const std::string& text, const MapPoint& training, const std::string& where);
+
+/// Throws BadInput if both axes set the same quantity.
+void CheckDifferent(const MapAxis& x, const MapAxis& y);
+
+/// The definition of a map.
+struct MapConfig {
+  MapPoint point;            // conditions on neither axis
+  MapAxis x, y;              // (nx), (ny)
+  bool start_given = false;  // start at `point`'s start; else hanging with the usual noise
+  int episodes = 1;          // per cell
+  PendulumEnvConfig env;     // other conditions; its seed also draws the cells to check
+
+  int64_t cells() const { return static_cast<int64_t>(x.values.size() * y.values.size()); }
+  /// The conditions of cell `i`; cells are counted along x first.
+  MapPoint PointOf(int64_t cell) const;
+};
+
+/// Result of a cell's episodes.
+struct MapCell {
+  int64_t successes = 0;
+  double swing_up_seconds = 0;  // median over successful episodes; NaN if there are none
+};
+
+/// Results of the listed cells, in the order of the list. The pool shares the work without changing
+/// a bit. A cell's result does not depend on the other cells. `progress` counts episodes.
+std::vector<MapCell> RunMap(const MapConfig& config, const Policy& policy,
+                            std::span<const int64_t> cells, ThreadPool& pool,
+                            const Progress& progress);
+
+/// Draws `share` of the cells by the seed, at least one if the share is not 0, in ascending order.
+std::vector<int64_t> DrawCells(const MapConfig& config, double share);
+
+}  // namespace upswing

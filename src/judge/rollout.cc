@@ -1,0 +1,209 @@
+#include "judge/rollout.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "agents/config.h"
+#include "base/error.h"
+#include "base/text.h"
+
+namespace upswing {
+namespace {
+
+/// Control steps per second, a whole number in all tasks.
+double StepsPerSecond(const EnvSpec& spec) { return std::round(1 / spec.step_seconds); }
+
+/// The policy's values (Q) in units of reward.
+std::vector<double> ValuesOf(const Policy& policy, Matrix<const float> obs,
+                             Policy::Memory& memory) {
+  std::vector<float> numbers(static_cast<size_t>(policy.num_values()));
+  policy.Values(obs, Matrix<float>(numbers.data(), 1, policy.num_values()), memory);
+  const double scale = ValueUnitsOf(policy).reward_scale;
+  std::vector<double> values;
+  values.reserve(numbers.size());
+  for (const float value : numbers) values.push_back(value / scale);
+  return values;
+}
+
+/// Adds the estimates that the policy has to a row.
+void AddEstimates(const Policy& policy, Matrix<const float> obs, Policy::Memory& memory,
+                  RolloutRow& row) {
+  if (policy.num_values() > 0) row.q = ValuesOf(policy, obs, memory);
+  if (!policy.has_spread()) return;
+  row.spread.emplace();
+  policy.Spread(obs, {&row.spread->low, 1, 1}, {&row.spread->high, 1, 1}, memory);
+}
+
+/// Sets the double pendulum's reward for the state and torque of a row.
+void RewardRow(const Plant& plant, RolloutRow& row) {
+  const auto terms = RewardTerms(plant, StateOf(row), row.torque);
+  row.terms.assign(terms.begin(), terms.end());
+  row.reward = 0;
+  for (const double term : row.terms) row.reward += term;
+  row.at_goal = Inverted(StateOf(row));
+}
+
+}  // namespace
+
+int64_t RolloutSteps(const EnvSpec& spec, double seconds) {
+  return std::llround(seconds * StepsPerSecond(spec));
+}
+
+PendulumState StateOf(const RolloutRow& row) {
+  return {row.state[0], row.state[1], row.state[2], row.state[3]};
+}
+
+Episode::Episode(RolloutConfig config)
+    : config_(std::move(config)),
+      env_([&] {
+        EnvConfig env = config_.env;
+        env.episode_seconds = config_.seconds + 1;
+        return MakeEnv(env);
+      }()),
+      result_(env_->spec()),
+      rollout_{env_->spec(), {}, Plant(), Disturbance()} {
+  if (config_.start) env_->SetState(0, *config_.start);
+  if (config_.policy != nullptr) memory_ = config_.policy->Start(1);
+  if (pendulum() == nullptr) return;
+  rollout_.plant = pendulum()->plant(0);
+  rollout_.disturbance = pendulum()->disturbance(0);
+}
+
+void Episode::Step(bool motor, const std::array<double, 2>& push) {
+  const std::array<double, 2> before =
+      inputs_.empty() ? std::array<double, 2>{} : inputs_.back().push;
+  if (push != before) pendulum()->Push(0, push);
+  inputs_.push_back({motor, push});
+  const size_t step = rollout_.rows.size();
+  double torque = 0;
+  if (config_.policy != nullptr) config_.policy->Act(env_->obs(), {&torque, 1, 1}, *memory_);
+  if (step < config_.schedule.size()) torque = config_.schedule[step];
+  if (!motor) torque = 0;
+  RolloutRow row;
+  row.t = static_cast<double>(step) / StepsPerSecond(rollout_.spec);
+  row.state.resize(rollout_.spec.state_names.size());
+  env_->GetState(0, row.state);
+  row.chosen = torque;
+  if (config_.estimates) AddEstimates(*config_.policy, env_->obs(), *memory_, row);
+  env_->Step({&torque, 1, 1}, result_);
+  row.torque = result_.torque[0];
+  row.at_goal = result_.at_goal[0] != 0;
+  row.reward = result_.reward[0];
+  row.terms = result_.reward_terms;
+  if (pendulum() != nullptr) RewardRow(rollout_.plant, row);
+  rollout_.rows.push_back(std::move(row));
+  if (pendulum() == nullptr || result_.terminated[0] == 0) return;
+  throw Failure(
+      Concat("the simulation diverged after t = ", FormatNumber(rollout_.rows.back().t), " s"));
+}
+
+void Episode::GoBack(int64_t steps) {
+  std::vector<Input> inputs = inputs_;
+  inputs.resize(static_cast<size_t>(std::clamp<int64_t>(steps, 0, this->steps())));
+  *this = Episode(config_);
+  for (const Input& input : inputs) Step(input.motor, input.push);
+}
+
+PendulumState Episode::StateOfRow(int64_t k) const {
+  return k < steps() ? StateOf(rollout_.rows[static_cast<size_t>(k)]) : pendulum()->state(0);
+}
+
+PendulumState Episode::StateAt(double steps) const {
+  const auto k = static_cast<int64_t>(std::floor(steps));
+  const double share = steps - static_cast<double>(k);
+  const PendulumState a = StateOfRow(k);
+  return share > 0 ? StateBetween(a, StateOfRow(k + 1), kControlPeriod, share) : a;
+}
+
+double Episode::TorqueAt(double steps) const {
+  const auto k = std::min(static_cast<int64_t>(std::floor(steps)), this->steps() - 1);
+  return k < 0 ? 0 : rollout_.rows[static_cast<size_t>(k)].torque;
+}
+
+Rollout RunRollout(const RolloutConfig& config) {
+  Episode episode(config);
+  // Step once more than the rollout has steps: the extra step computes the motor's torque in the
+  // last state.
+  const int64_t steps = RolloutSteps(episode.rollout().spec, config.seconds);
+  while (episode.steps() <= steps && !episode.done()) episode.Step();
+  return episode.rollout();
+}
+
+std::string TorqueText(const Rollout& rollout) {
+  const bool pendulum = HasPlant(rollout.spec.task);
+  const std::vector<RolloutRow>& rows = rollout.rows;
+  // Leave out the double pendulum's last state, because no step follows it.
+  const size_t steps = rows.size() - (pendulum && rows.size() > 1 ? 1 : 0);
+  TorqueTally tally(1, rollout.spec.step_seconds);
+  for (size_t k = 0; k < steps; ++k) {
+    const size_t after = std::min(pendulum ? k + 1 : k, rows.size() - 1);
+    tally.Add({&rows[k].torque, 1}, rows[after].at_goal);
+  }
+  const bool upright = !rollout.spec.evaluation.by_return() && tally.has_goal_steps();
+  EvaluationEpisode e;
+  tally.Finish(upright, e);
+  const std::string& unit = rollout.spec.action_unit;
+  const std::string text =
+      fmt::format("peak {:.4g} {}, rms {:.4g} {}, variation {:.4g} {}/s", e.peak_torque, unit,
+                  e.rms_torque, unit, e.torque_variation, unit);
+  if (!upright) return text;
+  return text + fmt::format(", once upright {:.4g} {}/s", e.goal_variation, unit);
+}
+
+std::string RolloutCsv(const Rollout& rollout) {
+  const bool pendulum = HasPlant(rollout.spec.task);
+  std::string csv;
+  if (pendulum) {
+    csv =
+        "t,qpos0,qpos1,qvel0,qvel1,torque,energy,height,inverted,reward,energy_reward,"
+        "height_reward,balance_reward,velocity_penalty,torque_penalty\n";
+  } else {
+    csv = Concat("t,", Join(rollout.spec.state_names, ","), ",torque,reward,",
+                 Join(rollout.spec.term_names, ","), '\n');
+  }
+  for (const RolloutRow& row : rollout.rows) {
+    std::vector<double> cells{row.t};
+    cells.insert(cells.end(), row.state.begin(), row.state.end());
+    cells.push_back(row.torque);
+    if (pendulum) {
+      const PendulumState s = StateOf(row);
+      const double inverted = row.at_goal ? 1 : 0;
+      cells.insert(cells.end(), {Energy(rollout.plant, s), TipHeight(rollout.plant, s), inverted});
+    }
+    cells.push_back(row.reward);
+    for (const double term : row.terms) cells.push_back(term + 0.0);  // turns -0 into 0
+    std::vector<std::string> texts;
+    texts.reserve(cells.size());
+    for (const double cell : cells) texts.push_back(FormatNumber(cell));
+    csv += Join(texts, ",") + '\n';
+  }
+  return csv;
+}
+
+std::string JudgementText(const Policy& policy, const EnvConfig& config) {
+  const std::unique_ptr<VectorEnv> env = MakeEnv(config);
+  const EvaluationEpisode episode = EvaluateEpisodes(policy, *env).front();
+  std::string upright;
+  if (!env->spec().evaluation.by_return()) {
+    upright = episode.swing_up_seconds
+                  ? fmt::format("upright from {:.2f} s to the end, ", *episode.swing_up_seconds)
+                  : "not upright at the end, ";
+  }
+  return fmt::format("{}, {}return {:.6g}", episode.success ? "success" : "failure", upright,
+                     episode.reward_sum);
+}
+
+std::string EpisodeText(const Rollout& rollout) {
+  if (!HasPlant(rollout.spec.task)) return "";
+  std::string text = PlantText(rollout.plant);
+  const Options options = OptionsOf(rollout.disturbance);
+  for (const Option& option : options.all()) {
+    if (option.number() > 0) text += Concat(", ", option.name, " ", FormatNumber(option.number()));
+  }
+  return text;
+}
+
+}  // namespace upswing

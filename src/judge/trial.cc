@@ -1,0 +1,164 @@
+#include "judge/trial.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "agents/task.h"
+#include "base/error.h"
+#include "base/text.h"
+#include "mujoco/engines.h"
+#include "os/file.h"
+#include "runs/config_files.h"
+#include "runs/plant_file.h"
+#include "runs/run_folder.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The environments of a policy for a task without plant, sensors and engines. Throws BadInput if
+/// the arguments set one of these.
+EnvConfig OtherTask(const TrialArguments& a, const LoadedPolicy& loaded) {
+  const auto refuse = [&](const std::string& flag) {
+    throw BadInput(
+        Concat(flag, ": expected none, because the task ", loaded.task, " has no such setting"));
+  };
+  if (!a.set.empty()) refuse("--set");
+  if (!a.model.empty()) refuse("--model");
+  if (!a.plant.empty()) refuse("--plant");
+  if (a.unknown_plant) refuse("--unknown-plant");
+  if (!a.flags.empty()) refuse(FlagOf(a.flags.front().name));
+  EnvConfig env;
+  env.task = loaded.task;
+  env.seed = static_cast<uint64_t>(a.seed);
+  env.stream = "evaluation";
+  return env;
+}
+
+/// The folder for figures if the user names none.
+fs::path DefaultOut(const LoadedPolicy& loaded, const std::string& name) {
+  const bool has_file = !loaded.path.empty();
+  const fs::path file = loaded.path, run = file.parent_path();
+  const std::string stem = has_file ? file.stem().string() : loaded.policy->kind();
+  const bool of_run = has_file && fs::exists(run / RunFolder::kConfig);
+  return FreePath(of_run ? run / name : fs::path("runs") / Concat(name, "-", stem));
+}
+
+/// Parses the value of --start: a number for each state variable, such as q1,q2,w1,w2 (rad, rad/s).
+/// Throws BadInput.
+std::vector<double> ParseStart(const std::string& text, const EnvSpec& spec) {
+  const std::vector<std::string_view> pieces = Split(text, ',');
+  const size_t S = spec.state_names.size();
+  std::vector<double> numbers;
+  for (const std::string_view piece : pieces) {
+    const auto number = ParseNumber(piece);
+    if (number && std::isfinite(*number)) numbers.push_back(*number);
+  }
+  if (pieces.size() != S || numbers.size() != S) {
+    throw BadInput(Concat("--start: expected ", S, " numbers ", Join(spec.state_names, ","),
+                          ", got \"", text, "\""));
+  }
+  return numbers;
+}
+
+}  // namespace
+
+TrialConditions ConditionsOf(const std::vector<FlagValue>& flags) {
+  TrialConditions conditions;
+  SetFlags(OptionsOf(conditions), flags);
+  return conditions;
+}
+
+EnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded) {
+  EnvConfig env;
+  if (loaded != nullptr && !HasPlant(loaded->task)) return OtherTask(a, *loaded);
+  env.engine = &FindEngine(a.physics, "--physics");
+  Plant plant = loaded != nullptr ? loaded->plant : Plant();
+  std::vector<FlagValue> flags;
+  if (!a.plant.empty()) {
+    if (!a.model.empty()) {
+      throw BadInput("--plant: expected no --model with it, which has its own plant");
+    }
+    PlantFile file = ReadPlantFile(a.plant);
+    plant = file.plant;
+    flags = std::move(file.conditions);
+  }
+  flags.insert(flags.end(), a.flags.begin(), a.flags.end());
+  const TrialConditions conditions = ConditionsOf(flags);
+  env.disturbances = {conditions.disturbance};
+  env.randomization = conditions.randomization;
+  (void)env.randomization.MakePosterior();  // throws if there is none to draw from
+  if (a.unknown_plant && loaded == nullptr) {
+    throw BadInput("--unknown-plant: expected a policy with it, got none");
+  }
+  if (loaded != nullptr) {
+    env.mjcf = loaded->mjcf;
+    env.memory = loaded->memory();
+    if (loaded->identifies()) env.identified_from = loaded->plant;
+    if (a.unknown_plant) env.assumed_plant = loaded->plant;
+  }
+  env.plants = {ChangedPlant(plant, a.model, a.set, env.mjcf)};
+  env.seed = static_cast<uint64_t>(a.seed);
+  env.stream = "evaluation";
+  return env;
+}
+
+std::unique_ptr<VectorEnv> OneEpisode(EnvConfig config, int index) {
+  config.num_envs = 1;
+  config.first_index += static_cast<uint64_t>(index);
+  return MakeEnv(config);
+}
+
+std::string ChangesText(const EnvConfig& env) {
+  if (!HasPlant(env.task)) return "";
+  const TrialConditions now{env.disturbance(0), env.randomization}, usual;
+  std::vector<std::string> texts;
+  for (const auto& [option, before] : Differences(OptionsOf(now), OptionsOf(usual))) {
+    if (option.name == "posterior") continue;  // numbers of randomize_posterior
+    texts.push_back(Concat(option.name, " ", option.text()));
+  }
+  if (env.assumed_plant) texts.emplace_back("the plant unknown to the policy");
+  return Join(texts, ", ");
+}
+
+std::string PlantChangesText(const Plant& plant, const LoadedPolicy& loaded) {
+  std::vector<std::string> texts;
+  for (const auto& [now, before] : Differences(OptionsOf(plant), OptionsOf(loaded.plant))) {
+    texts.push_back(fmt::format("{} {:.4g} {} ({}: {:.4g})", now.name, now.number(), now.unit,
+                                loaded.origin(), before->number()));
+  }
+  return Join(texts, ", ");
+}
+
+fs::path FigureFolder(const std::string& out, const LoadedPolicy& loaded, const std::string& name) {
+  if (out.empty()) return DefaultOut(loaded, name);
+  fs::path folder = out;
+  for (const char* extension : {".svg", ".png", ".csv"}) {
+    if (folder.extension() == extension) {
+      throw BadInput(
+          Concat("--out: expected a folder for several files, got the name of a file: ", out));
+    }
+  }
+  CheckFree(folder);
+  return folder;
+}
+
+RolloutConfig TrialEpisode(const TrialArguments& a, const LoadedPolicy* loaded) {
+  if (a.start && a.is_of_eval()) {
+    throw BadInput("--start: expected none with --episode, which has its own start");
+  }
+  RolloutConfig config;
+  if (loaded != nullptr) config.policy = loaded->policy.get();
+  config.env = TrialEnvironments(a, loaded);
+  config.env.first_index = static_cast<uint64_t>(std::max<int64_t>(0, a.episode));
+  const char* usual = TaskNamed(config.env.task).usual_start;
+  if (a.start || (!a.is_of_eval() && usual != nullptr)) {
+    config.start = ParseStart(a.start ? *a.start : usual, SpecOf(config.env));
+  }
+  return config;
+}
+
+}  // namespace upswing

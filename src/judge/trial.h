@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "agents/config.h"
+#include "agents/loaded_policy.h"
+#include "judge/rollout.h"
+#include "pendulum/pendulum_env.h"
+
+/// The plant, sensors and motor for `eval`, `simulate` and `plot`. The same flags make the same
+/// episodes in all of them.
+namespace upswing {
+
+/// Differences of a trial from the training.
+struct TrialArguments {
+  std::string model, physics = "mujoco";
+  std::string plant;  // name of a plant file or a shipped plant; empty: the policy's
+  std::vector<std::string> set;
+  std::vector<FlagValue> flags;  // settings of Disturbance and Randomization
+  int64_t seed = 0;
+  bool unknown_plant = false;
+  bool known_plant = false;  // design a controller for each episode's plant; only in eval
+  // The single episode of `simulate`, `plot` and `view`: its start, or its index in `eval`
+  // (negative: none).
+  std::optional<std::string> start;
+  int64_t episode = -1;
+
+  bool is_of_eval() const { return episode >= 0; }
+};
+
+/// Disturbances of sensors and motor, and random plants.
+struct TrialConditions {
+  Disturbance disturbance;
+  Randomization randomization;
+
+  void Describe(Options& o) {
+    disturbance.Describe(o);
+    randomization.Describe(o);
+  }
+};
+
+/// The conditions that flags set, later ones over earlier ones. Throws BadInput.
+TrialConditions ConditionsOf(const std::vector<FlagValue>& flags);
+
+/// The environments of a trial: the environments of the policy's training with the changes of the
+/// arguments; without a policy (null), environments of the built-in plant. Environment i has
+/// episode i. Throws BadInput.
+EnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded);
+
+/// An environment whose only episode is episode `index` of `config`.
+std::unique_ptr<VectorEnv> OneEpisode(EnvConfig config, int index);
+
+/// Conditions that differ from the defaults, such as `delay 0.02, …`; empty if there are none.
+std::string ChangesText(const EnvConfig& env);
+
+/// Differences of a plant from the policy's own plant, such as `mass2 1.3 kg (training: 1), …`;
+/// empty if there are none.
+std::string PlantChangesText(const Plant& plant, const LoadedPolicy& loaded);
+
+/// The folder for figures of a policy: `out`; if that is empty, NAME in the run folder,
+/// runs/NAME-FILE for another policy file or runs/NAME-CONTROLLER for a controller, with -2, -3, …
+/// if the folder exists. Throws BadInput if `out` is not empty or has the name of a figure.
+std::filesystem::path FigureFolder(const std::string& out, const LoadedPolicy& loaded,
+                                   const std::string& name);
+
+/// The single episode of the arguments, with a policy (null: none) that must outlive it. Throws
+/// BadInput.
+RolloutConfig TrialEpisode(const TrialArguments& a, const LoadedPolicy* loaded);
+
+}  // namespace upswing

@@ -1,0 +1,216 @@
+#include "mujoco/mjcf_check.h"
+
+#include <tinyxml2.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+#include <vector>
+
+#include "base/error.h"
+#include "base/text.h"
+
+namespace upswing {
+namespace {
+
+constexpr int kMostElements = 200;  // the built-in model has 15
+constexpr int kMostLevels = 10;     // of nesting; the built-in model has 5
+constexpr size_t kMostName = 100;   // bytes
+
+constexpr double kLargest = 1e6;  // largest magnitude of a number
+
+/// An element with its allowed attributes and child elements, as words.
+struct Element {
+  std::string name, attributes, children = {};
+};
+
+/// Attributes that hold a name. Other attributes hold numbers and kKeywords; MuJoCo checks which
+/// ones and how many.
+constexpr std::string_view kNames =
+    "name class childclass model joint actuator body1 body2 target eulerseq";
+constexpr std::string_view kKeywords =
+    "false true auto enable disable degree radian local Euler RK4 implicit implicitfast PGS CG "
+    "Newton dense sparse pyramidal elliptic hinge slide ball free capsule sphere ellipsoid "
+    "cylinder box plane fixed track trackcom targetbody targetbodycom spot directional point";
+
+/// The elements that a model may contain.
+std::vector<Element> MakeElements() {
+  const std::string named = "name class ", place = "pos quat axisangle xyaxes zaxis euler ",
+                    shape = named + place + "type size fromto rgba group ";
+  return {
+      {"mujoco", "model", "compiler option default worldbody actuator sensor contact keyframe"},
+      {"compiler", "angle autolimits coordinate inertiafromgeom eulerseq"},
+      {"option",
+       "timestep gravity integrator iterations ls_iterations tolerance ls_tolerance solver "
+       "jacobian cone density viscosity",
+       "flag"},
+      // The flags that switch off gravity, springs, damping, the motor or its limit are left out.
+      {"flag",
+       "contact constraint equality frictionloss limit warmstart eulerdamp refsafe midphase "
+       "nativeccd island energy sensor"},
+      {"default", "class", "default joint geom site motor"},
+      {"worldbody", "", "body light camera site"},
+      {"body", "name childclass " + place, "joint geom body inertial light camera site"},
+      {"inertial", "mass diaginertia fullinertia " + place},
+      {"joint", named +
+                    "type axis pos ref springref stiffness damping armature frictionloss limited "
+                    "range solreflimit solimplimit solreffriction solimpfriction margin group"},
+      {"geom", shape + "mass density contype conaffinity condim friction margin solref solimp"},
+      {"site", shape},
+      {"camera", named + place + "mode target fovy"},
+      {"light", named + "mode target type directional castshadow active pos dir diffuse ambient "
+                        "specular attenuation cutoff exponent"},
+      {"actuator", "", "motor"},
+      {"motor", named + "joint gear ctrllimited ctrlrange group"},
+      {"sensor", "", "jointpos jointvel actuatorfrc"},
+      {"jointpos", "name joint"},
+      {"jointvel", "name joint"},
+      {"actuatorfrc", "name actuator"},
+      {"contact", "", "exclude"},
+      {"exclude", "name body1 body2"},
+      {"keyframe", "", "key"},
+      {"key", "name time qpos qvel ctrl"},
+  };
+}
+
+/// The words of `text`, separated by whitespace.
+std::vector<std::string> Words(std::string_view text) {
+  constexpr std::string_view kBlanks = " \t\n\r";
+  std::vector<std::string> words;
+  for (size_t at = 0; (at = text.find_first_not_of(kBlanks, at)) != std::string_view::npos;) {
+    const size_t end = std::min(text.find_first_of(kBlanks, at), text.size());
+    words.emplace_back(text.substr(at, end - at));
+    at = end;
+  }
+  return words;
+}
+
+/// `text` in quotes, cut if it is long.
+std::string Quoted(std::string_view text) {
+  constexpr size_t kMostShown = 40;
+  if (text.size() <= kMostShown) return Concat("\"", Printable(text), "\"");
+  return Concat("\"", Printable(text.substr(0, kMostShown)), "…\"");
+}
+
+/// Checks one document; error messages begin with `where`.
+class Checker {
+ public:
+  explicit Checker(const std::string& where) : where_(where), elements_(MakeElements()) {}
+
+  void Check(const std::string& mjcf) {
+    tinyxml2::XMLDocument document;
+    document.Parse(mjcf.data(), mjcf.size());
+    if (document.Error()) {
+      Refuse(document.ErrorLineNum(), Concat("not well-formed XML: ", ErrorText(document)));
+    }
+    for (const auto* node = document.FirstChild(); node != nullptr; node = node->NextSibling()) {
+      if (node->ToDeclaration() == nullptr) CheckNode(*node, nullptr, 1);
+    }
+    if (count_ == 0) Refuse(1, "expected <mujoco>, got an empty XML document");
+  }
+
+ private:
+  [[noreturn]] void Refuse(int line, std::string_view why) const {
+    throw BadInput(Concat(where_, ":", line, ": ", why));
+  }
+
+  /// The parser's error, such as "mismatched element".
+  static std::string ErrorText(const tinyxml2::XMLDocument& document) {
+    std::string text = document.ErrorName();
+    for (const std::string_view prefix : {"XML_ERROR_", "XML_"}) {
+      if (text.starts_with(prefix)) text.erase(0, prefix.size());
+    }
+    std::ranges::transform(text, text.begin(), [](char c) {
+      return c == '_' ? ' ' : c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+    });
+    return text;
+  }
+
+  /// Checks an element and its contents; only elements and comments are allowed.
+  void CheckNode(const tinyxml2::XMLNode& node, const Element* parent, int level) {
+    if (node.ToComment() != nullptr) return;
+    const int line = node.GetLineNum();
+    const tinyxml2::XMLElement* element = node.ToElement();
+    if (element == nullptr) {
+      Refuse(line, Concat("expected only elements and comments, got ", Quoted(node.Value())));
+    }
+    if (++count_ > kMostElements || level > kMostLevels) {
+      Refuse(line, Concat("expected at most ", kMostElements, " elements, nested at most ",
+                          kMostLevels, " deep"));
+    }
+    const Element& known = Find(*element, parent);
+    for (const auto* a = element->FirstAttribute(); a != nullptr; a = a->Next()) {
+      CheckAttribute(*a, known);
+    }
+    for (const auto* child = node.FirstChild(); child != nullptr; child = child->NextSibling()) {
+      CheckNode(*child, &known, level + 1);
+    }
+  }
+
+  const Element& Find(const tinyxml2::XMLElement& element, const Element* parent) const {
+    const std::string name = element.Name();
+    const std::vector<std::string> expected = Words(parent ? parent->children : "mujoco");
+    if (std::ranges::find(expected, name) == expected.end()) {
+      const std::string place = parent ? Concat(" in <", parent->name, ">") : "";
+      Refuse(element.GetLineNum(),
+             Concat("expected ",
+                    expected.empty() ? "nothing" : Concat("<", Join(expected, ">, <"), ">"), place,
+                    ", got ", Quoted(name), DidYouMean(name.substr(0, kMostName), expected)));
+    }
+    return *std::ranges::find(elements_, name, &Element::name);
+  }
+
+  void CheckAttribute(const tinyxml2::XMLAttribute& attribute, const Element& element) const {
+    const int line = attribute.GetLineNum();
+    const std::string name = attribute.Name();
+    const std::vector<std::string> names = Words(element.attributes);
+    if (std::ranges::count(names, name) == 0) {
+      Refuse(line, Concat("<", element.name, "> takes no ", Quoted(name), " here",
+                          DidYouMean(name.substr(0, kMostName), names), "; expected ",
+                          names.empty() ? "no attribute" : Join(names, ", ")));
+    }
+    const std::string_view text = attribute.Value();
+    const std::string expected = Expected(name, text);
+    if (expected.empty()) return;
+    Refuse(line,
+           Concat("<", element.name, "> ", name, ": expected ", expected, ", got ", Quoted(text)));
+  }
+
+  /// A description of the attribute's valid values; empty if `text` is valid.
+  static std::string Expected(const std::string& name, std::string_view text) {
+    if (std::ranges::count(Words(kNames), name) > 0) {
+      const bool fits = text.size() <= kMostName && Printable(text) == text;
+      return fits ? "" : Concat("a name of at most ", kMostName, " bytes");
+    }
+    const std::vector<std::string> keywords = Words(kKeywords);
+    const auto fits = [&](const std::string& word) {
+      const auto number = ParseNumber(word);
+      return number ? std::abs(*number) <= kLargest : std::ranges::count(keywords, word) > 0;
+    };
+    const std::vector<std::string> words = Words(text);
+    if (!words.empty() && std::ranges::all_of(words, fits)) return "";
+    return Concat("numbers within ", FormatNumber(kLargest), " or a keyword of MJCF");
+  }
+
+  const std::string& where_;
+  std::vector<Element> elements_;
+  int count_ = 0;  // number of elements so far
+};
+
+}  // namespace
+
+void CheckMjcf(const std::string& mjcf, const std::string& where) {
+  if (mjcf.size() > kMostMjcfBytes) {
+    throw BadInput(
+        Concat(where, ": expected MJCF of at most ", kMostMjcfBytes, " bytes, got ", mjcf.size()));
+  }
+  std::string text = mjcf.starts_with("\xef\xbb\xbf") ? mjcf.substr(3) : mjcf;  // byte order mark
+  std::ranges::replace_if(
+      text, [](char c) { return c == '\t' || c == '\n' || c == '\r'; }, ' ');
+  if (Printable(text) != text) {
+    throw BadInput(Concat(where, ": expected UTF-8 text without control characters"));
+  }
+  Checker(where).Check(mjcf);
+}
+
+}  // namespace upswing

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <mujoco/mjbatch.h>
+#include <mujoco/mujoco.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pendulum/double_pendulum.h"
+
+/// Owning handles of MuJoCo objects, and access to the plant's numbers in a compiled model.
+namespace upswing {
+
+struct MuJoCoDeleter {
+  void operator()(mjModel* model) const { mj_deleteModel(model); }
+  void operator()(mjData* data) const { mj_deleteData(data); }
+  void operator()(mjSpec* spec) const { mj_deleteSpec(spec); }
+  void operator()(mjBatch* batch) const { mjb_deleteBatch(batch); }
+};
+using ModelPtr = std::unique_ptr<mjModel, MuJoCoDeleter>;
+using DataPtr = std::unique_ptr<mjData, MuJoCoDeleter>;
+using BatchPtr = std::unique_ptr<mjBatch, MuJoCoDeleter>;
+
+/// MuJoCo's version, such as "4.0.0".
+std::string MuJoCoVersion();
+
+/// Compiles MJCF. Throws BadInput with `where` (a file's name) and MuJoCo's own message.
+ModelPtr CompileModel(const std::string& mjcf, const std::string& where);
+
+/// Compiles untrusted MJCF after CheckMjcf. Throws BadInput unless the model has the structure of
+/// the built-in one:
+/// - two capsules hanging on hinges about +y, whose mass may have its own distribution (`inertial`)
+///   with the centre on the link's axis
+/// - a motor at one hinge, with the same limit both ways
+/// - gravity along -z
+/// - springs at rest when hanging, and joint limits that are the same both ways
+/// - a timestep that divides the control period
+/// - a plant within the ranges of its settings
+///
+/// Armature, friction, stiffness, the capsules' radius and the integrator may differ.
+ModelPtr LoadModel(const std::string& mjcf, const std::string& where);
+
+/// Differences of a loaded model from the built-in one that affect the motion, without the plant's
+/// parameters; such as "armature1 0.02 kg·m²". A limit or friction that a flag of the model
+/// switches off is one of them, and says so.
+std::vector<std::string> DifferencesFromBuiltIn(const mjModel& model);
+
+/// The plant that a loaded model describes. It has own centres of mass and inertias where the links
+/// are not solid capsules. It has no rotors, no dry friction and the default armature, which only
+/// the built-in model takes from a plant.
+Plant PlantOf(const mjModel& model);
+
+/// Pointers to the plant's numbers in an mjModel, or in rows that a batch has expanded. The
+/// comments give sizes.
+struct ModelFields {
+  mjtNum* body_mass;           // (3)
+  mjtNum* body_inertia;        // (3 × 3)
+  mjtNum* body_ipos;           // (3 × 3)
+  mjtNum* body_pos;            // (3 × 3)
+  mjtNum* geom_pos;            // (2 × 3)
+  mjtNum* geom_size;           // (2 × 3)
+  mjtNum* dof_damping;         // (2)
+  mjtNum* actuator_ctrlrange;  // (1 × 2)
+  int* actuator_trnid;         // (1 × 2)
+  mjtNum* gravity;             // (3)
+  mjtNum* dof_armature;        // (2) null if the model is from a file, which has its own
+  // Null if the model was compiled without rotors or without dry friction:
+  mjtNum* tendon_armature;   // (1)
+  mjtNum* wrap_prm;          // (2)
+  mjtNum* dof_frictionloss;  // (2)
+};
+/// Whether a model has the fields for a plant's rotors, and for its dry friction.
+bool HasRotors(const mjModel& model);
+bool HasDryFriction(const mjModel& model);
+/// The fields of a model. `built_in`: it is the built-in one, not from a file.
+ModelFields FieldsOf(mjModel& model, bool built_in = true);
+
+/// Writes a plant into a loaded model, as if its MJCF had these numbers. The caller then calls
+/// mj_setConst or mjb_setConst. Throws BadInput if the plant has rotors or dry friction and the
+/// model was compiled without them, or another armature than the default for a model from a file.
+void WritePlant(const Plant& plant, const ModelFields& fields);
+
+}  // namespace upswing

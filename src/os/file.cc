@@ -1,0 +1,239 @@
+#include "os/file.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <utility>
+
+#include "base/error.h"
+#include "base/text.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Writes all bytes, in as many calls as necessary; false with errno on failure.
+bool WriteAll(int fd, std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = write(fd, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return false;
+    bytes = bytes.subspan(static_cast<size_t>(written));
+  }
+  return true;
+}
+
+/// Whether an error of a system call is due to its path.
+bool IsOfPath(int error_number) {
+  constexpr std::array kOfPath{EACCES, EEXIST, EINVAL,  EISDIR,    ELOOP, ENAMETOOLONG,
+                               ENODEV, ENOENT, ENOTDIR, ENXIO,     EPERM, ENOTEMPTY,
+                               EROFS,  EBUSY,  EXDEV,   EOPNOTSUPP};
+  return std::ranges::find(kOfPath, error_number) != kOfPath.end();
+}
+
+std::string TextOf(std::span<const std::byte> bytes) {
+  std::string text(bytes.size(), '\0');
+  if (!bytes.empty()) std::memcpy(text.data(), bytes.data(), bytes.size());
+  return text;
+}
+
+void WriteInPlace(const fs::path& path, std::string_view text) {
+  const Descriptor fd(open(path.c_str(), O_WRONLY | O_CLOEXEC));
+  if (fd.get() < 0 || !WriteAll(fd.get(), BytesOf(text))) {
+    throw PathError("cannot write", path, errno);
+  }
+}
+
+}  // namespace
+
+Error PathError(std::string_view what, const fs::path& path, int error_number) {
+  return {IsOfPath(error_number) ? 2 : 1,
+          Concat(what, " ", path.string(), ": ", std::strerror(error_number))};
+}
+
+bool Exists(const fs::path& path) {
+  std::error_code error;
+  return fs::exists(path, error);
+}
+
+bool IsFile(const fs::path& path) {
+  std::error_code error;
+  return fs::is_regular_file(path, error);
+}
+
+bool IsOwnFile(const fs::path& path) {
+  std::error_code error;
+  return fs::is_regular_file(fs::symlink_status(path, error));
+}
+
+std::string ReadOwnFile(const fs::path& path, size_t most_bytes) {
+  return TextOf(ReadOwnBytes(path, most_bytes));
+}
+
+std::vector<std::byte> ReadOwnBytes(const fs::path& path, size_t most_bytes) {
+  // Use O_NONBLOCK, because opening a pipe would wait for a writer.
+  const Descriptor fd(open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
+  const auto cannot = [&](std::string_view why) {
+    return BadInput(Concat("cannot read ", path.string(), ": ", why));
+  };
+  struct stat info {};
+  if (fd.get() < 0 || fstat(fd.get(), &info) != 0) throw cannot(std::strerror(errno));
+  if (S_ISDIR(info.st_mode)) throw cannot("expected a file, got a folder");
+  if (!S_ISREG(info.st_mode)) throw cannot("expected a file, got a pipe or a device");
+  const auto expect_fits = [&](uintmax_t size) {
+    if (size <= most_bytes) return;
+    throw cannot(Concat("expected at most ", most_bytes, " bytes, got ", size));
+  };
+  expect_fits(static_cast<uintmax_t>(info.st_size));
+  // Read until the end, because a system file reports no size.
+  std::vector<std::byte> bytes(static_cast<size_t>(info.st_size));
+  size_t filled = 0;
+  while (true) {
+    if (filled == bytes.size()) bytes.resize(bytes.size() + 65536);
+    const ssize_t got = read(fd.get(), bytes.data() + filled, bytes.size() - filled);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) throw cannot(std::strerror(errno));
+    if (got == 0) break;
+    filled += static_cast<size_t>(got);
+    expect_fits(filled);
+  }
+  bytes.resize(filled);
+  return bytes;
+}
+
+std::string ReadEnd(const fs::path& path, std::streamoff most_bytes) {
+  if (!IsOwnFile(path)) return "";
+  std::ifstream file(path, std::ios::binary | std::ios::ate);
+  if (!file) return "";
+  const std::streamoff size = file.tellg();
+  file.seekg(std::max<std::streamoff>(0, size - most_bytes));
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void WriteFileAtomically(const fs::path& path, std::span<const std::span<const std::byte>> parts) {
+  Making file(path, Making::Kind::kFile);
+  bool written = true;
+  for (const auto part : parts) written = written && WriteAll(file.descriptor(), part);
+  if (!written || fsync(file.descriptor()) != 0) throw PathError("cannot write", path, errno);
+  file.Publish();
+}
+
+void WriteFileAtomically(const fs::path& path, std::string_view text) {
+  WriteFileAtomically(path, std::array{BytesOf(text)});
+}
+
+void WriteIfOther(const fs::path& path, const std::string& text) {
+  if (!IsOwnFile(path) || ReadOwnFile(path) != text) WriteFileAtomically(path, text);
+}
+
+void CheckNoLink(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_symlink(folder, error)) return;
+  throw BadInput(Concat(folder.string(), ": expected a folder, got a link"));
+}
+
+void WriteNamedFile(const fs::path& path, std::string_view text) {
+  struct stat info {};
+  if (stat(path.c_str(), &info) != 0) {
+    if (errno != ENOENT) throw PathError("cannot write", path, errno);
+    if (lstat(path.c_str(), &info) == 0) {
+      throw BadInput(
+          Concat("cannot write ", path.string(), ": expected a file, got a link to nothing"));
+    }
+    return WriteFileAtomically(path, text);
+  }
+  if (S_ISDIR(info.st_mode)) throw PathError("cannot write", path, EISDIR);
+  if (!S_ISREG(info.st_mode)) return WriteInPlace(path, text);
+  WriteFileAtomically(fs::canonical(path), text);
+}
+
+void CheckFree(const fs::path& folder, std::string_view advice) {
+  std::error_code error;
+  const fs::file_status there = fs::symlink_status(folder, error);
+  if (!fs::exists(there)) return;
+  const bool is_folder = fs::is_directory(folder, error);
+  if (is_folder && fs::is_empty(folder, error)) return;
+  if (is_folder && error) throw PathError("cannot read", folder, error.value());
+  const bool leads_nowhere = fs::is_symlink(there) && !fs::exists(folder, error);
+  throw BadInput(Concat(folder.string(), ": expected a new or empty folder, got ",
+                        is_folder       ? "one that is not empty"
+                        : leads_nowhere ? "a link to nothing"
+                                        : "a file",
+                        " (", advice, ")"));
+}
+
+void MakeNewFolder(const fs::path& folder) {
+  CheckFree(folder);
+  MakeFolder(folder);
+}
+
+fs::path FreePath(const fs::path& path) {
+  fs::path free = path;
+  for (int number = 2; fs::exists(fs::symlink_status(free)); ++number) {
+    free = Concat(path.string(), "-", number);
+  }
+  return free;
+}
+
+void MakeFolder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw PathError("cannot make the folder", folder, error.value());
+}
+
+FolderLock::FolderLock(const fs::path& folder)
+    : descriptor_(open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+  if (descriptor_.get() < 0) throw PathError("cannot read", folder, errno);
+  if (flock(descriptor_.get(), LOCK_EX | LOCK_NB) == 0) return;
+  if (errno != EWOULDBLOCK) throw PathError("cannot lock", folder, errno);
+  throw FolderBusy(Concat(folder.string(), ": another process is at work here"));
+}
+
+AppendFile::AppendFile(fs::path path)
+    : path_(std::move(path)),
+      descriptor_(open(path_.c_str(),
+                       O_WRONLY | O_CREAT | O_APPEND | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0666)) {
+  const auto refuse = [&](std::string_view what) {
+    return BadInput(Concat("cannot write ", path_.string(),
+                           ": expected a regular file that only this folder has, got ", what));
+  };
+  if (descriptor_.get() < 0) {
+    const int error_number = errno;
+    std::error_code error;
+    throw error_number == ELOOP && fs::is_symlink(path_, error)
+        ? refuse("a link")
+        : PathError("cannot write", path_, error_number);
+  }
+  struct stat info {};
+  if (fstat(descriptor_.get(), &info) != 0) throw PathError("cannot write", path_, errno);
+  if (!S_ISREG(info.st_mode)) throw refuse("a pipe or a device");
+  if (info.st_nlink > 1) {
+    throw refuse(Concat("one with ", info.st_nlink, " names (hard links; a copy would do)"));
+  }
+  size_ = info.st_size;
+}
+
+void AppendFile::CutTo(int64_t size) {
+  if (ftruncate(descriptor_.get(), size) != 0) throw PathError("cannot write", path_, errno);
+  size_ = size;
+}
+
+void AppendFile::Sync() const {
+  if (fsync(descriptor_.get()) != 0) throw PathError("cannot write", path_, errno);
+}
+
+void AppendFile::Append(std::span<const std::byte> bytes) {
+  if (!WriteAll(descriptor_.get(), bytes)) throw PathError("cannot write", path_, errno);
+  size_ += static_cast<int64_t>(bytes.size());
+}
+
+}  // namespace upswing

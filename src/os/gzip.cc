@@ -1,0 +1,94 @@
+#include "os/gzip.h"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <array>
+
+#include "base/error.h"
+
+namespace upswing {
+namespace {
+
+// Logs of machines shrink to a third, and dull simulated ones to a tenth. A file can expand 1000
+// times. Small texts may do so.
+constexpr size_t kMostRatio = 100, kSmall = 1 << 20;
+
+/// zlib's state for inflating gzip members.
+class Inflater {
+ public:
+  explicit Inflater(std::string_view bytes) {
+    stream_.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
+    stream_.avail_in = static_cast<uInt>(bytes.size());
+    constexpr int kGzipOnly = 16;  // expects a header of gzip, not of zlib
+    if (inflateInit2(&stream_, MAX_WBITS + kGzipOnly) != Z_OK) throw Failure("zlib does not work");
+  }
+  ~Inflater() { inflateEnd(&stream_); }
+  Inflater(const Inflater&) = delete;
+  Inflater& operator=(const Inflater&) = delete;
+
+  /// Appends the next piece of text. Returns zlib's status.
+  int Next(std::string& text) {
+    stream_.next_out = reinterpret_cast<Bytef*>(buffer_.data());
+    stream_.avail_out = static_cast<uInt>(buffer_.size());
+    const int status = inflate(&stream_, Z_NO_FLUSH);
+    text.append(buffer_.data(), buffer_.size() - stream_.avail_out);
+    return status;
+  }
+  bool at_end() const { return stream_.avail_in == 0; }
+  void NextMember() { inflateReset(&stream_); }
+
+ private:
+  z_stream stream_{};
+  std::array<char, 65536> buffer_{};
+};
+
+}  // namespace
+
+bool IsGzip(std::string_view bytes) { return bytes.starts_with("\x1f\x8b"); }
+
+std::string Gunzip(std::string_view bytes, const std::string& where, size_t most_bytes) {
+  most_bytes = std::min(most_bytes, kSmall + kMostRatio * bytes.size());
+  Inflater inflater(bytes);
+  std::string text;
+  while (true) {
+    const int status = inflater.Next(text);
+    if (text.size() > most_bytes) {
+      throw BadInput(Concat("cannot read ", where, ": expected at most ", most_bytes,
+                            " bytes after decompression, got more"));
+    }
+    if (status == Z_STREAM_END) {
+      if (inflater.at_end()) return text;
+      inflater.NextMember();
+    } else if (status != Z_OK) {
+      throw BadInput(Concat("cannot read ", where, ": expected a gzip file, got ",
+                            inflater.at_end() ? "only its beginning" : "a damaged one"));
+    }
+  }
+}
+
+std::string Gzip(std::string_view text) {
+  constexpr int kGzipHeader = 16, kMemory = 9;  // the most memory, 256 KB
+  z_stream stream{};
+  if (deflateInit2(&stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, MAX_WBITS + kGzipHeader, kMemory,
+                   Z_DEFAULT_STRATEGY) != Z_OK) {
+    throw Failure("zlib does not work");
+  }
+  std::string bytes(deflateBound(&stream, text.size()), '\0');
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(text.data()));
+  stream.avail_in = static_cast<uInt>(text.size());
+  stream.next_out = reinterpret_cast<Bytef*>(bytes.data());
+  stream.avail_out = static_cast<uInt>(bytes.size());
+  const int status = deflate(&stream, Z_FINISH);
+  bytes.resize(stream.total_out);
+  deflateEnd(&stream);
+  if (status != Z_STREAM_END) throw Failure("zlib cannot compress");
+  return bytes;
+}
+
+uint32_t Crc32(std::span<const std::byte> bytes) {
+  const auto* data = reinterpret_cast<const Bytef*>(bytes.data());
+  return static_cast<uint32_t>(crc32_z(0, data, bytes.size()));
+}
+
+}  // namespace upswing

@@ -1,0 +1,63 @@
+#include "os/streams.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+
+#include "base/error.h"
+#include "base/text.h"
+#include "os/file.h"
+
+namespace upswing {
+
+std::string InputName(const std::string& path) {
+  return IsStandardStream(path) ? "standard input" : path;
+}
+
+std::string ReadInput(const std::string& path) {
+  if (!IsStandardStream(path)) return ReadOwnFile(path);
+  std::string text;
+  std::array<char, 65536> buffer;
+  while (const size_t got = std::fread(buffer.data(), 1, buffer.size(), stdin)) {
+    text.append(buffer.data(), got);
+    if (text.size() <= kMostTextBytes) continue;
+    throw BadInput(Concat("cannot read standard input: expected at most ", kMostTextBytes,
+                          " bytes, got more"));
+  }
+  if (std::ferror(stdin) != 0) {
+    throw BadInput(Concat("cannot read standard input: ", std::strerror(errno)));
+  }
+  return text;
+}
+
+void CheckWritable(const std::string& flag, const std::string& path) {
+  if (IsStandardStream(path)) return;
+  std::error_code error;
+  const auto cannot = [&](std::string_view why) {
+    return BadInput(Concat(flag, " ", path, ": expected a file that can be written: ", why));
+  };
+  if (std::filesystem::is_directory(path, error)) throw cannot("it is a folder");
+  if (std::filesystem::exists(path, error)) {
+    if (access(path.c_str(), W_OK) != 0) throw cannot(std::strerror(errno));
+    return;
+  }
+  const int descriptor = open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  if (descriptor < 0) throw cannot(std::strerror(errno));
+  close(descriptor);
+  unlink(path.c_str());
+}
+
+void WriteOutput(const std::string& path, std::string_view text) {
+  if (IsStandardStream(path)) {
+    std::fwrite(text.data(), 1, text.size(), stdout);  // main() reports a failure
+  } else {
+    WriteNamedFile(path, text);
+  }
+}
+
+}  // namespace upswing

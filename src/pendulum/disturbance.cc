@@ -1,0 +1,87 @@
+#include "pendulum/disturbance.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/text.h"
+
+namespace upswing {
+
+void Disturbance::Describe(Options& o) {
+  o.Section("disturbance");
+  o.Add(&sensor_noise, "sensor_noise", {0, 10}, "rad, rad/s",
+        "standard deviation of the noise on measured angles and velocities");
+  o.Add(&delay, "delay", {0, kLargestDelay}, "s", "time from choosing a torque to its effect")
+      .step = kControlPeriod;
+  sensors.Describe(o);
+}
+
+int Disturbance::delay_steps() const {
+  return static_cast<int>(std::lround(delay / kControlPeriod));
+}
+
+Disturbance Larger(const Disturbance& a, const Disturbance& b) {
+  const SensorModel &x = a.sensors, &y = b.sensors;
+  return {std::max(a.sensor_noise, b.sensor_noise),
+          std::max(a.delay, b.delay),
+          {std::max(x.latency, y.latency), std::max(x.encoder_counts, y.encoder_counts),
+           std::max(x.velocity_window, y.velocity_window),
+           std::max(x.velocity_filter, y.velocity_filter)}};
+}
+
+Disturber::Disturber(std::vector<Disturbance> disturbances, int num_envs,
+                     const Disturbance& largest, uint64_t seed, const std::string& stream,
+                     uint64_t first_index)
+    : capacity_(static_cast<size_t>(largest.delay_steps())),
+      disturbances_(std::move(disturbances)) {
+  const auto n = static_cast<size_t>(num_envs);
+  disturbances_.resize(n, disturbances_.front());
+  queues_.resize(n * capacity_);
+  applied_.resize(n);
+  if (!largest.sensors.exact()) sensors_.emplace(num_envs, largest.sensors);
+  for (size_t i = 0; i < n; ++i) rngs_.emplace_back(seed, stream, first_index + i);
+}
+
+void Disturber::Begin(int env, const PendulumState& start) {
+  std::ranges::fill(Queue(env), 0.0);
+  if (sensors_) sensors_->Begin(env, start);
+}
+
+std::span<const double> Disturber::Apply(std::span<const double> torque,
+                                         std::span<const int64_t> steps) {
+  for (size_t i = 0; i < torque.size(); ++i) {
+    applied_[i] = torque[i];
+    const int delay = disturbances_[i].delay_steps();
+    // The queue is a ring as long as the delay: the new torque replaces the one that is due now.
+    if (delay > 0) std::swap(applied_[i], Queue(static_cast<int>(i))[steps[i] % delay]);
+  }
+  return applied_;
+}
+
+void Disturber::Undo(int env, int64_t step) {
+  const auto i = static_cast<size_t>(env);
+  const int delay = disturbances_[i].delay_steps();
+  if (delay > 0) std::swap(applied_[i], Queue(env)[static_cast<size_t>(step % delay)]);
+}
+
+PendulumState Disturber::Measure(int env, PendulumState s, double torque) {
+  const Disturbance& disturbance = disturbances_[static_cast<size_t>(env)];
+  if (sensors_) s = sensors_->Measure(env, disturbance.sensors, s, torque);
+  const double noise = disturbance.sensor_noise;
+  if (noise == 0) return s;
+  Rng& rng = rngs_[static_cast<size_t>(env)];
+  for (double* x : {&s.q1, &s.q2, &s.w1, &s.w2}) *x += noise * rng.Normal();
+  return s;
+}
+
+double Disturber::MeasuredTorque(int env, double torque) const {
+  return sensors_ ? sensors_->Torque(env, disturbance(env).sensors) : torque;
+}
+
+void Disturber::State(const Archive& archive) {
+  archive.Array("queues", std::span(queues_));
+  if (sensors_) sensors_->State(archive.In("sensors"));
+  for (size_t i = 0; i < rngs_.size(); ++i) rngs_[i].State(archive.In(Concat("rng.", i)));
+}
+
+}  // namespace upswing

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <array>
+
+#include "pendulum/double_pendulum.h"
+
+/// The equations of motion of a double pendulum, in one form for every plant and every caller:
+///   M(q) q̈ = τ - c(q, q̇) - g(q) - d q̇ - f atan(100 q̇)
+///   M = [[J1 + J2 + 2 b cos q2, J2 + b cos q2], [·, J2 + a]]
+/// The last term is dry friction, smoothed as in RealAIGym's plant (Wiebe et al., "Open source
+/// dual- purpose acrobot and pendubot platform", IEEE Robotics and Automation Magazine 31 (2024)).
+namespace upswing {
+
+struct MassMatrix {
+  double M11, M12, M22;  // kg·m²
+
+  double det() const { return M11 * M22 - M12 * M12; }
+};
+
+/// The terms of the equations of motion in one state.
+struct ManipulatorTerms : MassMatrix {
+  double h1, h2;  // N·m: velocity, gravity, damping and dry friction; M q̈ + h = τ
+  double energy;  // kinetic and potential, J; 0 at rest upright
+};
+
+/// The constants of the equations of motion. Motor rotors change only J1, J2 and a.
+struct Manipulator {
+  double J1;      // inertia about joint 1 with link 2 as a point, and its armature, kg·m²
+  double J2;      // inertia of link 2 about joint 2, kg·m²
+  double b;       // mass of link 2 · length of link 1 · centre of link 2: coupling, kg·m²
+  double a;       // armature of joint 2, kg·m²
+  double G1;      // largest moment of gravity about joint 1 with link 2 as a point, N·m
+  double G2;      // largest moment of gravity on link 2 about joint 2, N·m
+  double d1, d2;  // damping, N·m·s/rad
+  double f1, f2;  // dry friction, N·m
+
+  /// Adds the rotors of two motors (kg·m² each) behind gears. One rotor turns at gear · w1. Link 1
+  /// carries the other, which turns at w1 - gear · w2.
+  void AddRotors(double inertia, double gear);
+
+  MassMatrix Mass(double cos_q2) const {
+    return {J1 + J2 + 2 * b * cos_q2, J2 + b * cos_q2, J2 + a};
+  }
+  ManipulatorTerms At(const PendulumState& s) const;
+  /// q̈ (rad/s²) under the torques (N·m) at both joints.
+  std::array<double, 2> Acceleration(const PendulumState& s,
+                                     const std::array<double, 2>& torque) const;
+};
+
+/// Torque (N·m) of the dry friction f (N·m) against a velocity w (rad/s): f atan(100 w).
+double DryFriction(double f, double w);
+
+Manipulator ManipulatorOf(const Plant& plant);
+
+}  // namespace upswing

@@ -1,0 +1,243 @@
+#include "pendulum/pendulum_env.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "base/error.h"
+#include "base/text.h"
+
+namespace upswing {
+namespace {
+
+/// The random streams other than the start states' stream, for (seed, stream of the environments).
+std::string PlantStream(const std::string& stream) { return Concat(stream, ": plant"); }
+std::string NoiseStream(const std::string& stream) { return Concat(stream, ": sensor noise"); }
+
+/// The sensors and motors of these settings; none if they are perfect.
+std::optional<Disturber> MakeDisturber(const PendulumEnvConfig& config) {
+  const Randomization& random = config.randomization;
+  Disturbance largest;
+  for (const Disturbance& each : config.disturbances) {
+    largest = Larger(largest, random.Largest(each));
+  }
+  if (!largest.any()) return std::nullopt;
+  return Disturber(config.disturbances, config.num_envs, largest, config.seed,
+                   NoiseStream(config.stream), config.first_index);
+}
+
+}  // namespace
+
+EnvSpec PendulumSpec(const PendulumEnvConfig& config) {
+  EnvSpec spec;
+  spec.task = kDoublePendulum;
+  spec.num_envs = config.num_envs;
+  spec.obs_size = kObservationSize + (config.identified_from ? kIdentifiedSize : 0) +
+                  config.memory * kMemorySize;
+  spec.action_limit = {config.plant(0).torque_limit};
+  spec.step_seconds = kControlPeriod;
+  spec.term_names = {kRewardTermNames.begin(), kRewardTermNames.end()};
+  spec.state_names = {"q1", "q2", "w1", "w2"};
+  spec.state_units = {"rad", "rad", "rad/s", "rad/s"};
+  spec.mirror_signs = {kMirrorSigns.begin(), kMirrorSigns.end()};
+  if (config.identified_from) {
+    spec.mirror_signs.insert(spec.mirror_signs.end(), kIdentifiedMirrorSigns.begin(),
+                             kIdentifiedMirrorSigns.end());
+  }
+  spec.mirror_signs.resize(static_cast<size_t>(spec.obs_size), -1.0F);
+  spec.bodies = 2;
+  spec.evaluation = {kEvaluationSeconds, kReturnSeconds, kHoldSeconds, 0};
+  return spec;
+}
+
+PendulumEnv::PendulumEnv(const PendulumEnvConfig& config)
+    : config_(config),
+      spec_(PendulumSpec(config)),
+      physics_(config.engine->make(config)),
+      episode_steps_(std::max<int64_t>(1, std::llround(config_.episode_seconds / kControlPeriod))),
+      disturber_(MakeDisturber(config)),
+      posterior_(config.randomization.MakePosterior()) {
+  const auto n = static_cast<size_t>(config_.num_envs);
+  step_counts_.resize(n);
+  obs_.resize(n * static_cast<size_t>(spec_.obs_size));
+  if (config_.randomization.any()) plants_.resize(n);
+  for (int i = 0; i < config_.num_envs; ++i) {
+    const uint64_t index = config_.first_index + static_cast<uint64_t>(i);
+    if (!plants_.empty()) {
+      plant_rngs_.emplace_back(config_.seed, PlantStream(config_.stream), index);
+    }
+    rngs_.emplace_back(config_.seed, config_.stream, index);
+  }
+  plant_seeds_ = plant_rngs_;
+  if (config_.identified_from) {
+    identifier_.emplace(*config_.identified_from, config_.num_envs);
+  }
+  for (int i = 0; i < config_.num_envs; ++i) Reset(i);
+}
+
+void PendulumEnv::Lean(int env, std::span<double> lean) const {
+  std::ranges::copy(upswing::Lean(state(env)), lean.begin());
+}
+
+Matrix<const float> PendulumEnv::obs() const {
+  return {obs_.data(), config_.num_envs, spec_.obs_size};
+}
+
+void PendulumEnv::GetState(int env, std::span<double> s) const {
+  const PendulumState now = state(env);
+  std::ranges::copy(std::array{now.q1, now.q2, now.w1, now.w2}, s.begin());
+}
+
+void PendulumEnv::SetState(int env, std::span<const double> s) {
+  SetState(env, PendulumState{s[0], s[1], s[2], s[3]});
+}
+
+void PendulumEnv::SetState(int env, const PendulumState& s) {
+  physics_->SetState(env, s);
+  step_counts_[static_cast<size_t>(env)] = 0;
+  if (disturber_) disturber_->Begin(env, s);
+  std::ranges::fill(Row(obs_, env), 0.0F);  // a new episode has no memory
+  const PendulumState measured = Measure(env, 0);
+  std::ranges::copy(Observation(env, measured), Row(obs_, env).begin());
+  if (!identifier_) return;
+  identifier_->Begin(env, measured);
+  identifier_->Observe(env, measured, Row(obs_, env).subspan(kObservationSize, kIdentifiedSize));
+}
+
+PendulumState PendulumEnv::Measure(int env, double torque) {
+  const PendulumState s = state(env);
+  return disturber_ ? disturber_->Measure(env, s, torque) : s;
+}
+
+void PendulumEnv::Identify(int env, double torque, const PendulumState& measured) {
+  if (!disturber_) return identifier_->Update(env, torque, measured);
+  identifier_->Update(env, disturber_->MeasuredTorque(env, torque), measured,
+                      disturber_->disturbance(env).sensors.velocity_noise());
+}
+
+std::array<float, kObservationSize> PendulumEnv::Observation(int env,
+                                                             const PendulumState& measured) const {
+  if (config_.identified_from) return Observe(*config_.identified_from, measured);
+  return Observe(config_.assumed_plant ? *config_.assumed_plant : plant(env), measured);
+}
+
+void PendulumEnv::SpreadRows(std::vector<float>& table) const {
+  // Moves the last row first, so that no row is overwritten before it is moved.
+  for (int env = config_.num_envs - 1; env > 0; --env) {
+    const auto from = table.begin() + static_cast<ptrdiff_t>(env) * kObservationSize;
+    std::copy_backward(from, from + kObservationSize, Row(table, env).begin() + kObservationSize);
+  }
+}
+
+void PendulumEnv::Randomize(int env) {
+  const auto i = static_cast<size_t>(env);
+  const Randomization& random = config_.randomization;
+  plant_seeds_[i] = plant_rngs_[i];
+  plants_[i] = random.Draw(config_.plant(env), plant_rngs_[i]);
+  Disturbance disturbance = random.Draw(config_.disturbance(env), plant_rngs_[i]);
+  if (posterior_) posterior_->Deviate(plants_[i], disturbance, plant_rngs_[i]);
+  physics_->SetPlant(env, plants_[i]);
+  if (disturber_) disturber_->Set(env, disturbance);
+}
+
+void PendulumEnv::Reset(int env) {
+  constexpr double kPi = std::numbers::pi;
+  if (!plants_.empty()) Randomize(env);
+  Rng& rng = rngs_[static_cast<size_t>(env)];
+  const StartStates& start = config_.start;
+  PendulumState s;
+  if (rng.Uniform() < start.random_share) {
+    s = {rng.Uniform(-kPi, kPi), rng.Uniform(-kPi, kPi),
+         rng.Uniform(-start.random_velocity, start.random_velocity),
+         rng.Uniform(-start.random_velocity, start.random_velocity)};
+  } else {
+    s = {start.noise * rng.Normal(), start.noise * rng.Normal(), start.noise * rng.Normal(),
+         start.noise * rng.Normal()};
+  }
+  SetState(env, s);
+}
+
+void PendulumEnv::Restart(int env, std::optional<uint64_t> seed) {
+  if (seed) {
+    const auto i = static_cast<size_t>(env);
+    rngs_[i] = Rng(*seed, config_.stream);
+    if (!plants_.empty()) plant_rngs_[i] = Rng(*seed, PlantStream(config_.stream));
+    if (disturber_) disturber_->Seed(env, Rng(*seed, NoiseStream(config_.stream)));
+  }
+  Reset(env);
+}
+
+void PendulumEnv::Hold(int env) {
+  held_.resize(static_cast<size_t>(config_.num_envs));
+  held_[static_cast<size_t>(env)] = state(env);
+}
+
+void PendulumEnv::RestoreHeld() {
+  for (size_t i = 0; i < held_.size(); ++i) {
+    if (!held_[i]) continue;
+    physics_->SetState(static_cast<int>(i), *held_[i]);
+    if (disturber_) disturber_->Undo(static_cast<int>(i), step_counts_[i]);
+  }
+}
+
+void PendulumEnv::StandIn(int env, StepResult& result) const {
+  const auto i = static_cast<size_t>(env);
+  std::ranges::copy(Row(obs_, env), Row(result.next_obs, env).begin());
+  std::ranges::fill(std::span(result.reward_terms).subspan(i * kRewardTerms, kRewardTerms), 0.0);
+  result.reward[i] = 0;
+  result.at_goal[i] = 0;
+  result.torque[i] = 0;
+  result.work[i] = 0;
+}
+
+void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
+  physics_->Step(disturber_ ? disturber_->Apply(torque, step_counts_) : torque, result);
+  if (spec_.obs_size > kObservationSize) SpreadRows(result.next_obs);  // the physics packs the rows
+  RestoreHeld();
+  for (int env = 0; env < config_.num_envs; ++env) {
+    const auto i = static_cast<size_t>(env);
+    if (!held_.empty() && held_[i]) {
+      StandIn(env, result);
+      result.terminated[i] = result.truncated[i] = 0;
+      continue;
+    }
+    ++step_counts_[i];
+    const auto next_obs = Row(result.next_obs, env);
+    if (disturber_ || config_.assumed_plant || identifier_) {
+      const PendulumState measured = Measure(env, result.torque[i]);
+      std::ranges::copy(Observation(env, measured), next_obs.begin());
+      if (identifier_ && !result.terminated[i]) {
+        Identify(env, result.torque[i], measured);
+        identifier_->Observe(env, measured, next_obs.subspan(kObservationSize, kIdentifiedSize));
+      }
+    }
+    if (config_.memory > 0) Remember(Row(obs_, env), torque[i], config_.memory, next_obs);
+    if (result.terminated[i]) StandIn(env, result);
+    result.truncated[i] = step_counts_[i] >= episode_steps_ && !result.terminated[i] ? 1 : 0;
+  }
+  // The next observation is the successor, or the start of a new episode.
+  std::ranges::copy(result.next_obs, obs_.begin());
+  for (int env = 0; env < config_.num_envs; ++env) {
+    if (result.done(static_cast<size_t>(env))) Reset(env);
+  }
+  held_.clear();
+}
+
+void PendulumEnv::State(const Archive& archive) {
+  for (size_t i = 0; i < plants_.size(); ++i) {
+    // A saved state holds the random stream of each plant; loading draws the plant again.
+    plant_seeds_[i].State(archive.In(Concat("plant_seed.", i)));
+    if (!archive.loading()) continue;
+    plant_rngs_[i] = plant_seeds_[i];
+    Randomize(static_cast<int>(i));
+  }
+  physics_->State(archive);
+  archive.Array("step_counts", std::span(step_counts_), {0, episode_steps_ - 1});
+  archive.Array("obs", std::span(obs_));
+  archive.Scalar("start_noise", config_.start.noise, {0, 10});
+  if (disturber_) disturber_->State(archive.In("disturbance"));
+  if (identifier_) identifier_->State(archive.In("identification"));
+  for (size_t i = 0; i < rngs_.size(); ++i) rngs_[i].State(archive.In(Concat("rng.", i)));
+}
+
+}  // namespace upswing

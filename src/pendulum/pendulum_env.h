@@ -1,0 +1,144 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/env.h"
+#include "base/rng.h"
+#include "pendulum/disturbance.h"
+#include "pendulum/double_pendulum.h"
+#include "pendulum/identification.h"
+#include "pendulum/physics.h"
+#include "pendulum/randomization.h"
+
+namespace upswing {
+
+/// Distribution of start states. A share of the episodes begins at random angles and velocities.
+/// The others begin hanging, with normal noise on all four state variables.
+struct StartStates {
+  double noise = 0.1;          // standard deviation, rad and rad/s
+  double random_share = 0;     // share of episodes that begin at random angles in [-π, π]
+  double random_velocity = 5;  // bound of the uniform velocities of random starts, rad/s
+};
+
+/// Settings of a PendulumEnv.
+struct PendulumEnvConfig : PhysicsConfig {
+  double episode_seconds = kEvaluationSeconds;
+  int memory = 0;  // number of past control steps in an observation
+  StartStates start;
+  uint64_t seed = 0;
+  std::string stream = "environment";  // environment i draws from (seed, stream, first_index + i)
+  uint64_t first_index = 0;
+  std::vector<Disturbance> disturbances{Disturbance()};  // one for all, or one for each
+  Randomization randomization;  // around plants and disturbances, drawn at each reset
+  // The plant that gives energy and height in observations, such as the plant of the training.
+  // Observations then reveal nothing of the true plant. None: each environment's own plant.
+  std::optional<Plant> assumed_plant = {};
+  // The nominal plant where identification starts, such as the plant of the training. Observations
+  // then hold the estimate, and take energy and height from the nominal plant.
+  std::optional<Plant> identified_from = {};
+
+  const Disturbance& disturbance(int env) const {
+    return disturbances[disturbances.size() > 1 ? static_cast<size_t>(env) : 0];
+  }
+};
+
+/// The specification of the task "double-pendulum" with these settings. An evaluation episode lasts
+/// 20 s and its return counts the first 10 s. It succeeds if both links are inverted throughout the
+/// last 10 s.
+EnvSpec PendulumSpec(const PendulumEnvConfig& config);
+
+/// N double pendulums and their episodes. Reaching the time limit truncates; only a numerical
+/// blow-up (see Physics::Step) terminates. The start states do not depend on the physics.
+///
+/// With randomised plants, observation and reward use the plant of the episode. With disturbances,
+/// observations hold what the sensors measure, and motors apply the delayed torque. State, reward
+/// and goal use the true state.
+class PendulumEnv : public VectorEnv {
+ public:
+  /// Throws BadInput under the same conditions as Engine::make.
+  explicit PendulumEnv(const PendulumEnvConfig& config);
+
+  const EnvSpec& spec() const override { return spec_; }
+  void Lean(int env, std::span<double> lean) const override;
+  Matrix<const float> obs() const override;
+  void Step(Matrix<const double> action, StepResult& result) override {
+    Step(action.values(), result);
+  }
+  /// Steps every environment under the torque (N), N·m.
+  void Step(std::span<const double> torque, StepResult& result);
+  void GetState(int env, std::span<double> state) const override;
+  void SetState(int env, std::span<const double> state) override;
+  void SetStartNoise(double sigma) override { config_.start.noise = sigma; }
+  void State(const Archive& archive) override;
+
+  /// Begins another episode of an environment, as Gymnasium's reset does. With a seed, this episode
+  /// and the following ones equal those of the first environment of a new set with this seed.
+  void Restart(int env, std::optional<uint64_t> seed);
+  /// Makes the next Step leave an environment as it is: its successor is the present observation,
+  /// and the rest of its result is 0.
+  void Hold(int env);
+
+  /// The plant of the running episode.
+  const Plant& plant(int env) const {
+    return plants_.empty() ? config_.plant(env) : plants_[static_cast<size_t>(env)];
+  }
+  /// The disturbance of the running episode.
+  Disturbance disturbance(int env) const {
+    return disturber_ ? disturber_->disturbance(env) : Disturbance();
+  }
+  PendulumState state(int env) const { return physics_->state(env); }
+  /// See Physics::Push.
+  void Push(int env, const std::array<double, 2>& torque) { physics_->Push(env, torque); }
+  /// Begins an episode of an environment in a state.
+  void SetState(int env, const PendulumState& state);
+
+ private:
+  void Reset(int env);
+  /// Gives a new episode its own plant and disturbance.
+  void Randomize(int env);
+  /// The state that the environment's sensors measure now, with noise drawn from its stream.
+  /// `torque` (N·m) acted in the last control period; 0 at the start.
+  PendulumState Measure(int env, double torque);
+  /// Updates the identified plant with a measured state and the torque (N·m) before it.
+  void Identify(int env, double torque, const PendulumState& measured);
+  /// The observation of a measured state, without memory and identification.
+  std::array<float, kObservationSize> Observation(int env, const PendulumState& measured) const;
+  /// Moves rows of kObservationSize numbers to the beginnings of the wider rows with memory.
+  void SpreadRows(std::vector<float>& table) const;
+  /// Puts held environments back into their states.
+  void RestoreHeld();
+  /// Replaces the result of a step that blew up or was held back: the successor by the last
+  /// observation, the rest by zeros.
+  void StandIn(int env, StepResult& result) const;
+
+  /// One environment's observation (D) within a table of observations.
+  template <typename Table>
+  auto Row(Table& table, int env) const {
+    const auto size = static_cast<size_t>(spec_.obs_size);
+    return std::span(table).subspan(static_cast<size_t>(env) * size, size);
+  }
+
+  PendulumEnvConfig config_;
+  EnvSpec spec_;
+  std::unique_ptr<Physics> physics_;
+  int64_t episode_steps_;
+  std::optional<Disturber> disturber_;  // none if sensors and motors are perfect
+  std::optional<Posterior> posterior_;  // if plants and sensors are drawn from it
+  std::vector<Rng> rngs_;               // (N)
+  // Only with randomised plants, else empty:
+  std::vector<Plant> plants_;         // (N) plants of the running episodes
+  std::vector<Rng> plant_rngs_;       // (N) streams for the plants of the next episodes
+  std::vector<Rng> plant_seeds_;      // (N) plant_rngs_ before the draws of the running episodes
+  std::vector<int64_t> step_counts_;  // (N) control steps since the episode began
+  std::vector<std::optional<PendulumState>> held_;  // (N) states that the next Step keeps; or empty
+  std::vector<float> obs_;                          // (N, D)
+  std::optional<Identifier> identifier_;            // if plants are identified
+};
+
+}  // namespace upswing

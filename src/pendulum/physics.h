@@ -1,0 +1,87 @@
+#pragma once
+
+#include <array>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/archive.h"
+#include "base/env.h"
+#include "base/thread_pool.h"
+#include "pendulum/double_pendulum.h"
+
+namespace upswing {
+
+class Physics;
+struct PhysicsConfig;
+
+/// An implementation of the physics; each is a constant.
+struct Engine {
+  const char* name;
+  /// Throws BadInput if the model does not compile, is not a double pendulum, or is not supported
+  /// by this engine.
+  std::unique_ptr<Physics> (*make)(const PhysicsConfig& config);
+};
+
+/// The name of the MuJoCo engine, which the folder mujoco/ provides.
+inline constexpr const char* kMuJoCoName = "mujoco";
+
+/// The closed form. It has only the built-in model, is many times faster than MuJoCo, and agrees
+/// with it to 12 digits per step.
+extern const Engine kClosedForm;
+
+/// The engines that a program includes.
+using Engines = std::span<const Engine* const>;
+
+/// The names of all engines, even those that a program does not include, the default first:
+/// "mujoco", "closed-form".
+std::vector<std::string> EngineNames();
+
+/// The engine with this name. Throws BadInput with a message that begins with `where`.
+const Engine& FindEngine(Engines engines, std::string_view name, const std::string& where);
+
+/// Settings of the physics.
+struct PhysicsConfig {
+  const Engine* engine = &kClosedForm;
+  std::vector<Plant> plants = std::vector<Plant>(1);  // one for all environments, or one for each
+  int num_envs = 1;
+  RewardWeights weights;
+  std::string mjcf;            // replaces the built-in model if not empty; see LoadModel
+  ThreadPool* pool = nullptr;  // runs the work in parallel; results have the same bits
+
+  const Plant& plant(int env) const {
+    return plants[plants.size() > 1 ? static_cast<size_t>(env) : 0];
+  }
+};
+
+/// N double pendulums stepped together, each with the task's observation and reward.
+class Physics {
+ public:
+  virtual ~Physics() = default;
+
+  /// The present state of an environment.
+  virtual PendulumState state(int env) const = 0;
+  /// Puts an environment into a state; works after a blow-up too.
+  virtual void SetState(int env, const PendulumState& state) = 0;
+
+  /// Gives an environment another plant. The caller then calls SetState or loads a state.
+  virtual void SetPlant(int env, const Plant& plant) = 0;
+
+  /// Holds `torque` (N), N·m, for one control period and fills `result` except `truncated`.
+  /// `next_obs` gets N packed rows of kObservationSize, even if its rows are wider. A state blows
+  /// up if a number is not finite or beyond 1e10, or if MuJoCo warns; then only `terminated` has a
+  /// meaning.
+  virtual void Step(std::span<const double> torque, StepResult& result) = 0;
+
+  /// Adds a torque (N·m) to each joint of an environment, on top of the motor's, as when a person
+  /// pushes. It acts from the next step until the next Push or a new state. Throws Failure if the
+  /// engine does not support pushes.
+  virtual void Push(int env, const std::array<double, 2>& torque);
+
+  /// Saves or loads the state, but not the plants.
+  virtual void State(const Archive& archive) = 0;
+};
+
+}  // namespace upswing

@@ -1,0 +1,139 @@
+#include "pendulum/posterior.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "base/error.h"
+#include "base/text.h"
+
+namespace upswing {
+namespace {
+
+constexpr double kRounding = 1e-6;  // of a correlation
+// Smallest centre of mass (m) and inertia (kg·m²) of a link that is no capsule.
+constexpr double kSmallestLink = 1e-5;
+constexpr std::string_view kLatency = "sensor_latency";
+
+/// A parameter of the plant that identification can find.
+struct UncertainParameter {
+  const char* name;
+  double Plant::*value;
+};
+constexpr UncertainParameter kUncertain[] = {
+    {"mass1", &Plant::mass1},       {"mass2", &Plant::mass2},       {"length1", &Plant::length1},
+    {"length2", &Plant::length2},   {"damping1", &Plant::damping1}, {"damping2", &Plant::damping2},
+    {"gravity", &Plant::gravity},   {"coulomb1", &Plant::coulomb1}, {"coulomb2", &Plant::coulomb2},
+    {"center1", &Plant::center1},   {"center2", &Plant::center2},   {"inertia1", &Plant::inertia1},
+    {"inertia2", &Plant::inertia2}, {"armature", &Plant::armature}};
+
+/// The words of a row; several blanks count as one.
+std::vector<std::string_view> WordsOf(std::string_view row) {
+  std::vector<std::string_view> words = Split(row, ' ');
+  std::erase(words, std::string_view());
+  return words;
+}
+
+/// Row `covariance` of the Cholesky factor L, after the given rows of L; nothing if the matrix is
+/// not positive. A value without variance has a row of zeros.
+std::optional<std::vector<double>> FactorRow(const std::vector<double>& covariance,
+                                             const std::vector<std::vector<double>>& rows) {
+  std::vector<double> L(covariance.size());
+  double rest = covariance.back();  // variance that the values above do not explain
+  const double variance = covariance.back();
+  for (size_t j = 0; j < rows.size(); ++j) {
+    double sum = covariance[j], variance_j = 0;
+    for (size_t k = 0; k < j; ++k) sum -= L[k] * rows[j][k];
+    for (const double entry : rows[j]) variance_j += entry * entry;
+    const double pivot = rows[j].back();
+    const double rounding = kRounding * std::sqrt(variance_j * std::max(variance, 0.0));
+    if (pivot == 0 && std::abs(sum) > rounding) return std::nullopt;
+    L[j] = pivot == 0 ? 0 : sum / pivot;
+    rest -= L[j] * L[j];
+  }
+  if (!(rest >= -kRounding * variance)) return std::nullopt;
+  // A value that depends on others has only rounding left.
+  L.back() = rest > kRounding * kRounding * variance ? std::sqrt(rest) : 0;
+  return L;
+}
+
+}  // namespace
+
+Range UncertainRange(const Option& option) {
+  const bool of_link = option.name.starts_with("center") || option.name.starts_with("inertia");
+  return {of_link ? kSmallestLink : option.range.low, option.range.high};
+}
+
+bool Posterior::Knows(std::string_view name) {
+  return name == kLatency || std::ranges::any_of(kUncertain, [&](const UncertainParameter& p) {
+           return p.name == name;
+         });
+}
+
+std::string Posterior::Text(const std::vector<std::string>& names,
+                            const std::vector<double>& covariance) {
+  std::vector<std::string> rows;
+  for (size_t i = 0; i < names.size(); ++i) {
+    std::vector<std::string> words{names[i]};
+    for (size_t j = 0; j <= i; ++j) words.push_back(FormatNumber(covariance[i * names.size() + j]));
+    rows.push_back(Join(words, " "));
+  }
+  return Join(rows, "; ");
+}
+
+Posterior Posterior::Parse(std::string_view text, const std::string& where) {
+  Posterior posterior;
+  const Disturbance disturbance;
+  const Plant plant;
+  Options options = OptionsOf(plant);
+  options.AddMissing(OptionsOf(disturbance));
+  std::vector<std::string_view> names;
+  for (const std::string_view row : Split(text, ';')) {
+    const std::vector<std::string_view> words = WordsOf(row);
+    const size_t n = posterior.rows_.size() + 1;
+    const std::string_view name = words.empty() ? "" : words.front();
+    if (!Knows(name) || std::ranges::find(names, name) != names.end()) {
+      throw BadInput(Concat(where, ": expected rows with different values of a machine, got \"",
+                            Printable(name), "\""));
+    }
+    names.push_back(name);
+    std::vector<double> covariance;
+    for (const std::string_view word : std::span(words).subspan(1)) {
+      const std::optional<double> number = ParseNumber(word);
+      if (number && std::isfinite(*number)) covariance.push_back(*number);
+    }
+    if (covariance.size() != n || words.size() != n + 1) {
+      throw BadInput(Concat(where, ": ", name, ": expected ", n, " finite numbers"));
+    }
+    std::optional<std::vector<double>> L = FactorRow(covariance, posterior.rows_);
+    if (!L) throw BadInput(Concat(where, ": expected a positive matrix, got another one"));
+    posterior.rows_.push_back(std::move(*L));
+    Value value{nullptr, UncertainRange(*options.Get(name))};
+    for (const UncertainParameter& p : kUncertain) {
+      if (p.name == name) value.of_plant = p.value;
+    }
+    posterior.values_.push_back(value);
+  }
+  return posterior;
+}
+
+void Posterior::Deviate(Plant& plant, Disturbance& disturbance, Rng& rng) const {
+  std::vector<double> z;
+  for (size_t i = 0; i < values_.size(); ++i) z.push_back(rng.Normal());
+  for (size_t i = 0; i < values_.size(); ++i) {
+    const auto [of_plant, range] = values_[i];
+    double& value = of_plant != nullptr ? plant.*of_plant : disturbance.sensors.latency;
+    for (size_t j = 0; j <= i; ++j) value += rows_[i][j] * z[j];
+    value = std::clamp(value, range.low, range.high);
+  }
+}
+
+Disturbance Posterior::Largest(const Disturbance& nominal) const {
+  Disturbance largest = nominal;
+  for (const Value& value : values_) {
+    if (value.of_plant == nullptr) largest.sensors.latency = value.range.high;
+  }
+  return largest;
+}
+
+}  // namespace upswing

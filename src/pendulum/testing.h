@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cmath>
+#include <numbers>
+#include <variant>
+
+#include "base/options.h"
+#include "base/rng.h"
+#include "pendulum/double_pendulum.h"
+
+/// Helpers that the tests of the double pendulum share.
+namespace upswing {
+
+inline constexpr double kPi = std::numbers::pi;
+
+/// A plant with parameters drawn from their whole ranges, without rotors and dry friction.
+/// Parameters are uniform on a logarithmic scale, or in the cube root where a range begins at 0.
+inline Plant RandomPlant(Rng& rng) {
+  Plant plant;
+  const Options options = OptionsOf(plant);
+  for (const Option& option : options.all()) {
+    if (option.implied && option.name != "actuated_joint") continue;
+    const auto& [low, high] = option.range;
+    *std::get<double*>(option.target) = low > 0
+                                            ? std::exp(rng.Uniform(std::log(low), std::log(high)))
+                                            : high * std::pow(rng.Uniform(), 3);
+    if (option.step > 0)
+      *std::get<double*>(option.target) = std::round(*std::get<double*>(option.target));
+  }
+  return plant;
+}
+
+/// A RandomPlant with rotors and dry friction, both small enough for the physics' steps. It has its
+/// own armature, and often own centres of mass and inertias.
+inline Plant RandomMachine(Rng& rng) {
+  Plant plant = RandomPlant(rng);
+  const double inertia = plant.mass2 * plant.length2 * plant.length2;  // about link 2's
+  plant.gear_ratio = rng.Uniform(0, 10);
+  plant.rotor_inertia = rng.Uniform(0, 0.1) * inertia;
+  plant.coulomb1 = rng.Uniform(0, 0.2) * inertia;
+  plant.coulomb2 = rng.Uniform(0, 0.2) * inertia;
+  plant.armature = rng.Uniform(0.001, 0.05);
+  const auto often = [&](double value) { return rng.Uniform() < 0.7 ? value : 0; };
+  plant.center1 = often(rng.Uniform(0.2, 1.2) * plant.length1);
+  plant.center2 = often(rng.Uniform(0.2, 1.2) * plant.length2);
+  plant.inertia1 = often(rng.Uniform(0.02, 0.3) * plant.mass1 * plant.length1 * plant.length1);
+  plant.inertia2 = often(rng.Uniform(0.02, 0.3) * plant.mass2 * plant.length2 * plant.length2);
+  return plant;
+}
+
+}  // namespace upswing

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/archive.h"
+#include "base/env.h"
+#include "base/matrix.h"
+#include "base/policy.h"
+#include "base/steps.h"
+
+namespace upswing {
+
+/// Names and values, in a fixed order.
+using Metrics = std::vector<std::pair<std::string, double>>;
+
+/// A learner. The training loop calls Act, Observe and Learn once per step of the environments.
+class Agent {
+ public:
+  virtual ~Agent() = default;
+
+  /// Chooses exploring actions (N × A) for the observations (N × D).
+  virtual void Act(Matrix<const float> obs, Matrix<double> action) = 0;
+
+  /// Receives the result of the last Act.
+  virtual void Observe(const StepResult& result) = 0;
+
+  /// Makes all gradient steps that are due. Throws Failure if a number is not finite.
+  virtual void Learn() = 0;
+
+  /// Control steps observed so far, over all environments.
+  virtual int64_t steps() const = 0;
+  /// Gradient steps since the beginning of the training.
+  virtual int64_t updates() const = 0;
+
+  /// Metrics of learning since the last call, such as the mean loss. They are columns of
+  /// metrics.csv.
+  virtual Metrics TakeMetrics() = 0;
+
+  /// The current policy, without exploration. `info` describes it. The agent adds the meaning of
+  /// its values.
+  virtual std::unique_ptr<Policy> ExportPolicy(PolicyInfo info) const = 0;
+
+  /// Saves or loads the whole state of the agent.
+  virtual void State(const Archive& archive) = 0;
+};
+
+/// Throws Failure unless the reward and the observation of environment `env` are finite.
+void ExpectFinite(const StepResult& result, size_t env);
+
+}  // namespace upswing

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/env.h"
+#include "base/options.h"
+#include "base/thread_pool.h"
+#include "rl/agent.h"
+
+namespace upswing {
+
+/// Sizes that determine the memory use of an agent.
+struct AgentSize {
+  double parameters;    // parameters of the networks that learn
+  double arrays;        // numbers in memory per parameter, such as Adam's moments
+  double saved_arrays;  // numbers in a checkpoint per parameter
+  double transition;    // numbers per transition in the replay memory or rollout
+  double capacity;      // transitions in the replay memory or rollout
+  double batch;         // rows of a minibatch
+  double widest;        // units of the widest layer
+  double layers;        // layers whose activations and gradients are kept
+  const char* store = "replay memory";
+  const char* store_flag = "--replay";  // flag that makes the store smaller
+};
+
+/// Settings of a learning algorithm, and everything that the program needs from the algorithm.
+struct AgentConfig {
+  virtual ~AgentConfig() = default;
+
+  /// One line per setting: name, range, unit, help.
+  virtual void Describe(Options& options) = 0;
+
+  /// Makes an agent for environments of this kind. The threads of the pool share its work.
+  virtual std::unique_ptr<Agent> Make(const EnvSpec& spec, uint64_t seed,
+                                      ThreadPool& pool) const = 0;
+
+  /// Throws BadInput if settings contradict each other although each is in its range. The message
+  /// begins with a setting's name.
+  virtual void Check(int64_t num_envs) const = 0;
+
+  virtual AgentSize Size(const EnvSpec& spec) const = 0;
+
+  /// The algorithm in words, such as `double, dueling network 64-64 with heads of 32`.
+  virtual std::string Text() const = 0;
+
+  /// Warnings, one per line, about settings that keep the agent from learning within `steps`.
+  virtual std::vector<std::string> Warnings(int64_t steps, int64_t num_envs) const = 0;
+  /// Whether values include an entropy bonus and so differ from discounted returns.
+  virtual bool HasSoftValues() const { return false; }
+};
+
+/// Widths of layers as text, such as `64-64`.
+std::string WidthsText(const std::vector<int64_t>& widths);
+
+/// The largest of `widths`.
+double Widest(const std::vector<int64_t>& widths);
+
+/// Adds a warning if both ends of the learning-rate schedule are 0.
+void WarnOfNoRate(double begin, double end, std::vector<std::string>& warnings);
+
+}  // namespace upswing

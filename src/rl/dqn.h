@@ -1,0 +1,78 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "base/thread_pool.h"
+#include "rl/dqn_config.h"
+#include "rl/off_policy.h"
+#include "rl/trained_network.h"
+
+/// Deep Q-Network (Mnih et al., 2015) and its extensions, each a flag.
+///
+/// Symbols: s observation, a action, r reward, γ discount, θ online parameters, θ⁻ target
+/// parameters, y target, B batch size, A number of actions, D observation size.
+namespace upswing {
+
+/// TD targets y (B) = r + discount · evaluate(s', a*) with a* = argmax_a select(s', a):
+/// - DQN: select = evaluate = Q(s', ·; θ⁻), so that y = r + γ max_a Q(s', a; θ⁻) (Mnih et al.,
+///   2015).
+/// - Double DQN: select = Q(s', ·; θ), evaluate = Q(s', ·; θ⁻) (van Hasselt et al., 2016, Eq 4).
+/// - Either of them with mirror symmetry: evaluate = Q(σs', σ·; θ⁻), where σ is the mirror. The
+///   true values are equal, and their errors nearly independent, as in Double Q-learning (van
+///   Hasselt, 2010).
+///
+/// All Q-values are (B × A), reward and discount (B). The discount is γⁿ, or 0 after a termination.
+void TdTargets(Matrix<const float> select, Matrix<const float> evaluate,
+               std::span<const float> reward, std::span<const float> discount, std::span<float> y);
+
+/// Huber loss with threshold 1: δ²/2 where |δ| ≤ 1, |δ| - 1/2 beyond.
+float HuberLoss(float delta);
+/// Derivative of the Huber loss: δ clipped to ±1.
+float HuberGradient(float delta);
+
+/// A DQN agent for N environments.
+class Dqn : public OffPolicyAgent {
+ public:
+  /// Throws BadInput if the task has more than one torque. Also throws BadInput if the config
+  /// mirrors minibatches but the task has no mirror symmetry.
+  Dqn(const DqnConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool);
+
+  void Act(Matrix<const float> obs, Matrix<double> action) override;
+  Metrics TakeMetrics() override;
+  std::unique_ptr<Policy> ExportPolicy(PolicyInfo info) const override;
+  void State(const Archive& archive) override;
+
+  std::span<const float> online() const { return online_.theta(); }
+  std::span<const float> target() const { return theta_target_; }
+  double epsilon() const;
+  void Update(const Minibatch& batch) override;
+
+ private:
+  /// Computes the TD errors of some rows of a minibatch and backpropagates them to the activations.
+  void BackwardRows(const Minibatch& batch, RowRange rows);
+  /// Computes Q(σs, σ·; θ⁻) (B × A) for some rows. Reversing the columns mirrors the torques,
+  /// because they ascend and are symmetric about 0.
+  void ForwardMirrored(Matrix<const float> s, RowRange rows, Matrix<float> q);
+  /// Adds `shift` to the values of all three sets of parameters.
+  void ShiftValues(float shift);
+  /// Moves theta_policy_ towards θ by Polyak averaging.
+  void AveragePolicy();
+
+  DqnConfig config_;
+  int D_, B_;
+  std::vector<double> torques_;  // (A)
+
+  TrainedNetwork online_;
+  AlignedVector<float> theta_target_, theta_policy_;  // θ⁻; evaluated average of θ (policy_tau)
+  // Buffers of an update, B rows.
+  AlignedVector<float> q_, q_select_, q_target_, dq_;  // (B × A)
+  AlignedVector<float> mirrored_;                      // (B × D) σs'
+  AlignedVector<float> y_, q_taken_;                   // (B) targets, Q(s, a)
+  Network::Activations act_activations_;
+  AlignedVector<float> act_q_;  // (N × A) Q-values of the last Act
+};
+
+}  // namespace upswing

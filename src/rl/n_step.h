@@ -1,0 +1,41 @@
+#pragma once
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "base/archive.h"
+#include "rl/replay.h"
+
+namespace upswing {
+
+/// Joins the steps of each environment into transitions over n steps (Sutton, 1988; Mnih et al.,
+/// 2016, Section 4). At the end of an episode, the last steps become shorter transitions. Each
+/// transition has the discount γᵏ of its true length k.
+class NStep {
+ public:
+  NStep(int num_envs, int n, double gamma, int obs_size, ActionSpace actions);
+
+  /// Adds one step of environment `env` and calls `emit` for every transition that is now complete.
+  void Push(int env, std::span<const float> obs, std::span<const float> action, double reward,
+            std::span<const float> next_obs, bool terminated, bool truncated,
+            const std::function<void(const Transition&)>& emit);
+
+  /// Number of steps, over all environments, that are not yet part of a transition.
+  int64_t waiting() const;
+
+  /// Saves or loads the waiting steps.
+  void State(const Archive& archive);
+
+ private:
+  size_t n_, obs_size_, action_size_;
+  double gamma_;
+  ActionSpace actions_;
+  // The waiting steps of each environment, oldest first.
+  std::vector<int64_t> count_;  // (N)
+  std::vector<float> obs_;      // (N × n × D)
+  std::vector<float> action_;   // (N × n × A)
+  std::vector<double> reward_;  // (N × n)
+};
+
+}  // namespace upswing

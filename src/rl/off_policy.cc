@@ -1,0 +1,150 @@
+#include "rl/off_policy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/error.h"
+#include "base/text.h"
+#include "rl/schedule.h"
+
+namespace upswing {
+
+OffPolicyAgent::OffPolicyAgent(const OffPolicyConfig& config, const EnvSpec& spec,
+                               const ActionSpace& actions, uint64_t seed, ThreadPool& pool)
+    : pool_(pool),
+      explore_rng_(seed, "exploration"),
+      act_action_(static_cast<size_t>(spec.num_envs) * actions.size),
+      mirror_signs_(spec.mirror_signs),
+      td_error_(config.batch),
+      settings_(config),
+      update_threads_(&pool),
+      obs_size_(spec.obs_size),
+      action_size_(actions.size),
+      action_space_(actions),
+      sample_rng_(seed, "replay sampling"),
+      replay_(config.replay, spec.obs_size, actions, config.prioritized),
+      n_step_(spec.num_envs, static_cast<int>(config.n_step), config.gamma, spec.obs_size, actions),
+      batch_(static_cast<int>(config.batch), spec.obs_size, actions.size),
+      act_obs_(static_cast<size_t>(spec.num_envs) * obs_size_) {
+  if (config.mirror && mirror_signs_.empty()) {
+    throw BadInput(Concat("mirror: expected a task with mirror symmetry, got ", spec.task));
+  }
+}
+
+double OffPolicyAgent::learning_rate() const {
+  return Scheduled(settings_.learning_rate, settings_.learning_rate_end, steps_,
+                   settings_.learning_rate_steps);
+}
+
+double OffPolicyAgent::importance_exponent() const {
+  return Scheduled(settings_.importance_exponent, 1.0, steps_, settings_.learning_rate_steps);
+}
+
+double OffPolicyAgent::AveragingTau(double tau) const {
+  const double initial = settings_.learning_rate;
+  return initial > 0 ? std::min(tau, tau * learning_rate() / initial) : tau;
+}
+
+void OffPolicyAgent::Remember(Matrix<const float> obs) {
+  std::ranges::copy(obs.values(), act_obs_.begin());
+}
+
+double OffPolicyAgent::RewardOf(const StepResult& result, size_t env) {
+  return settings_.reward_scale * result.reward[env];
+}
+
+void OffPolicyAgent::Observe(const StepResult& result) {
+  const size_t D = obs_size_, A = action_size_;
+  const size_t envs = result.reward.size();
+  for (size_t env = 0; env < envs; ++env) {
+    ExpectFinite(result, env);
+    n_step_.Push(static_cast<int>(env), std::span(act_obs_).subspan(env * D, D),
+                 std::span(act_action_).subspan(env * A, A), RewardOf(result, env),
+                 std::span(result.next_obs).subspan(env * D, D), result.terminated[env] != 0,
+                 result.truncated[env] != 0, [&](const Transition& t) { replay_.Add(t); });
+    if (result.done(env)) ++episodes_;
+  }
+  steps_ += static_cast<int64_t>(envs);
+}
+
+int64_t OffPolicyAgent::updates_due() const {
+  const int64_t learning_steps = steps_ - settings_.learning_starts;
+  if (learning_steps <= 0 || replay_.size() == 0) return 0;
+  return static_cast<int64_t>(static_cast<double>(learning_steps) * settings_.updates_per_step);
+}
+
+void OffPolicyAgent::Learn() {
+  while (updates_ < updates_due()) {
+    update_threads_.Run([&] {
+      SampleBatch();
+      Update(batch_);
+    });
+    if (settings_.prioritized) replay_.Prioritize(batch_, td_error_, settings_.priority_exponent);
+  }
+}
+
+void OffPolicyAgent::SampleBatch() {
+  if (settings_.prioritized) {
+    replay_.SamplePrioritized(sample_rng_, importance_exponent(), pool_, batch_);
+  } else {
+    replay_.Sample(sample_rng_, batch_);
+  }
+  if (settings_.mirror) MirrorHalf(sample_rng_, mirror_signs_, action_space_, batch_);
+}
+
+float OffPolicyAgent::CenteringShift(const Minibatch& batch, double errors) const {
+  // A shift of all values by x changes each error by (1 - γⁿ) x.
+  double per_shift = 0;
+  for (size_t i = 0; i < batch.weight.size(); ++i) {
+    per_shift += double{batch.weight[i]} * (1 - batch.discount[i]);
+  }
+  return per_shift > 0 ? static_cast<float>(-settings_.reward_centering * errors / per_shift) : 0;
+}
+
+void OffPolicyAgent::CountErrors(double loss, double q, double td_error) {
+  if (!std::isfinite(loss)) {
+    throw Failure(
+        Concat("the loss is ", loss, " in update ", updates_ + 1, ", expected a finite number"));
+  }
+  loss_sum_ += loss;
+  q_sum_ += q;
+  td_sum_ += td_error;
+  ++report_updates_;
+}
+
+void OffPolicyAgent::TakeMeans(Metrics& metrics) {
+  const double n = static_cast<double>(std::max<int64_t>(1, report_updates_));
+  const auto take = [&](const char* name, double& sum) {
+    metrics.emplace_back(name, sum / n);
+    sum = 0;
+  };
+  take("loss", loss_sum_);
+  take("q", q_sum_);
+  take("td_error", td_sum_);
+  take("gradient_norm", norm_sum_);
+  report_updates_ = 0;
+}
+
+void OffPolicyAgent::SharedState(const Archive& archive) {
+  constexpr int64_t kMostUpdates = 100 * kMostSteps;  // updates_per_step is at most 100
+  replay_.State(archive.In("replay"));
+  n_step_.State(archive.In("n_step"));
+  explore_rng_.State(archive.In("explore_rng"));
+  sample_rng_.State(archive.In("sample_rng"));
+  archive.Scalar("steps", steps_, {0, kMostSteps});
+  archive.Check(replay_.size() == std::min(replay_.capacity(), steps_ - n_step_.waiting()),
+                "replay/rows", "one transition for each step, or a full memory");
+  archive.Scalar("episodes", episodes_, {0, steps_});
+  archive.Scalar("updates", updates_, {0, kMostUpdates});
+  archive.Check(updates_ == updates_due(), "updates",
+                Concat(updates_due(), ", which the steps imply"));
+  constexpr Bounds<double> kSum{0, std::numeric_limits<double>::max()};
+  archive.Scalar("report_updates", report_updates_, {0, updates_});
+  archive.Scalar("loss_sum", loss_sum_, kSum);
+  archive.Scalar("q_sum", q_sum_, kAnyNumber<double>);
+  archive.Scalar("td_sum", td_sum_, kSum);
+  archive.Scalar("norm_sum", norm_sum_, kSum);
+}
+
+}  // namespace upswing

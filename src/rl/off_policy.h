@@ -1,0 +1,88 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/thread_tuner.h"
+#include "rl/agent.h"
+#include "rl/n_step.h"
+#include "rl/off_policy_config.h"
+#include "rl/replay.h"
+
+namespace upswing {
+
+/// An agent that learns from a replay memory: the common part of DQN and SAC. A derived agent acts
+/// and makes a gradient step from a minibatch.
+///
+/// Letters: N environments, D observation size, A numbers of an action, B batch size.
+class OffPolicyAgent : public Agent {
+ public:
+  void Observe(const StepResult& result) override;
+  void Learn() override;
+  int64_t steps() const override { return steps_; }
+  int64_t updates() const override { return updates_; }
+
+  const Replay& replay() const { return replay_; }
+  double learning_rate() const;
+  /// β of prioritised replay. It rises to 1 over learning_rate_steps (Schaul et al., 2016).
+  double importance_exponent() const;
+  /// Makes one gradient step on the given minibatch and adds it to the metrics. Sets td_error_ and
+  /// increments updates_.
+  virtual void Update(const Minibatch& batch) = 0;
+
+ protected:
+  /// Throws BadInput if the config mirrors minibatches but the task has no mirror symmetry.
+  OffPolicyAgent(const OffPolicyConfig& config, const EnvSpec& spec, const ActionSpace& actions,
+                 uint64_t seed, ThreadPool& pool);
+
+  /// The reward of environment `env` for learning: the step's reward times reward_scale.
+  virtual double RewardOf(const StepResult& result, size_t env);
+  /// Keeps the observations (N × D) for which the agent is about to act.
+  void Remember(Matrix<const float> obs);
+  /// Polyak rate of the evaluated policy: `tau` times the ratio of the current to the initial
+  /// learning rate. As learning slows, the average covers more updates (Polyak and Juditsky, 1992).
+  double AveragingTau(double tau) const;
+  /// Shift of all values after a minibatch: reward_centering times the shift that makes the
+  /// weighted mean error 0. `errors` is the weighted sum of Q(s, a) - y, clipped if the loss clips.
+  ///
+  /// Online and target values shift together, so that the target network's lag does not slow their
+  /// common level. This is reward centering (Naik et al., 2024, Eq 12). Its average reward r̄ is
+  /// (1 - γ) times the sum of all shifts.
+  float CenteringShift(const Minibatch& batch, double errors) const;
+  /// Adds a minibatch's mean loss, mean Q and mean |TD error| to the metrics. Throws Failure if the
+  /// loss is not finite.
+  void CountErrors(double loss, double q, double td_error);
+  /// Adds the metrics of this base class: means since the last call.
+  void TakeMeans(Metrics& metrics);
+  /// Saves or loads the replay memory, random streams, counters and metric sums. Loading also
+  /// throws BadInput if they contradict each other.
+  void SharedState(const Archive& archive);
+
+  ThreadPool& pool_;
+  Rng explore_rng_;
+  std::vector<float> act_action_;    // (N × A) of the last Act
+  std::vector<float> mirror_signs_;  // (D) signs of the observations; empty: no mirror symmetry
+  std::vector<float> td_error_;      // (B) of the last Update: Q(s, a) - y, or its size
+  int64_t steps_ = 0, episodes_ = 0, updates_ = 0;
+  double norm_sum_ = 0;  // sum of the gradients' norms since TakeMeans
+
+ private:
+  int64_t updates_due() const;
+  /// Draws a minibatch from the replay memory.
+  void SampleBatch();
+
+  OffPolicyConfig settings_;
+  ThreadTuner update_threads_;
+  size_t obs_size_, action_size_;
+  ActionSpace action_space_;
+  Rng sample_rng_;
+  Replay replay_;
+  NStep n_step_;
+  Minibatch batch_;
+  std::vector<float> act_obs_;                    // (N × D) of the last Act
+  double loss_sum_ = 0, q_sum_ = 0, td_sum_ = 0;  // sums since TakeMeans
+  int64_t report_updates_ = 0;
+};
+
+}  // namespace upswing

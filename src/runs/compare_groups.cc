@@ -1,0 +1,269 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <set>
+
+#include "base/error.h"
+#include "base/format.h"
+#include "base/text.h"
+#include "runs/compare_runs.h"
+#include "runs/model_info.h"
+
+namespace upswing {
+namespace {
+
+constexpr size_t kLongText = 48;  // longer differences are not shown
+
+/// Name of the setting that holds the model's content.
+constexpr const char* kModelContent = "model";
+
+/// Name (`section.key`) and value of each setting that decides the training, of all algorithms,
+/// plus the model's content. The order is the same for any two runs.
+using Settings = std::vector<std::pair<std::string, std::string>>;
+
+Settings SettingsOf(Config config) {
+  Settings settings;
+  config.model.clear();  // the content of a model counts, not its path
+  Config scratch;
+  const Options own = OptionsOf(config), all = EverySetting(scratch);
+  for (const Option& every : all.all()) {
+    const Option* found = own.Get(every.name);
+    const std::string name = Concat(every.section, ".", every.name);
+    if (found == nullptr || found->decides != Option::Decides::kTraining) {
+      settings.emplace_back(name, "none");
+      continue;
+    }
+    const auto* text = std::get_if<std::string*>(&found->target);
+    settings.emplace_back(name, text != nullptr ? **text : found->text());
+  }
+  settings.emplace_back(kModelContent, ModelContent(config.mjcf));
+  return settings;
+}
+
+/// The label of a run's group.
+std::string LabelOf(const RunRecord& run) {
+  return Concat(run.variant.empty() ? run.config.agent : run.variant,
+                run.config.mjcf.empty() ? "" : ", other model");
+}
+
+/// Whether a setting belongs to the task that a policy is evaluated on: model, plant, disturbance,
+/// randomisation, and how many episodes have to succeed. Settings of the training, and of when and
+/// in which engine it evaluates, do not belong to it.
+bool IsTask(const std::string& name) {
+  constexpr std::array<std::string_view, 3> kBeginnings{"plant.", "disturbance.", "randomize."};
+  return name == kModelContent || name == "train.eval_episodes" || name == "task.task" ||
+         std::ranges::any_of(
+             kBeginnings, [&](std::string_view beginning) { return name.starts_with(beginning); });
+}
+
+/// Tells whether a setting counts.
+using Wanted = bool (*)(const std::string& name);
+
+/// The settings that differ among `others`, such as `hidden [64, 64], head 32`.
+std::string Differences(
+    const Settings& settings, const std::vector<const Settings*>& others,
+    Wanted wanted = [](const std::string& name) { return name != "train.agent"; }) {
+  std::vector<std::string> parts;
+  for (size_t i = 0; i < settings.size(); ++i) {
+    const std::string& name = settings[i].first;
+    const std::string& value = settings[i].second;  // clang 14 captures no structured binding
+    const bool differs = std::ranges::any_of(
+        others, [&](const Settings* other) { return (*other)[i].second != value; });
+    if (!differs || !wanted(name)) continue;
+    const std::string key = name.substr(name.find('.') + 1);
+    parts.push_back(value.size() < kLongText ? Concat(key, " ", value) : key);
+  }
+  return Join(parts, ", ");
+}
+
+/// Sets how each group (with these `settings`) differs from the others. Groups with the same name
+/// get a second name: their differences from each other, or a number if there are many.
+void TellGroupsApart(std::vector<RunGroup>& groups, const std::vector<Settings>& settings) {
+  std::vector<const Settings*> all;
+  std::map<std::string, std::vector<const Settings*>> namesakes;
+  for (size_t i = 0; i < groups.size(); ++i) {
+    all.push_back(&settings[i]);
+    namesakes[groups[i].label].push_back(&settings[i]);
+  }
+  std::map<std::string, int> count;
+  for (size_t i = 0; i < groups.size(); ++i) {
+    std::string& label = groups[i].label;
+    groups[i].differences = Differences(settings[i], all);
+    const auto& same_name = namesakes[label];
+    if (same_name.size() == 1) continue;
+    const int number = ++count[label];
+    const std::string differences = Differences(settings[i], same_name);
+    label += differences.empty() || differences.size() > kLongText ? Concat(" #", number)
+                                                                   : Concat(" (", differences, ")");
+  }
+}
+
+/// Adds notes on the groups' numbers of seeds and on budgets that readers of the figures should
+/// know.
+void NotePlans(const std::vector<RunGroup>& groups, std::vector<std::string>& notes) {
+  std::set<std::pair<int64_t, bool>> of_all;
+  std::map<size_t, std::vector<std::string>> few;  // labels by their number of seeds
+  for (const RunGroup& group : groups) {
+    std::set<int64_t> budgets;
+    std::set<bool> stops;
+    for (const RunRecord& run : group.runs) {
+      const TrainConfig& train = run.config.train;
+      budgets.insert(train.steps);
+      stops.insert(train.stop_when_solved);
+      of_all.emplace(train.steps, train.stop_when_solved);
+    }
+    if (budgets.size() > 1) {
+      notes.push_back(fmt::format("{}: the runs have different budgets, {} to {} steps",
+                                  group.label, FormatCount(*budgets.begin()),
+                                  FormatCount(*budgets.rbegin())));
+    }
+    if (stops.size() > 1) {
+      notes.push_back(group.label + ": some runs stop when solved and some do not");
+    }
+    if (group.runs.size() == 1) {
+      notes.push_back(group.label + ": no intervals, because there is only one seed");
+    } else if (group.runs.size() < 5) {
+      few[group.runs.size()].push_back(group.label);
+    }
+  }
+  for (const auto& [seeds, labels] : few) {
+    notes.push_back(fmt::format("{}: intervals are too narrow, because {} seeds are few",
+                                Join(labels, ", "), seeds));
+  }
+  if (notes.empty() && of_all.size() > 1) {
+    notes.emplace_back("the groups differ in steps or stop_when_solved");
+  }
+}
+
+/// Adds a note if comparable runs had different shares of their processors.
+void NoteLoads(const std::vector<RunRecord>& runs, std::vector<std::string>& notes) {
+  std::map<std::pair<std::string, std::set<int64_t>>, std::vector<double>> busy;
+  for (const RunRecord& run : runs) {
+    const RunConditions& c = run.conditions;
+    if (c.busy) busy[{run.settings, c.threads}].push_back(*c.busy);
+  }
+  for (const auto& [same_work, shares] : busy) {
+    constexpr double kAlike = 0.75;
+    const auto [low, high] = std::ranges::minmax(shares);
+    if (low >= kAlike * high) continue;
+    notes.push_back(fmt::format(
+        "times were measured under different machine loads: of runs with the same settings and "
+        "threads, one had its threads at work {:.0f}% of the time, another {:.0f}%",
+        100 * low, 100 * high));
+    return;
+  }
+}
+
+/// Adds notes on conditions that change the times and differ between runs, other than settings.
+void NoteTimes(const std::vector<RunRecord>& runs, std::vector<std::string>& notes) {
+  std::map<int64_t, int> threads;  // number of threads → number of runs
+  std::set<std::string> processors, vectors;
+  std::set<int64_t> intervals;
+  for (const RunRecord& f : runs) {
+    const RunConditions& c = f.conditions;
+    intervals.insert(f.config.train.eval_every);
+    for (const int64_t count : c.threads) ++threads[count];
+    for (const std::string& name : c.processors) processors.insert(Printable(name));
+    for (const std::string& name : c.vectors) vectors.insert(Printable(name));
+  }
+  const auto join = [](const std::set<std::string>& names) {
+    return Join({names.begin(), names.end()}, "; ");
+  };
+  if (threads.size() > 1) {
+    std::vector<std::string> counts;
+    counts.reserve(threads.size());
+    for (const auto& [count, of_runs] : threads) {
+      counts.push_back(fmt::format("{} ({})", count, Counted(of_runs, "run")));
+    }
+    notes.push_back(
+        Concat("times were measured with different numbers of threads: ", Join(counts, ", ")));
+  }
+  if (processors.size() > 1) {
+    notes.push_back(Concat("times were measured on different processors: ", join(processors)));
+  }
+  if (vectors.size() > 1) {
+    notes.push_back(
+        Concat("times were measured with different vector instructions: ", join(vectors)));
+  }
+  NoteLoads(runs, notes);
+  if (intervals.size() > 1) {
+    notes.push_back(fmt::format(
+        "runs are evaluated every {} to {} steps: the resolution of times and steps to solve",
+        FormatCount(*intervals.begin()), FormatCount(*intervals.rbegin())));
+  }
+}
+
+/// Numbers the tasks that the groups (with these `settings`) are evaluated on, in their order.
+void TellTasksApart(Comparison& comparison, const std::vector<Settings>& settings) {
+  std::vector<const Settings*> tasks;  // of a group on each task
+  for (size_t i = 0; i < settings.size(); ++i) {
+    const auto same = [&](const Settings* other) {
+      return Differences(settings[i], {other}, IsTask).empty();
+    };
+    const auto at = std::ranges::find_if(tasks, same);
+    comparison.groups[i].task = static_cast<int>(at - tasks.begin());
+    if (at == tasks.end()) tasks.push_back(&settings[i]);
+  }
+  for (const Settings* task : tasks) {
+    comparison.task_texts.push_back(Differences(*task, tasks, IsTask));
+  }
+}
+
+void NoteTasks(Comparison& comparison, bool different_tasks) {
+  const size_t tasks = comparison.task_texts.size();
+  if (tasks == 1) return;
+  comparison.notes.push_back(fmt::format(
+      "the groups are evaluated on {} different tasks: {}", tasks,
+      different_tasks ? "the table holds figures of different tasks"
+                      : "groups are compared within a task (--different-tasks compares all)"));
+}
+
+}  // namespace
+
+Comparison GroupRuns(const CompareRequest& request) {
+  const Found found = FindRuns(request);
+  if (found.runs.empty()) {
+    const size_t others = found.left_out.size() - 1;
+    throw BadInput(Concat(
+        found.left_out.front(),
+        others > 0 ? Concat("; no run is left to compare (", others, " more were left out)") : ""));
+  }
+  Comparison comparison;
+  std::vector<RunGroup>& groups = comparison.groups;
+  std::vector<Settings> settings;  // one per group
+  for (const RunRecord& run : found.runs) {
+    const auto same = [&](const RunGroup& group) {
+      return group.runs.front().settings == run.settings;
+    };
+    auto at = std::ranges::find_if(groups, same);
+    if (at == groups.end()) {
+      at = groups.insert(at, {LabelOf(run), {}});
+      settings.push_back(SettingsOf(run.config));
+    }
+    at->runs.push_back(run);
+  }
+  for (RunGroup& group : groups) {
+    std::ranges::sort(group.runs, {}, [](const RunRecord& run) { return run.config.train.seed; });
+  }
+  TellGroupsApart(groups, settings);
+  TellTasksApart(comparison, settings);
+  comparison.notes = found.notes;
+  NotePlans(groups, comparison.notes);
+  for (const RunGroup& group : groups) {
+    const std::string& mjcf = group.runs.front().config.mjcf;
+    if (mjcf.empty()) continue;
+    comparison.notes.push_back(Concat(group.label, ": uses an MJCF model, not the built-in one ",
+                                      "(content ", ModelContent(mjcf), ")"));
+  }
+  NoteTimes(found.runs, comparison.notes);
+  NoteTasks(comparison, request.different_tasks);
+  for (const std::string& line : found.left_out) comparison.notes.push_back(line + ": left out");
+  if (request.different_tasks) {
+    for (RunGroup& group : groups) group.task = 0;
+  }
+  return comparison;
+}
+
+}  // namespace upswing

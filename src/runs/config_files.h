@@ -1,0 +1,46 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "agents/config.h"
+
+/// Training settings and models in files.
+namespace upswing {
+
+/// Runs ParseConfig on a configuration file: an empty path means no file, `-` means standard input.
+/// A flag called `plant` names a plant file (runs/plant_file.h), which is a layer between the
+/// configuration file and the other flags.
+Config BuildConfig(const std::filesystem::path& file, const std::vector<FlagValue>& flags);
+
+/// Reads the settings of a run folder and applies the flags. Also throws BadInput if the run's file
+/// lacks a setting. Such a run is from another version, and today's default may differ from the
+/// value it used.
+Config ReadRunConfig(const std::filesystem::path& run, const std::vector<FlagValue>& flags = {});
+
+/// Reads the settings of a variant from a regular file in a study's folder. A model is the copy in
+/// the same folder. Throws BadInput.
+Config ReadSettings(const std::filesystem::path& file);
+
+/// Changes the model's path to the name of its copy in the run's folder, which stays valid when the
+/// folder moves.
+void NameModelCopy(Config& config);
+
+/// Adapts the settings for one of many runs: one thread unless the user set a number, and the
+/// model's copy next to the run.
+void MakeReadyForMany(Config& config);
+
+/// ConfigToml with comments, for a file in any place: the model's path is absolute.
+std::string CompleteToml(Config config);
+
+/// Checksum that identifies the settings of a training. It ignores seed, steps and whether the
+/// training stops when solved.
+std::string SettingsMark(const Config& config);
+
+/// The plant for a trial: `base`, or the plant of the model file if there is one, with the changes
+/// in `set` ("mass2=1.2"). Writes the model's text to `mjcf`. Throws BadInput.
+Plant ChangedPlant(const Plant& base, const std::string& model, const std::vector<std::string>& set,
+                   std::string& mjcf);
+
+}  // namespace upswing

@@ -1,0 +1,212 @@
+#include "runs/find_policy.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <set>
+
+#include "agents/controllers.h"
+#include "base/error.h"
+#include "base/format.h"
+#include "base/text.h"
+#include "mujoco/model.h"
+#include "runs/plant_file.h"
+#include "runs/run_folder.h"
+#include "runs/tensor_file.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The controller that a setting belongs to.
+std::string SectionOf(const FlagValue& flag) {
+  ControllerConfig config;
+  return OptionsOf(config).Find(flag.name, FlagOf(flag.name)).front()->section;
+}
+
+/// Loads the policy for --swing-up. Throws BadInput that names the flag.
+LoadedPolicy SwingUpNamed(const std::string& name) {
+  LoadedPolicy loaded;
+  try {
+    loaded = LoadPolicy(name);
+  } catch (const Error& error) {
+    throw Error(error.exit_code(), Concat("--swing-up: ", error.what()));
+  }
+  if (loaded.mjcf.empty()) return loaded;
+  throw BadInput(Concat("--swing-up: expected a policy of the built-in model, got ", name,
+                        ", which was trained on another model"));
+}
+
+/// Applies --made-for: a plant file, if there is one, then the changes. Returns what was changed:
+/// the file, or the plant before. Throws BadInput.
+PlantFile ChangeDesignPlant(const PolicyArguments& a, Plant& plant) {
+  std::vector<std::string> changes, files;
+  for (const std::string& text : a.made_for) {
+    (text.find('=') == std::string::npos ? files : changes).push_back(text);
+  }
+  if (files.size() > 1) {
+    throw BadInput(
+        Concat("--made-for: expected at most one plant file, got ", Join(files, " and ")));
+  }
+  PlantFile file;
+  if (a.plant) file.plant = plant = *a.plant;
+  if (!files.empty()) {
+    file = ReadPlantFile(files.front(), "--made-for", "NAME=VALUE, ");
+    file.name = files.front();
+    plant = file.plant;
+  }
+  ApplyChanges(OptionsOf(plant), changes, "--made-for");
+  return file;
+}
+
+/// Throws BadInput if a setting belongs to no controller in `names`.
+void CheckSettings(const PolicyArguments& settings, const std::vector<std::string>& names) {
+  const std::string got = names.empty() ? "none" : Join(names, ", ");
+  if (settings.has_settings() && std::ranges::none_of(names, IsController)) {
+    const std::string flag =
+        settings.flags.empty() ? "--made-for" : FlagOf(settings.flags.front().name);
+    throw BadInput(Concat(flag, ": expected a controller (", Join(ControllerNames(), ", "),
+                          ") with it, got ", got));
+  }
+  for (const FlagValue& flag : settings.flags) {
+    const std::string section = SectionOf(flag);
+    const auto has = [&](const std::string& name) {
+      return IsController(name) && HasSection(name, section);
+    };
+    if (std::ranges::any_of(names, has)) continue;
+    throw BadInput(
+        Concat(FlagOf(flag.name), ": expected the controller ", section, " with it, got ", got));
+  }
+}
+
+}  // namespace
+
+std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
+                                      const PolicyArguments& controllers) {
+  CheckSettings(controllers, names);
+  std::vector<LoadedPolicy> policies;
+  std::set<fs::path> seen;  // files, and names of controllers
+  for (const std::string& name : names) {
+    PolicyArguments one{name, {}, {}};
+    if (IsController(name)) {
+      one.made_for = controllers.made_for;
+      std::ranges::copy_if(controllers.flags, std::back_inserter(one.flags),
+                           [&](const auto& flag) { return HasSection(name, SectionOf(flag)); });
+    }
+    policies.push_back(GetPolicy(one));
+    std::error_code none;
+    const auto file = fs::canonical(policies.back().path, none);
+    if (!seen.insert(none ? fs::path(name) : file).second) {
+      throw BadInput(Concat(Printable(name), ": expected each policy once, got it twice"));
+    }
+  }
+  return policies;
+}
+
+LoadedPolicy GetPolicy(const PolicyArguments& a) {
+  CheckSettings(a, a.name.empty() ? std::vector<std::string>() : std::vector{a.name});
+  ControllerConfig config;
+  SetFlags(OptionsOf(config), a.flags);
+  if (a.name == "hybrid" && !config.swing_up.empty()) {
+    const LoadedPolicy swing_up = SwingUpNamed(config.swing_up);
+    config.plant = swing_up.plant;
+    config.swing_up_policy = swing_up.policy;
+  }
+  const PlantFile made_for = ChangeDesignPlant(a, config.plant);
+  const bool is_controller = IsController(a.name), is_path = fs::exists(a.name);
+  if (is_controller && is_path) {
+    throw BadInput(Concat(a.name, ": expected a controller or a file, got the name of both; ./",
+                          a.name, " means the file; rename the file to use the controller"));
+  }
+  if (is_controller) {
+    const auto design_for = [name = a.name, config](const Plant& plant) {
+      ControllerConfig other = config;
+      other.plant = plant;
+      return MakeController(name, other);
+    };
+    return {TitleOf(a.name, config, made_for.name, made_for.plant),
+            "",
+            design_for(config.plant),
+            kDoublePendulum,
+            config.plant,
+            "",
+            design_for};
+  }
+  if (!is_path) {
+    const std::string shipped = Concat("web/public/agents/", a.name, ".safetensors");
+    const std::string meant = std::filesystem::exists(shipped)
+                                  ? Concat(" (did you mean ", shipped, "?)")
+                                  : DidYouMean(a.name, ControllerNames());
+    throw BadInput(Concat(
+        a.name, ": no such file; expected a policy.safetensors, a run folder or a controller (",
+        Join(ControllerNames(), ", "), ")", meant));
+  }
+  return LoadPolicy(a.name);
+}
+
+LoadedPolicy LoadPolicy(const fs::path& path) {
+  fs::path file = path;
+  if (fs::is_directory(path)) {
+    file = path / RunFolder::kPolicy;
+    if (fs::exists(path / RunFolder::kConfig) && !fs::exists(file)) {
+      throw BadInput(Concat(path.string(), ": expected a run with a policy.safetensors, got one ",
+                            "without; the first evaluation writes it"));
+    }
+  }
+  if (!fs::exists(file)) {
+    const bool is_controller = IsController(path.string());
+    throw BadInput(Concat(file.string(),
+                          ": no such file; expected a policy.safetensors or a run folder",
+                          is_controller ? ", not a controller" : ""));
+  }
+  return ReadPolicy(LoadTensors(file, kMostPolicyBytes));
+}
+
+LoadedPolicy ReadPolicy(const Tensors& file) {
+  LoadedPolicy loaded = PolicyIn(file);
+  if (!loaded.mjcf.empty()) {
+    LoadModel(loaded.mjcf, Concat(file.where(), ": metadata \"model\""));
+  }
+  return loaded;
+}
+
+namespace {
+
+/// The last `parts` parts of a policy's path, without the file name for a run.
+std::string EndOfPath(const LoadedPolicy& loaded, int parts) {
+  if (loaded.path.empty()) return loaded.name;
+  const fs::path path = loaded.path;
+  fs::path rest = path.parent_path(), end = path.stem();
+  if (end == "policy" && rest.has_filename()) {
+    end = rest.filename();
+    rest = rest.parent_path();
+  }
+  for (int part = 1; part < parts && rest.has_filename(); ++part) {
+    end = rest.filename() / end;
+    rest = rest.parent_path();
+  }
+  return end;
+}
+
+}  // namespace
+
+std::string TitleOf(const LoadedPolicy& loaded) { return EndOfPath(loaded, 1); }
+
+std::vector<std::string> TitlesOf(const std::vector<LoadedPolicy>& policies) {
+  constexpr int kMostParts = 20;
+  std::vector<std::string> titles;
+  for (const LoadedPolicy& loaded : policies) {
+    const auto is_own = [&](int parts) {
+      return std::ranges::count(policies, EndOfPath(loaded, parts), [&](const LoadedPolicy& other) {
+               return EndOfPath(other, parts);
+             }) == 1;
+    };
+    int parts = 1;
+    while (parts < kMostParts && !is_own(parts)) ++parts;
+    constexpr size_t kLongest = 30;  // bytes
+    titles.push_back(Shortened(EndOfPath(loaded, parts), kLongest));
+  }
+  return titles;
+}
+
+}  // namespace upswing

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "agents/loaded_policy.h"
+
+/// Loading of policies by name: a controller, a policy file or a run folder.
+namespace upswing {
+
+/// A policy as named on a command line.
+struct PolicyArguments {
+  std::string name;  // name of a controller (agents/controllers.h), a file or a run folder
+  std::vector<FlagValue> flags;  // settings of the controller
+  // The controller's design plant: changes such as mass2=1.2, and at most one plant file.
+  std::vector<std::string> made_for;
+  std::optional<Plant> plant = {};  // design plant before made_for; nothing: the task's
+
+  bool has_settings() const { return !flags.empty() || !made_for.empty(); }
+  bool empty() const { return name.empty() && !has_settings(); }
+};
+
+/// Makes the controller with this name, or loads the policy from this path. Also throws BadInput if
+/// the name could mean both, or if there are controller settings for a policy that is not a
+/// controller.
+LoadedPolicy GetPolicy(const PolicyArguments& a);
+
+/// Gets the policies of these names, each a PolicyArguments::name. Each controller gets those
+/// settings in `controllers` that it has. Throws BadInput if none of the policies has a given
+/// setting.
+std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
+                                      const PolicyArguments& controllers);
+
+/// Loads a policy file, or the best policy of a run folder. Throws as PolicyIn does. Also throws
+/// BadInput if its model is invalid.
+LoadedPolicy LoadPolicy(const std::filesystem::path& path);
+
+/// Makes the policy of a file that has been read. Throws as LoadPolicy does.
+LoadedPolicy ReadPolicy(const Tensors& file);
+
+/// A short title for a picture: the folder's name of a run, or the stem of another file.
+std::string TitleOf(const LoadedPolicy& loaded);
+/// Titles of several policies. Parent folders are added until the titles differ, and a long title
+/// keeps only its end.
+std::vector<std::string> TitlesOf(const std::vector<LoadedPolicy>& policies);
+
+}  // namespace upswing

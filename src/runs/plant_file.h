@@ -1,0 +1,51 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "agents/config.h"
+#include "pendulum/double_pendulum.h"
+
+/// A machine's plant in a file: a TOML table [plant] with the settings of Plant, and perhaps a
+/// table [disturbance] with the settings of Disturbance. A twin also has a table [covariance].
+namespace upswing {
+
+struct PlantFile {
+  Plant plant;  // settings that the file leaves out have their defaults
+  // The settings of [disturbance]; with a covariance of the plant, also the setting `posterior`.
+  std::vector<FlagValue> conditions;
+
+  /// Each setting of the plant, as a flag.
+  std::vector<FlagValue> PlantFlags() const;
+
+  std::string name;  // for messages
+};
+
+/// Names of the shipped plants, configs/plants/NAME.toml.
+std::vector<std::string> ShippedPlants();
+
+/// Parses a plant file. Tables that describe other parts of a machine are ignored. `where` names
+/// the file in messages. Throws BadInput.
+PlantFile ParsePlantFile(std::string_view toml, const std::string& where);
+
+/// The text of a plant file, and its name for messages.
+struct PlantDocument {
+  std::string toml, where;
+};
+
+/// The text of the shipped plant of this name, or of the plant file at this path. Messages name the
+/// argument `flag`, and what else it takes. Throws BadInput.
+PlantDocument ReadPlantDocument(const std::string& name, const std::string& flag,
+                                const std::string& else_taken = "");
+
+/// The shipped plant of this name, or the plant file at this path. Messages name the argument
+/// `flag`, and what else it takes. Throws BadInput.
+PlantFile ReadPlantFile(const std::string& name, const std::string& flag = "--plant",
+                        const std::string& else_taken = "");
+
+/// Replaces the flags called `plant` by the settings of the last named plant file. These come
+/// first, so that the other flags override them. Throws BadInput.
+std::vector<FlagValue> WithPlantFile(const std::vector<FlagValue>& flags);
+
+}  // namespace upswing

@@ -1,0 +1,95 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "base/tensors.h"
+#include "os/file.h"
+#include "runs/event_file.h"
+
+namespace upswing {
+
+/// A row of a table: column names and values in order. The first column is the step.
+using Row = std::vector<std::pair<std::string, double>>;
+
+/// A run on disk:
+///   config.toml             every setting; `train --config` repeats the run
+///   metrics.csv             a row per log interval
+///   episodes.csv            a row per training episode
+///   evals.csv               a row per evaluation
+///   events.out.tfevents.*   metrics and evaluations for TensorBoard
+///   checkpoint.safetensors  the whole state of the training
+///   policy.safetensors      the best policy at evaluation
+///   log.txt                 events with date and time
+///   model.xml               the MJCF of a model that is not built in
+/// The checkpoint contains the sizes of the tables. Opening a run cuts the tables to these sizes,
+/// so that rows written after the checkpoint do not appear twice.
+class RunFolder {
+ public:
+  // Names of the files.
+  static constexpr const char* kConfig = "config.toml";
+  static constexpr const char* kMetrics = "metrics.csv";
+  static constexpr const char* kEpisodes = "episodes.csv";
+  static constexpr const char* kEvaluations = "evals.csv";
+  static constexpr const char* kCheckpoint = "checkpoint.safetensors";
+  static constexpr const char* kPolicy = "policy.safetensors";
+  static constexpr const char* kLog = "log.txt";
+  static constexpr const char* kModel = "model.xml";  // only for a model that is not built in
+
+  /// Makes the folder with these files (name, text) and the first checkpoint. Adds the tables'
+  /// sizes to the checkpoint, so that the folder can be opened with it.
+  ///
+  /// Makes missing parent folders, as mkdir -p does. The folder appears under its name complete or
+  /// not at all (see Making). Throws BadInput if something is already there. Otherwise throws as
+  /// PathError does.
+  static void Create(const std::filesystem::path& path,
+                     const std::vector<std::pair<std::string, std::string>>& files,
+                     Tensors& checkpoint);
+
+  /// Opens a run after its checkpoint has been loaded. The caller holds the run's FolderLock.
+  /// Throws BadInput and changes nothing if a table is shorter than its size in the checkpoint. The
+  /// same holds if a link shares it with another folder (see AppendFile).
+  RunFolder(std::filesystem::path path, const Tensors& checkpoint);
+  /// Writes the rows that are not in the files yet, even after a failed training.
+  ~RunFolder();
+  RunFolder(const RunFolder&) = delete;
+  RunFolder& operator=(const RunFolder&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+  static std::filesystem::path CheckpointPath(const std::filesystem::path& run) {
+    return run / kCheckpoint;
+  }
+
+  /// Adds rows to the tables. Episodes end thousands of times a second. Their rows are written with
+  /// the next row of metrics or checkpoint, or when many are waiting.
+  void LogMetrics(const Row& row);
+  void LogEpisode(const Row& row);
+  void LogEvaluation(const Row& row);
+  /// Adds a line with date and time to log.txt.
+  void Log(std::string_view line);
+
+  /// Adds the tables' sizes to a checkpoint and writes it in place of the previous one.
+  void SaveCheckpoint(Tensors& checkpoint);
+
+ private:
+  struct Table {
+    std::string tag;  // prefix of its columns in TensorBoard; empty: not in TensorBoard
+    AppendFile file;
+    std::vector<std::string> columns;  // column names of the first line; empty: no line yet
+    std::string pending;               // rows that are not in the file yet
+    void Flush();
+  };
+  /// Appends a row in the order of the table's own columns. Another version may have begun the
+  /// table.
+  void AppendRow(Table& table, const Row& row);
+
+  std::filesystem::path path_;
+  Table metrics_, episodes_, evals_;
+  EventFile events_;
+  AppendFile log_;
+};
+
+}  // namespace upswing

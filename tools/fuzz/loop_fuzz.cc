@@ -1,0 +1,22 @@
+// Target: the faults of encoders, clock, firmware and line in a run of the control loop. Accepted:
+// a run without a fault.
+#include "extras/loop/adverse_testing.h"
+#include "tools/fuzz/target.h"
+
+namespace upswing {
+
+bool TryInput(std::string_view input) {
+  size_t at = 0;
+  // Without further bytes nothing else goes wrong.
+  const auto next = [&] { return at < input.size() ? static_cast<unsigned char>(input[at++]) : 1; };
+  const Chooser choose = [&](uint32_t n) {
+    const uint32_t low = next();
+    return (n > 256 ? low + 256U * next() : low) % n;
+  };
+  const bool with_twin = choose(2) == 0;
+  const AdverseRun run = RunAdversely(with_twin, 64, 300, choose);
+  Expect(run.violation.empty(), "safe torques");
+  return run.reason.empty();
+}
+
+}  // namespace upswing
