@@ -33,7 +33,7 @@ def run(*command, **more):
 
 
 PORTABLE = ["base", "nn", "pendulum", "rl", "control"]
-EXAMPLES = ["control_loop", "own_task", "train_and_judge"]
+EXAMPLES = ["control_loop", "dqn_on_one_page", "own_task", "train_and_judge"]
 
 # A project that finds the library, with one target for each part to build.
 PROJECT = f"""cmake_minimum_required(VERSION 3.25)
@@ -41,6 +41,7 @@ project(everything LANGUAGES CXX)
 foreach(name IN ITEMS {" ".join(EXAMPLES)})
   add_subdirectory({ROOT}/examples/${{name}} ${{name}})
 endforeach()
+target_compile_options(dqn_on_one_page PRIVATE -O2)
 add_subdirectory(docs)
 add_subdirectory(headers)
 add_subdirectory(wants)
@@ -86,7 +87,7 @@ class Library(unittest.TestCase):
             (source / path).write_text(text, encoding="utf-8")
         cache = (BUILD / "CMakeCache.txt").read_text(encoding="utf-8")
         compiler = re.search(r"^CMAKE_CXX_COMPILER:\w+=(.*)", cache, re.MULTILINE)[1]
-        # The slow code is in the library, so these programs need no optimisation.
+        # The slow code is in the library, so most of these programs need no optimisation.
         options = [f"-DCMAKE_CXX_COMPILER={compiler}", f"-DCMAKE_PREFIX_PATH={cls.prefix}",
                    "-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS_RELEASE=-O0 -DNDEBUG",
                    "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Wpedantic -Werror"]
@@ -129,6 +130,14 @@ class Library(unittest.TestCase):
         program = self.build("own_task")
         self.assertRegex(run(program), r"\nsolved after \d+ steps\n$")
         self.assertNotIn("mujoco", run("ldd", program))
+
+    def test_dqn_on_one_page(self):
+        lines = run(self.build("dqn_on_one_page"), "--seed", 1).splitlines()
+        self.assertRegex(lines[-1], r"^balances: 20 of 20 episodes after \d+ steps\.$")
+        source = ROOT / "examples/dqn_on_one_page/dqn_on_one_page.cc"
+        lengths = [len(line) for line in source.read_text(encoding="utf-8").splitlines()]
+        self.assertLessEqual(len(lengths), 250)
+        self.assertLessEqual(max(lengths), 100)
 
     def test_control_loop(self):
         program = self.build("control_loop")
