@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 #include <numbers>
 #include <thread>
 
@@ -201,6 +202,28 @@ TEST(ControlLoop, CompensatesTheFrictionOfTheOtherJoint) {
     }
   }
   EXPECT_GT(largest, 0.1);
+}
+
+/// Fails in its hundredth cycle, while the motor drives.
+class FailingController : public BoardController {
+ public:
+  void Act(int step, const BoardMeasurement& /*measured*/, size_t /*count*/,
+           Lanes& torque) override {
+    if (step >= 100) throw std::bad_alloc();
+    torque[0] = 1;
+  }
+};
+
+TEST(ControlLoop, AnExceptionSwitchesTheMotorsOff) {
+  LoopBench bench;
+  bench.competitor.make = [](size_t) { return std::make_unique<FailingController>(); };
+  bench.competitor.period = 1;
+  bench.link = std::make_unique<FakeLink>(bench.twin, FakeConfig{});
+  bench.Make();
+  EXPECT_THROW(bench.loop->Run(), std::bad_alloc);
+  EXPECT_GT(bench.loop->summary().driven, 0.1);
+  EXPECT_FALSE(FakeOf(bench).enabled());
+  EXPECT_EQ(FakeOf(bench).machine().torque(), (Joints{0, 0}));
 }
 
 TEST(Supervisor, TakesTheReadingsOfARealMachineForMotions) {
