@@ -33,8 +33,7 @@ class AdverseLink : public MachineLink {
         limit_(limit),
         rarity_(rarity),
         machine_(twin, {}, {}),
-        datagrams_(choose_(2) == 0),
-        protocol_(datagrams_),
+        protocol_(/*datagrams=*/choose_(2) == 0),
         clock_(choose_(5)) {}
 
   double Now() const override { return now_; }
@@ -189,7 +188,6 @@ class AdverseLink : public MachineLink {
   Joints limit_;  // N·m
   uint32_t rarity_;
   FakeMachine machine_;
-  bool datagrams_;
   LinkProtocol protocol_;
   uint32_t clock_;
   double now_ = 0, last_reading_ = -1;  // s

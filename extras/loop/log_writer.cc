@@ -2,11 +2,9 @@
 
 #include <fmt/format.h>
 #include <sys/file.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <iterator>
-#include <tuple>
 
 #include "base/error.h"
 #include "base/text.h"
@@ -68,13 +66,10 @@ void LogWriter::Add(const LoopRow& row, bool waits) {
 }
 
 void LogWriter::Flush() {
-  AppendFile& file = file_.front();
-  const int64_t whole = file.size();  // ends with a whole row
   try {
-    if (error_.empty()) file.Append(text_);
+    if (error_.empty()) file_.front().Append(text_);
   } catch (const Error& error) {
     error_ = error.what();  // the machine goes on; Finish reports it
-    std::ignore = ftruncate(file.descriptor(), whole);
   }
   text_.clear();
 }

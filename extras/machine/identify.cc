@@ -30,12 +30,6 @@ std::vector<int> Folds(std::span<const MachineLog> logs, int folds) {
   return fold;
 }
 
-bool HasMotors(std::span<const MachineLog> logs) {
-  return std::ranges::any_of(logs, [](const MachineLog& log) {
-    return HasTorque(log.commanded, 0) || HasTorque(log.commanded, 1);
-  });
-}
-
 /// Throws BadInput for a log in which a motor acts without commanded torques, which drive the
 /// model.
 void ExpectCommands(const MachineLog& log) {
@@ -78,7 +72,7 @@ std::vector<Structure> Structures(bool has_motors) {
 Identification Identify(std::span<const MachineLog> logs, const Twin& first,
                         const IdentifyConfig& config, ThreadPool* pool, const Progress& progress) {
   for (const MachineLog& log : logs) ExpectCommands(log);
-  const std::vector<Structure> structures = Structures(HasMotors(logs));
+  const std::vector<Structure> structures = Structures(HasCommands(logs));
   Identification result;
   const int n = static_cast<int>(logs.size());
   const double fits = 1.0 + config.folds * static_cast<double>(structures.size());

@@ -282,6 +282,12 @@ bool HasTorque(const std::vector<Joints>& torque, int joint) {
   return std::ranges::any_of(torque, [joint](const Joints& u) { return u[joint] != 0; });
 }
 
+bool HasCommands(std::span<const MachineLog> logs) {
+  return std::ranges::any_of(logs, [](const MachineLog& log) {
+    return HasTorque(log.commanded, 0) || HasTorque(log.commanded, 1);
+  });
+}
+
 LogColumns ParseLogColumns(std::string_view text, const std::string& where) {
   LogColumns columns;
   for (const auto& [key, node] : ParseToml(text, where)) {

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -34,6 +35,9 @@ struct MachineLog {
 
 /// Whether the torques of a log, which may lack them, are ever other than 0 at a joint (0 or 1).
 bool HasTorque(const std::vector<Joints>& torque, int joint);
+
+/// Whether the commanded torques of any of these logs are ever other than 0.
+bool HasCommands(std::span<const MachineLog> logs);
 
 /// A column of a file and its unit.
 struct LogColumn {

@@ -70,10 +70,7 @@ std::string ErrorText(const Estimate& e) {
 
 /// The torques that drive predictions in place of reported ones.
 const char* CommandedIn(std::span<const MachineLog> logs) {
-  const bool has_commands = std::ranges::any_of(logs, [](const MachineLog& log) {
-    return HasTorque(log.commanded, 0) || HasTorque(log.commanded, 1);
-  });
-  return has_commands ? "commanded" : "no";
+  return HasCommands(logs) ? "commanded" : "no";
 }
 
 void PrintErrors(std::span<const ErrorRow> rows, std::span<const Predictor> predictors,

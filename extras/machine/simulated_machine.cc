@@ -19,15 +19,15 @@ void SimulatedMachine::Advance(double time) {
   const int steps = MotionSteps(time - begin);
   const double h = (time - begin) / steps;
   if (h <= 0) return;
+  int cursor = 0;
   for (int i = 0; i < steps; ++i) {
     const double end = i + 1 == steps ? time : begin + (i + 1) * h;
-    moments_.push_back(After(moments_.back(), h, end, cursor_));
+    moments_.push_back(After(moments_.back(), h, end, cursor));
   }
   const double oldest = time - std::max({twin_.actuator.current_delay, -twin_.actuator.delay, 0.0});
   while (moments_.size() > 2 && moments_[1].time <= oldest) moments_.pop_front();
   constexpr double kKept = 0.2;  // s
   drive_.Forget(time - kKept);
-  cursor_ = 0;
 }
 
 SimulatedMachine::Moment SimulatedMachine::After(const Moment& moment, double h, double time,
@@ -45,7 +45,6 @@ void SimulatedMachine::Command(const Joints& torque) {
   while (moments_.size() > 1 && moments_.back().time > now + twin_.actuator.delay) {
     moments_.pop_back();
   }
-  cursor_ = 0;
   Advance(now);
 }
 

@@ -60,7 +60,6 @@ class SimulatedMachine {
   Twin twin_;
   Manipulator body_;
   Drive drive_;
-  int cursor_ = 0;
   std::deque<Moment> moments_;  // the newest last; as long as reported torques are old and
                                 // torques act back
 };

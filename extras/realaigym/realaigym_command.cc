@@ -181,8 +181,8 @@ int CompareTvlqr(const RealAiGymArguments& a, std::span<const MachineLog> logs,
     throw BadInput("--law: expected runs without pushes to rebuild the TVLQR from, got none");
   }
   const Twin twin = ReadTwin(a.twin, "--twin");
-  const std::vector<MachineLog> of_law =
-      ReadCheckedLogs(a.law.empty() ? a.hardware : a.law, "", [](const std::string&) {});
+  const std::vector<MachineLog> read = ReadCheckedLogs(a.law, "", [](const std::string&) {});
+  const std::span<const MachineLog> of_law = a.law.empty() ? logs : read;
   if (!a.law.empty() && ScoreHardware(of_law, {}).robot != real.robot) {
     throw BadInput(Concat("--law: expected runs of the ", NameOf(real.robot), ", got others"));
   }

@@ -11,6 +11,7 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <tuple>
 #include <utility>
 
 #include "base/error.h"
@@ -232,7 +233,11 @@ void AppendFile::Sync() const {
 }
 
 void AppendFile::Append(std::span<const std::byte> bytes) {
-  if (!WriteAll(descriptor_.get(), bytes)) throw PathError("cannot write", path_, errno);
+  if (!WriteAll(descriptor_.get(), bytes)) {
+    const int error_number = errno;
+    std::ignore = ftruncate(descriptor_.get(), size_);
+    throw PathError("cannot write", path_, error_number);
+  }
   size_ += static_cast<int64_t>(bytes.size());
 }
 

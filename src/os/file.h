@@ -101,7 +101,8 @@ class AppendFile {
   /// Cuts the file to `size` bytes, at most its current size. Throws Failure.
   void CutTo(int64_t size);
 
-  /// Appends all bytes at once. Throws Failure, for example on a full disk.
+  /// Appends all bytes or, as far as the system permits, none. Throws Failure, for example on a
+  /// full disk.
   void Append(std::span<const std::byte> bytes);
   void Append(std::string_view text) { Append(BytesOf(text)); }
 
