@@ -58,6 +58,8 @@ class Firmware(threading.Thread):
     def __init__(self, test, reading=lambda i: (0, 0), pack=lambda frame, i: frame):
         super().__init__(daemon=True)
         self.reading, self.pack, self.commands = reading, pack, []
+        self.known = []  # number of the newest reading that each command knew
+        self.number = 0  # of this reading
         self.driven = threading.Event()  # motors were on for 50 commands
         self.silent = threading.Event()  # no command for a while, once they were
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -70,6 +72,7 @@ class Firmware(threading.Thread):
     def run(self):
         on = 0
         for number in itertools.count(1):
+            self.number = number
             try:
                 command, sender = self.socket.recvfrom(1000)
             except TimeoutError:
@@ -78,7 +81,8 @@ class Firmware(threading.Thread):
                 continue
             except OSError:
                 return
-            flags, sequence = struct.unpack_from("<HI", command, 6)
+            flags, sequence, known = struct.unpack_from("<HII", command, 6)
+            self.known.append(known)
             self.commands.append((flags & 1, struct.unpack_from("<2f", command, 24)))
             angles = self.reading(on) if on > 0 else (0, 0)
             on += flags & 1
@@ -176,7 +180,7 @@ class Protection(ProgramTest):
                     def reading(i):
                         if i < 60 or (once and i > 100):
                             return 0, 0
-                        wrong.append(len(firmware.commands))
+                        wrong.append(firmware.number)
                         return 0, change
 
                     firmware = Firmware(self, reading)
@@ -184,9 +188,10 @@ class Protection(ProgramTest):
                     _, err = run.communicate(timeout=PATIENCE)
                     self.assertEqual(run.returncode, 1)
                     self.assertRegex(err, "joint 2: the (angle jumps by|encoder saturates)")
-                    # On a busy machine one command may cross the reading.
-                    self.assertLessEqual(len(firmware.commands[wrong[0]:]), 4)
-                    self.assertEqual({on for on, _ in firmware.commands[wrong[0] + 1:]}, {0})
+                    # The first command after the wrong reading is off.
+                    after = [on for (on, _), known in zip(firmware.commands, firmware.known)
+                             if known >= wrong[0]]
+                    self.assertEqual(after, [0] * 3)
                     self.assert_off(firmware)
 
     def test_a_datagram_is_one_frame(self):
