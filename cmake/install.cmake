@@ -4,6 +4,7 @@ include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 set(UPSWING_LAYERS base nn pendulum rl control os mujoco report agents runs judge)
 set(UPSWING_EXTRAS machine realaigym loop deploy view)
+set(UPSWING_PROGRAMS upswing upswing-machine upswing-realaigym upswing-deploy upswing-view)
 set(UPSWING_PACKAGE ${CMAKE_INSTALL_LIBDIR}/cmake/upswing)
 set(UPSWING_INSTALLED_MUJOCO ${CMAKE_INSTALL_LIBDIR}/upswing/mujoco)
 
@@ -31,12 +32,13 @@ install(FILES ${CMAKE_CURRENT_BINARY_DIR}/upswing-config.cmake
 # Packages have shared libraries of their own in lib/upswing, and the wheel's MuJoCo comes along with its
 # headers and licences.
 file(RELATIVE_PATH FROM_BIN /${CMAKE_INSTALL_BINDIR} /${CMAKE_INSTALL_LIBDIR}/upswing)
-set_target_properties(upswing PROPERTIES INSTALL_RPATH "$ORIGIN/${FROM_BIN}")
+set(UPSWING_RPATH "$ORIGIN/${FROM_BIN}")
 if(NOT mujoco_FOUND)
   install(DIRECTORY ${UPSWING_MUJOCO}/ DESTINATION ${UPSWING_INSTALLED_MUJOCO})
-  set_property(TARGET upswing APPEND PROPERTY INSTALL_RPATH "$ORIGIN/${FROM_BIN}/mujoco/lib")
+  list(APPEND UPSWING_RPATH "$ORIGIN/${FROM_BIN}/mujoco/lib")
 endif()
-install(TARGETS upswing)
+set_target_properties(${UPSWING_PROGRAMS} PROPERTIES INSTALL_RPATH "${UPSWING_RPATH}")
+install(TARGETS ${UPSWING_PROGRAMS})
 install(FILES LICENSE README.md CHANGELOG.md CITATION.cff DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(DIRECTORY examples DESTINATION ${CMAKE_INSTALL_DATADIR}/upswing PATTERN "*_test.py" EXCLUDE
         PATTERN "__pycache__" EXCLUDE)

@@ -11,12 +11,11 @@ function(upswing_quickly name)
   target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
 endfunction()
 
-# One library for each layer, a folder, with the tests next to its files. COMMANDS are sources
-# of the program.
-# upswing_layer(NAME SOURCES … COMMANDS … TESTS … PUBLIC … PRIVATE …)
+# One library for each layer, a folder, with the tests next to its files.
+# upswing_layer(NAME SOURCES … TESTS … PUBLIC … PRIVATE …)
 function(upswing_layer name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;COMMANDS;TESTS;PUBLIC;PRIVATE" ${ARGN})
-  foreach(FILES IN ITEMS SOURCES COMMANDS TESTS)
+  cmake_parse_arguments(ARG "" "" "SOURCES;TESTS;PUBLIC;PRIVATE" ${ARGN})
+  foreach(FILES IN ITEMS SOURCES TESTS)
     list(TRANSFORM ARG_${FILES} PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/${name}/)
   endforeach()
   add_library(upswing_${name} STATIC ${ARG_SOURCES})
@@ -26,10 +25,6 @@ function(upswing_layer name)
   target_include_directories(upswing_${name} PUBLIC $<BUILD_INTERFACE:${UPSWING_INCLUDE}>
                                                     $<INSTALL_INTERFACE:include/upswing>)
   target_link_libraries(upswing_${name} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
-  if(ARG_COMMANDS)
-    target_sources(upswing PRIVATE ${ARG_COMMANDS})
-    target_link_libraries(upswing PRIVATE upswing_${name})
-  endif()
   if(UPSWING_TESTS AND ARG_TESTS)
     add_executable(${name}_test ${ARG_TESTS})
     upswing_unity(${name}_test)

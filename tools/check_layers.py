@@ -44,7 +44,7 @@ LAYERS = {
     "web": PRODUCT | EXTRAS,
     "examples": PRODUCT | EXTRAS,
 }
-COMMAND = re.compile(r"extras/\w+/\w+_command\.cc$")
+COMMAND = re.compile(r"extras/\w+/(\w+_command|main)\.cc$")
 
 # Files that may include each foreign library.
 ALLOWED_FILES = {

@@ -12,7 +12,7 @@ demo() {
   for word; do
     case $word in -h | --help) help=yes ;; esac
   done
-  set_up release upswing
+  set_up release upswing upswing-deploy
   [ -x "$program" ] || fail "the program is not built: run ./upswing demo once without --no-setup"
   if [ -z "${UPSWING_PAGE:-}" ]; then
     [ "$setup" = no ] || [ "$help" = yes ] || build_demo

@@ -113,7 +113,8 @@ class DemoTest(ProgramTest):
     def test_an_installed_program_finds_its_page(self):
         place = self.folder / "installed"
         (place / "bin").mkdir(parents=True)
-        shutil.copy2(UPSWING, place / "bin")
+        for program in ("upswing", "upswing-deploy"):
+            shutil.copy2(UPSWING.with_name(program), place / "bin")
         del self.environment["UPSWING_PAGE"]
         command = [place / "bin/upswing", "demo"]
         done = subprocess.run(command, env=self.environment, stdin=subprocess.DEVNULL, check=False,

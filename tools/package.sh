@@ -58,7 +58,8 @@ package() {
   packages="$packages $window_packages $deb_packages $bench_packages python3-dev"
   viewer=yes
   set_up_docs
-  set_up release upswing upswing-bench
+  # shellcheck disable=SC2046  # a list of words
+  set_up release upswing $(extra_programs)
   rm -rf "$root/build/docs-work" "$docs" # an earlier build leaves pages and words of the index
   build_docs
   build_demo
@@ -84,6 +85,7 @@ set_up_arm64() {
       *) [ "$(id -u)" != 0 ] || dpkg --add-architecture arm64 ;;
     esac
     install_packages $arm64_packages
-    build arm64 upswing
+    # shellcheck disable=SC2046  # a list of words
+    build arm64 upswing $(extra_programs | grep -v upswing-bench)
   ) </dev/null || exit 1
 }

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <iterator>
 #include <sstream>
 #include <utility>
@@ -225,6 +226,12 @@ CLI::Option* AddText(CLI::App& app, std::string_view name, Target& target, std::
   return option;
 }
 
+/// Whether --help lists a command: packages leave out some programs, and have no launcher.
+bool IsAvailable(const CommandEntry& entry) {
+  return !IsInstalled() || (!entry.program.empty() &&
+                            std::filesystem::exists(ProgramPath().replace_filename(entry.program)));
+}
+
 }  // namespace
 
 size_t HelpColumns() { return static_cast<size_t>(std::clamp(TerminalWidth(100), 80, 100)); }
@@ -311,8 +318,8 @@ std::string CommandLine::Last(std::string_view name) const {
   return values.empty() ? "" : values.back();
 }
 
-int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> commands,
-               const std::string& footer) {
+int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> table,
+               std::span<const Command> own, const std::string& footer) {
   CLI::App program(
       "Upswing trains, compares, explains and deploys controllers that swing up and\n"
       "balance a double pendulum with one motor.",
@@ -324,18 +331,20 @@ int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> 
   formatter->column_width(kCommandColumns);
   program.formatter(formatter);
   program.footer(footer);
-  std::vector<std::unique_ptr<CommandLine>> lines;
-  const CommandLine* chosen = nullptr;
-  const bool installed = IsInstalled();
-  for (const CommandEntry& command : commands) {
-    if (command.declare == nullptr && installed) continue;  // only the repository has it
-    CLI::App* app = program.add_subcommand(command.name, command.help);
+  for (const CommandEntry& entry : table) {
+    if (IsAvailable(entry))
+      program.add_subcommand(std::string(entry.name), std::string(entry.help));
+  }
+  // Only the called command has arguments.
+  const std::string_view called = argc > 1 ? argv[1] : "";
+  const auto command = std::ranges::find(own, called, &Command::name);
+  std::optional<CommandLine> line;
+  if (command != own.end()) {
+    CLI::App* app = program.get_subcommand(std::string(called));
     app->formatter(std::make_shared<HelpFormatter>());
-    CommandLine& line = *lines.emplace_back(new CommandLine(*app));
-    if (command.declare != nullptr) command.declare(line);
-    app->callback([&line, &chosen] {
-      for (const auto& check : line.checks_) check();
-      chosen = &line;
+    command->declare(line.emplace(*app));
+    app->callback([&line] {
+      for (const auto& check : line->checks_) check();
     });
   }
   try {
@@ -348,7 +357,8 @@ int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> 
   } catch (const CLI::ParseError& error) {
     throw BadInput(Explain(program, error));
   }
-  return chosen->run_();
+  if (!line) throw BadInput(ExplainCommands(program, Printable(std::string(called))));
+  return line->run_();
 }
 
 }  // namespace upswing

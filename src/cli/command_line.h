@@ -79,24 +79,31 @@ class CommandLine {
 
  private:
   friend int RunProgram(int argc, const char* const* argv,
-                        std::span<const struct CommandEntry> commands, const std::string& footer);
+                        std::span<const struct CommandEntry> table,
+                        std::span<const struct Command> own, const std::string& footer);
 
   CLI::App& app_;
   std::vector<std::function<void()>> checks_;
   std::function<int()> run_;
 };
 
-/// A row of the table of commands.
+/// A row of the table of all commands.
 struct CommandEntry {
-  const char* name;
-  const char* help;               // one line
-  void (*declare)(CommandLine&);  // null: the command is a separate program
+  std::string_view name, help;  // help: one line
+  std::string_view program;     // that has the command; empty: only the launcher has it
 };
 
-/// Parses the command line, runs the command and returns its exit code. `footer` ends the program's
-/// --help. Throws BadInput with a message of one line if the command line is wrong.
-int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> commands,
-               const std::string& footer);
+/// A command that this program has.
+struct Command {
+  std::string_view name;
+  void (*declare)(CommandLine&);
+};
+
+/// Parses the command line, runs one of the program's `own` commands and returns its exit code.
+/// --help lists `table` and ends with `footer`. Throws BadInput with a message of one line if the
+/// command line is wrong.
+int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> table,
+               std::span<const Command> own, const std::string& footer);
 
 /// Largest number of columns in a line of --help: the terminal's, limited to 80 to 100; without a
 /// terminal 100.

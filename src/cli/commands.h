@@ -20,13 +20,6 @@ void AddPlot(CommandLine& line);
 void AddInfo(CommandLine& line);
 void AddCompare(CommandLine& line);
 void AddStudy(CommandLine& line);
-void AddExport(CommandLine& line);
-void AddView(CommandLine& line);
-void AddRealAiGym(CommandLine& line);
-void AddMachine(CommandLine& line);
-void AddRun(CommandLine& line);
-void AddFake(CommandLine& line);
-void AddDemo(CommandLine& line);
 
 /// Adds the policy argument (a file, a run folder or a controller) and the controllers' settings.
 void AddPolicy(CommandLine& line, PolicyArguments& a);

@@ -3,6 +3,7 @@
 #include <poll.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -11,6 +12,7 @@
 #include <exception>
 #include <filesystem>
 #include <iostream>
+#include <iterator>
 #include <system_error>
 
 #include "base/error.h"
@@ -23,6 +25,39 @@
 
 namespace upswing {
 namespace {
+
+/// The only list of commands, in the order of --help: name, help, program. The launcher ./upswing
+/// reads it, one line each.
+constexpr CommandEntry kTable[] = {
+    {"train", "Train an agent until it solves the task", "upswing"},
+    {"eval", "Evaluate a policy over many episodes", "upswing"},
+    {"bounds", "Search for the best episodes and compare policies with them", "upswing"},
+    {"simulate", "Write one rollout of a policy or of given torques as CSV", "upswing"},
+    {"map", "Map success over two quantities of plant, sensors or start", "upswing"},
+    {"plot", "Draw one episode of a policy as figures", "upswing"},
+    {"view", "Show policies in a window, or record them as a film or pictures", "upswing-view"},
+    {"info", "Describe and check a policy or a run, or describe this machine", "upswing"},
+    {"compare", "Compare runs over their seeds, with intervals and curves", "upswing"},
+    {"study", "Train variants of the settings, each with many seeds", "upswing"},
+    {"export", "Export policies as ONNX or C, or into the page", "upswing-deploy"},
+    {"realaigym", "Score a policy by RealAIGym's rules, or search for one", "upswing-realaigym"},
+    {"machine", "Check logs of a real machine, identify its twin, validate it", "upswing-machine"},
+    {"run", "Drive a real machine or its twin with a policy", "upswing-machine"},
+    {"fake", "Play a machine for `run`: a twin behind UDP or a terminal", "upswing-machine"},
+    {"bench", "Measure the speed of the program on this machine", "upswing-bench"},
+    {"demo", "Serve the page in which policies swing up the pendulum live", "upswing-deploy"},
+    {"docs", "Build the documentation, or the whole web site", ""},
+    {"package", "Build packages: tarball, Debian package, Python wheels", ""},
+    {"python", "Run Python with the package upswing", ""},
+    {"test", "Build and run all tests", ""},
+};
+
+constexpr const char* kExamples =
+    "Examples:\n"
+    "  ./upswing train                   train the default agent until it solves the task\n"
+    "  ./upswing eval runs/d3qn-seed1    evaluate its best policy\n"
+    "  ./upswing compare runs            compare the agents in runs over their seeds\n"
+    "  ./upswing train --help            show all settings with their defaults\n";
 
 /// Whether standard output has no reader any more, as after `| head -1` has ended.
 bool OutputIsClosed() {
@@ -53,23 +88,23 @@ void ChooseVectors() {
   if (path != nullptr && *path != '\0') UseSimdPath(path);
 }
 
-/// Runs a command that is a separate program: `upswing-NAME` in the same folder.
-void ReplaceByProgramOf(const std::string& command, char** argv) {
-  const std::filesystem::path program = ProgramPath().parent_path() / Concat("upswing-", command);
-  execv(program.c_str(), argv);
-  throw BadInput(
-      Concat(command, ": only the source repository has this command: ./upswing ", command));
+/// Runs a command of another program instead, if the first argument is one.
+void RunOtherProgram(char** argv, std::span<const Command> own) {
+  const std::string_view name = argv[1] == nullptr ? "" : argv[1];
+  const auto* entry = std::ranges::find(kTable, name, &CommandEntry::name);
+  if (entry == std::end(kTable) || std::ranges::find(own, name, &Command::name) != own.end())
+    return;
+  const std::filesystem::path program = ProgramPath().replace_filename(entry->program);
+  if (!entry->program.empty()) execv(program.c_str(), argv);
+  throw BadInput(Concat(name, ": expected ./upswing ", name, " in the source repository",
+                        entry->program.empty() ? "" : Concat(", which builds ", entry->program)));
 }
 
-int Main(int argc, char** argv, std::span<const CommandEntry> commands, const std::string& footer) {
+int Main(int argc, char** argv, std::span<const Command> own) {
   try {
-    for (const CommandEntry& command : commands) {
-      if (command.declare == nullptr && argc > 1 && command.name == std::string_view(argv[1])) {
-        ReplaceByProgramOf(command.name, argv);
-      }
-    }
+    RunOtherProgram(argv, own);
     ChooseVectors();
-    return Finish(RunProgram(argc, argv, commands, footer));
+    return Finish(RunProgram(argc, argv, kTable, own, kExamples));
   } catch (const Error& error) {
     SayError(OneLine(error.what()));
     return error.exit_code();
@@ -89,14 +124,13 @@ int Main(int argc, char** argv, std::span<const CommandEntry> commands, const st
 
 }  // namespace
 
-int MainProgram(int argc, char** argv, std::span<const CommandEntry> commands,
-                const std::string& footer) {
+int MainProgram(int argc, char** argv, std::span<const Command> own) {
   ListenToSignals();
   OpenStandardFiles();
   // A failed write then returns an error, which gets a message, instead of ending the program.
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
-  return Main(argc, argv, commands, footer);
+  return Main(argc, argv, own);
 }
 
 }  // namespace upswing

@@ -219,13 +219,12 @@ void AddBench(CommandLine& line) {
       "  ./upswing bench kernels --simd avx2 --seconds 1 --repetitions 5\n");
 }
 
-constexpr CommandEntry kCommands[] = {
-    {"bench", "Measure the speed of the program on this machine", AddBench}};
+constexpr Command kCommands[] = {{"bench", AddBench}};
 
 }  // namespace
 }  // namespace upswing
 
 // An exception during the report of another exception ends the program.
 int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
-  return upswing::MainProgram(argc, argv, upswing::kCommands, "");
+  return upswing::MainProgram(argc, argv, upswing::kCommands);
 }

@@ -70,18 +70,18 @@ def needed_libraries(target, elf):
     return re.findall(r"NEEDED +(\S+)", output(f"{target.tools}objdump", "-p", elf))
 
 
-def add_libraries(target, program, folder):
-    """Copies the shared libraries that `program` needs, except those of every system."""
+def add_libraries(target, programs, folder):
+    """Copies the shared libraries that `programs` need, except those of every system."""
     folder.mkdir(parents=True, exist_ok=True)
     compiler = f"{target.tools}g++"  # knows the folders of the libraries
-    waiting = needed_libraries(target, program)
+    waiting = [name for program in programs for name in needed_libraries(target, program)]
     while waiting:
         name = waiting.pop()
         if SYSTEM_LIBRARIES.fullmatch(name) or (folder / name).exists():
             continue
         path = Path(output(compiler, f"-print-file-name={name}").strip())
         if not path.is_absolute():
-            raise Refused(f"{program.name} needs {name}, which {compiler} does not find")
+            raise Refused(f"expected {name} where {compiler} finds libraries, got no such file")
         shutil.copyfile(path, folder / name)
         waiting += needed_libraries(target, folder / name)
 
@@ -116,13 +116,12 @@ class Packager:
         self.venvs = arguments.work
         self.work = arguments.work / target.machine
         self.tree = self.work / self.name
-        self.program = self.tree / "bin/upswing"
 
     def make_tree(self):
         """The installed program and library with everything that packages ship."""
         shutil.rmtree(self.work, ignore_errors=True)
         output("cmake", "--install", self.target.build, "--strip", "--prefix", self.tree)
-        add_libraries(self.target, self.program, self.tree / "lib/upswing")
+        add_libraries(self.target, self.programs(), self.tree / "lib/upswing")
         shutil.copytree(self.page, self.tree / "share/upswing/page")
         documents = self.tree / "share/doc/upswing"
         shutil.copytree(self.docs, documents / "html",
@@ -132,8 +131,11 @@ class Packager:
                                                  encoding="utf-8")
         normalise(self.tree, self.epoch)
 
+    def programs(self):
+        return sorted((self.tree / "bin").iterdir())
+
     def elves(self):
-        return [self.program, *(self.tree / "lib/upswing").rglob("*.so*")]
+        return [*self.programs(), *(self.tree / "lib/upswing").rglob("*.so*")]
 
     def glibc(self):
         return needed_version(self.target, self.elves(), "GLIBC")
@@ -171,6 +173,8 @@ class Packager:
                         f" -- The Upswing developers <upswing@localhost>  {date}\n")
         (root / "usr/share/man/man1").mkdir(parents=True)
         self.write_gzip(root / "usr/share/man/man1/upswing.1.gz", self.manual())
+        for extra in self.programs()[1:]:
+            (root / f"usr/share/man/man1/{extra.name}.1.gz").symlink_to("upswing.1.gz")
         overrides = root / "usr/share/lintian/overrides/upswing"
         overrides.parent.mkdir(parents=True)
         shutil.copyfile(Path(__file__).with_name("lintian-overrides"), overrides)
@@ -191,9 +195,10 @@ class Packager:
         installed = self.work / "manual"
         (installed / "share/upswing").mkdir(parents=True)
         (installed / "bin").mkdir()
-        program = shutil.copy2(TARGETS["x86-64"].build / "bin/upswing", installed / "bin")
+        for program in self.programs():
+            shutil.copy2(TARGETS["x86-64"].build / "bin" / program.name, installed / "bin")
         return output("help2man", "--no-info", "--name", "controllers for a double pendulum",
-                      "--version-string", f"upswing {self.version}", program, env=self.environment)
+                      "--version-string", f"upswing {self.version}", installed / "bin/upswing", env=self.environment)
 
     def control(self, root):
         size = sum(path.lstat().st_size for path in root.rglob("*")) // 1024

@@ -83,7 +83,7 @@ class PackageTest(unittest.TestCase):
                          policy(UPSWING, self.folder / "built"))
 
     def test_help_is_that_of_an_installed_program(self):
-        for words in ([], ["train"], ["demo"]):
+        for words in ([], ["train"], ["demo"], ["run"]):
             text = call(self.tree / "bin/upswing", *words, "--help").stdout
             self.assertIn(f"\n  upswing {(words or ['train'])[0]}", text)
             self.assertNotIn("./upswing", text)
@@ -97,8 +97,8 @@ class PackageTest(unittest.TestCase):
         self.assertNotIn(b"./upswing", manual)
 
     def test_has_all_libraries_and_their_notices(self):
-        listed = call("ldd", self.tree / "bin/upswing").stdout
-        self.assertNotIn("not found", listed)
+        for program in (self.tree / "bin").iterdir():
+            self.assertNotIn("not found", call("ldd", program).stdout)
         components = tomllib.loads((FOLDER / "components.toml").read_text("utf-8"))["component"]
         parts = " ".join(component["part"] for component in components)
         libraries = list((self.tree / "lib/upswing").glob("*.so*"))
