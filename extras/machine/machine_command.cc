@@ -29,9 +29,8 @@ namespace upswing {
 namespace {
 
 struct MachineArguments {
-  std::string action;
   std::vector<std::string> logs;
-  std::string columns, figure, plant, out, csv;
+  std::string columns, figure, plant, out, twin, csv;
   std::vector<std::string> against;
   int64_t folds = 5, threads = 0;
   double seconds = 1;
@@ -164,18 +163,14 @@ nlohmann::ordered_json ErrorsJson(std::span<const ErrorRow> rows,
 constexpr std::array kHorizons{0.2, 0.5, 1.0};
 
 int RunValidate(const MachineArguments& a) {
-  if (a.logs.size() < 2) {
-    throw BadInput("machine validate: expected a twin and at least one log");
-  }
-  const std::string& file = a.logs.front();
+  const std::string& file = a.twin;
   if (file.ends_with(".csv") || file.ends_with(".csv.gz")) {
     throw BadInput(Concat("machine validate: expected the twin's file before the logs, got \"",
                           Printable(file), "\""));
   }
   const Twin twin = ReadTwin(file, "machine validate");
   const std::vector<Twin> others = ReadOthers(a);
-  const std::vector<MachineLog> logs =
-      ReadCheckedLogs(std::span(a.logs).subspan(1), a.columns, SayError);
+  const std::vector<MachineLog> logs = ReadCheckedLogs(a.logs, a.columns, SayError);
   std::vector<Predictor> predictors{PredictorOf(twin.name, twin, logs)};
   AddOthers(others, a, logs, predictors);
   ThreadPool pool(ResolveThreads(a.threads));
@@ -293,81 +288,41 @@ int RunIdentify(const MachineArguments& a) {
   return 0;
 }
 
-/// Refuses options of other actions.
-void CheckOptions(const CommandLine& line, const std::string& action) {
-  struct Owned {
-    const char* option;
-    std::vector<std::string> actions;
-  };
-  const std::array<Owned, 6> kOwned{{{"--plant", {"identify"}},
-                                     {"--out", {"identify"}},
-                                     {"--folds", {"identify"}},
-                                     {"--seconds", {"identify"}},
-                                     {"--csv", {"validate"}},
-                                     {"--against", {"identify", "validate"}}}};
-  for (const auto& [option, actions] : kOwned) {
-    if (!line.Has(option) || std::ranges::count(actions, action) > 0) continue;
-    throw BadInput(Concat("machine ", Printable(action), ": expected no ", option,
-                          ", which belongs to ", Join(actions, " and ")));
-  }
-}
-
-int RunMachine(const MachineArguments& a) {
-  if (a.logs.empty()) throw BadInput(Concat("machine ", a.action, ": expected a log, got none"));
+/// Checks the files to write before any work.
+void CheckOutputs(const MachineArguments& a) {
   if (!a.figure.empty()) {
     CheckFigureName(a.figure);
     CheckWritable("--figure", a.figure);
     CheckCanDraw();
   }
   if (!a.csv.empty()) CheckWritable("--csv", a.csv);
-  if (a.action == "check") return RunCheck(a);
-  return a.action == "identify" ? RunIdentify(a) : RunValidate(a);
 }
 
-}  // namespace
-
-void AddMachine(CommandLine& line) {
-  MachineArguments& a = line.Runs(RunMachine);
-  line.Text("action", a.action, "ACTION",
-            "check: look for faults in logs; identify: fit a twin, a model of the machine, to "
-            "logs; validate: compare a twin's predictions with logs");
-  line.Require("action");
-  line.Texts("log", a.logs, "LOG",
-             "logs of a machine with two joints, .csv or .csv.gz; validate: first the twin's file");
+/// Adds the arguments that the commands share.
+void AddLogs(CommandLine& line, MachineArguments& a, std::string_view figure) {
+  line.Texts("log", a.logs, "LOG", "logs of a machine with two joints, .csv or .csv.gz");
+  line.Require("log");
   line.Text("--columns", a.columns, "FILE",
             "TOML file that names the columns and units (default: those of RealAIGym)");
-  line.Text("--figure", a.figure, "FILE", "figure of a log to draw, .svg or .png");
-  line.Text("--csv", a.csv, "FILE",
-            "validate: CSV file to write, measured and predicted angles of 1 s of each log");
-  line.Text("--plant", a.plant, "FILE",
-            "identify: plant file or shipped plant with masses, lengths and first guesses");
-  line.Text("--out", a.out, "FILE", "identify: TOML file of the twin to write");
-  line.Repeated("--against", a.against, "FILE",
-                "identify, validate: another twin or plant to compare with; repeat for more");
-  Options own;
-  own.Section("identify");
-  own.Add(&a.folds, "folds", {0, 100}, "",
-          "number of folds of the cross-validation that chooses the model; 0: none");
-  own.Add(&a.seconds, "seconds", {0.05, 10}, "s", "length of a window");
-  line.Arguments(own);
-  AddThreads(line, a.threads);
+  line.Text("--figure", a.figure, "FILE", figure);
   line.Flag("--json", a.as_json, "print JSON instead of text");
-  line.Check([&line, &a] {
-    constexpr std::array kActions{"check", "identify", "validate"};
-    if (std::ranges::find(kActions, a.action) == kActions.end()) {
-      throw BadInput(Concat("machine: expected check, identify or validate, got \"",
-                            Printable(a.action), "\""));
-    }
-    CheckOptions(line, a.action);
-  });
+  line.Check([&a] { CheckOutputs(a); });
+}
+
+/// Adds the arguments of predictions.
+void AddPredictions(CommandLine& line, MachineArguments& a) {
+  line.Repeated("--against", a.against, "FILE",
+                "another twin or plant to compare with; repeat for more");
+  AddThreads(line, a.threads);
+}
+
+void AddCheck(CommandLine& line) {
+  MachineArguments& a = line.Runs(RunCheck);
+  AddLogs(line, a, "figure of the log to draw, .svg or .png");
   line.Footer(
-      "check prints a line for each finding. A note is a fact, such as the rate. A warning\n"
-      "needs a look. A fault misleads an analysis of the log: degrees, swapped columns,\n"
-      "a stuck encoder. Exit code: 0 without a fault, 1 with one, 2 if a log cannot be read.\n\n"
-      "identify fits masses, centres, inertias, friction, delay and lag to windows of the\n"
-      "logs. Each window has a free start state. The commanded torques drive the model; the\n"
-      "reported ones are a second measurement. Cross-validation chooses the model.\n"
-      "The twin's covariance includes the differences between sessions.\n\n"
+      "Prints a line for each finding. A note is a fact, such as the rate. A warning needs a\n"
+      "look. A fault misleads an analysis of the log: degrees, swapped columns, a stuck\n"
+      "encoder. Exit code: 0 without a fault, 1 with one, 2 if a log cannot be read.\n\n"
       "A file of columns:\n"
       "  time = {column = \"t\", unit = \"ms\"}         # s, ms, us\n"
       "  angle1 = {column = \"theta1\", unit = \"deg\"}  # rad, deg\n"
@@ -380,11 +335,58 @@ void AddMachine(CommandLine& line) {
       "Examples:\n"
       "  ./upswing machine check trajectory.csv\n"
       "  ./upswing machine check logs/*.csv.gz --json\n"
-      "  ./upswing machine identify logs/*.csv --plant realaigym-c1 \\\n"
-      "    --out twin.toml\n"
-      "  ./upswing machine validate twin.toml new/*.csv \\\n"
-      "    --against realaigym-c1\n"
       "  ./upswing machine check swing.csv --columns columns.toml --figure swing.svg\n");
+}
+
+void AddIdentify(CommandLine& line) {
+  MachineArguments& a = line.Runs(RunIdentify);
+  AddLogs(line, a, "figure of the prediction errors to draw, .svg or .png");
+  line.Text("--plant", a.plant, "FILE",
+            "plant file or shipped plant with masses, lengths and first guesses");
+  line.Text("--out", a.out, "FILE", "TOML file of the twin to write");
+  AddPredictions(line, a);
+  Options own;
+  own.Add(&a.folds, "folds", {0, 100}, "",
+          "number of folds of the cross-validation that chooses the model; 0: none");
+  own.Add(&a.seconds, "seconds", {0.05, 10}, "s", "length of a window");
+  line.Arguments(own);
+  line.Footer(
+      "Fits masses, centres, inertias, friction, delay and lag to windows of the logs. Each\n"
+      "window has a free start state. The commanded torques drive the model; the reported\n"
+      "ones are a second measurement. Cross-validation chooses the model. The twin's\n"
+      "covariance includes the differences between sessions.\n\n"
+      "Examples:\n"
+      "  ./upswing machine identify logs/*.csv --plant realaigym-c1 --out twin.toml\n"
+      "  ./upswing machine identify run1.csv run2.csv --plant arm.toml --out arm-twin.toml \\\n"
+      "    --folds 0\n");
+}
+
+void AddValidate(CommandLine& line) {
+  MachineArguments& a = line.Runs(RunValidate);
+  line.Text("twin", a.twin, "TWIN", "twin or plant file");
+  line.Require("twin");
+  AddLogs(line, a, "figure of the prediction errors to draw, .svg or .png");
+  line.Text("--csv", a.csv, "FILE",
+            "CSV file to write, measured and predicted angles of 1 s of each log");
+  AddPredictions(line, a);
+  line.Footer(
+      "Prints the median error of predictions over 0.2, 0.5 and 1 s, by session.\n\n"
+      "Examples:\n"
+      "  ./upswing machine validate twin.toml new/*.csv --against realaigym-c1\n");
+}
+
+}  // namespace
+
+void AddMachine(CommandLine& line) {
+  AddCheck(line.Subcommand("check", "Look for faults in logs"));
+  AddIdentify(line.Subcommand("identify", "Fit a twin, a model of the machine, to logs"));
+  AddValidate(line.Subcommand("validate", "Compare a twin's predictions with logs"));
+  line.Footer(
+      "Examples:\n"
+      "  ./upswing machine check logs/*.csv.gz\n"
+      "  ./upswing machine identify logs/*.csv --plant realaigym-c1 --out twin.toml\n"
+      "  ./upswing machine validate twin.toml new/*.csv --against realaigym-c1\n"
+      "  ./upswing machine identify --help     show all options of identify\n");
 }
 
 }  // namespace upswing

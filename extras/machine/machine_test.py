@@ -157,9 +157,9 @@ class Machine(ProgramTest):
         refuse(["machine", "check", "bomb.csv.gz"], "bomb.csv.gz", "bytes after decompression")
         refuse(["machine", "check", "none.csv"], "none.csv", "No such file")
         refuse(["machine", "check", "."], "folder")
-        refuse(["machine", "check"], "expected a log, got none")
-        refuse(["machine", "polish", good], "expected check, identify or validate", '"polish"')
-        refuse(["machine"], "expected ACTION", "got none")
+        refuse(["machine", "check"], "machine check: expected LOG", "got none")
+        refuse(["machine", "polish", good], "one of check, identify, validate", '"polish"')
+        refuse(["machine"], "machine: expected a command", "got none")
         refuse(["machine", "check", good, good, "--figure", "log.svg"], "--figure", "got 2")
         refuse(["machine", "check", good, "--figure", "log.txt"], "log.txt")
         refuse(["machine", "check", good, "--figure", "no/log.svg"], "--figure", "no")
@@ -170,13 +170,13 @@ class Machine(ProgramTest):
         identify = ["machine", "identify", good, "--plant", "plant.toml"]
         out = ["--out", "twin.toml"]
         for arguments, *words in (
-                (["machine", "check", good, *out], "expected no --out", "identify"),
-                (["machine", "check", good, "--against", "plant.toml"], "no --against",
-                 "identify and validate"),
-                (["machine", "validate", "plant.toml", good, "--seconds", "1"], "no --seconds"),
-                (["machine", "check", good, "--csv", "x.csv"], "belongs to validate"),
+                (["machine", "check", good, *out], "unknown flag --out", "machine identify has it"),
+                (["machine", "check", good, "--against", "plant.toml"], "unknown flag --against",
+                 "identify has it"),
+                (["machine", "validate", "plant.toml", good, "--seconds", "1"], "flag --seconds"),
+                (["machine", "check", good, "--csv", "x.csv"], "machine validate has it"),
                 (["machine", "validate", good, "plant.toml"], "the twin's file before the logs"),
-                (["machine", "validate", "plant.toml"], "a twin and at least one log"),
+                (["machine", "validate", "plant.toml"], "machine validate: expected LOG"),
                 (["machine", "validate", "plant.toml", good, "--against", "plant.toml",
                   "--against", "plant.toml"], "--against", "more than once"),
                 (identify, "expected --out FILE"),

@@ -141,7 +141,15 @@ std::vector<std::string> KnownWords(const CLI::App& app) {
   return words;
 }
 
-/// Suggests a similar flag for an unknown one, or explains why this command lacks it.
+/// The name of a command, such as `machine check`.
+std::string FullName(const CLI::App& app) {
+  const CLI::App* parent = app.get_parent();
+  const bool is_nested = parent != nullptr && parent->get_parent() != nullptr;
+  return is_nested ? Concat(FullName(*parent), " ", app.get_name()) : app.get_name();
+}
+
+/// Suggests a similar flag for an unknown one, explains why this command lacks it, or names a
+/// declared command that has it.
 std::string ExplainFlag(const CLI::App& app, const std::string& word) {
   if (const auto* help = dynamic_cast<const HelpFormatter*>(app.get_formatter().get())) {
     help->HideFlags();
@@ -151,25 +159,35 @@ std::string ExplainFlag(const CLI::App& app, const std::string& word) {
     const bool near = IsHidden(*option) && !DidYouMean(word, FlagsOf(*option)).empty();
     if (near) return Concat("; ", option->get_description());
   }
+  const CLI::App& parent = app.get_parent() == nullptr ? app : *app.get_parent();
+  for (const CLI::App* sibling : parent.get_subcommands({})) {
+    if (sibling->get_option_no_throw(word) != nullptr) {
+      return Concat("; ", FullName(*sibling), " has it");
+    }
+  }
   return app.get_option_no_throw("--set") != nullptr ? "; --set NAME=VALUE changes the plant" : "";
 }
 
-/// The message for `got`, a word that is not a command.
-std::string ExplainCommands(const CLI::App& program, const std::string& got) {
+/// Whether `app` is the program or a command with commands of its own.
+bool HasCommands(const CLI::App& app) { return !app.get_subcommands({}).empty(); }
+
+/// The message for `got`, which is not a command of `app`.
+std::string ExplainCommands(const CLI::App& app, const std::string& got) {
   std::vector<std::string> names;
-  for (const CLI::App* sub : program.get_subcommands({})) names.push_back(sub->get_name());
-  return Concat("expected a command, one of ", Join(names, ", "), "; got ", got);
+  for (const CLI::App* sub : app.get_subcommands({})) names.push_back(sub->get_name());
+  const std::string where = app.get_parent() == nullptr ? "" : Concat(app.get_name(), ": ");
+  return Concat(where, "expected a command, one of ", Join(names, ", "), "; got ", got);
 }
 
 /// The message for a missing argument.
-std::string ExplainMissing(const CLI::App& program, const CLI::App& app) {
-  if (&app == &program) return ExplainCommands(program, "none");
+std::string ExplainMissing(const CLI::App& app) {
+  if (HasCommands(app)) return ExplainCommands(app, "none");
   for (const CLI::Option* option : app.get_options()) {
     if (!option->get_required() || option->count() > 0) continue;
-    return Concat(app.get_name(), ": expected ", option->get_type_name(), " (",
+    return Concat(FullName(app), ": expected ", option->get_type_name(), " (",
                   option->get_description(), "), got none");
   }
-  return Concat(app.get_name(), ": expected another argument, got none");
+  return Concat(FullName(app), ": expected another argument, got none");
 }
 
 /// The message for a wrong number of values of a flag. CLI11 names the flag only at the beginning
@@ -183,33 +201,33 @@ std::string ExplainValues(const std::string& message) {
   return Concat(flag, ": expected a value, got ", several ? "several" : "none");
 }
 
-/// Explains the first word that `app`, the program or one of its commands, does not know; empty if
-/// it knows all.
-std::string ExplainUnknown(const CLI::App& program, const CLI::App& app) {
+/// Explains the first word that `app`, the program or a command, does not know; empty if it knows
+/// all.
+std::string ExplainUnknown(const CLI::App& app) {
   const std::vector<std::string> unknown = app.remaining();
   if (unknown.empty()) return "";
   const std::string word = unknown.front().substr(0, unknown.front().find('='));
   if (word.starts_with("-")) return Concat("unknown flag ", word, ExplainFlag(app, word));
   std::string meant = DidYouMean(word, KnownWords(app));
-  if (&app == &program) return ExplainCommands(program, Concat("\"", word, "\"", meant));
+  if (HasCommands(app)) return ExplainCommands(app, Concat("\"", Printable(word), "\"", meant));
   if (meant.empty()) {
     const bool has_agents = app.get_option_no_throw("--agent") != nullptr;
     meant = Concat("; a value follows its flag, as in --",
                    has_agents ? Concat("agent ", word) : std::string("seed 1"));
   }
-  return Concat(app.get_name(), ": expected no argument ", word, meant);
+  return Concat(FullName(app), ": expected no argument ", word, meant);
 }
 
 /// The message for a wrong command line, in one line.
 std::string Explain(const CLI::App& program, const CLI::ParseError& error) {
-  const auto chosen = program.get_subcommands();
-  const CLI::App& app = chosen.empty() ? program : *chosen.front();
-  for (const CLI::App* asked : {&program, &app}) {
-    if (std::string unknown = ExplainUnknown(program, *asked); !unknown.empty()) return unknown;
+  const CLI::App* app = &program;  // the innermost command
+  for (const CLI::App* each = app; each != nullptr;) {
+    app = each;
+    if (std::string unknown = ExplainUnknown(*app); !unknown.empty()) return unknown;
+    const auto chosen = app->get_subcommands();
+    each = chosen.empty() ? nullptr : chosen.front();
   }
-  if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) {
-    return ExplainMissing(program, app);
-  }
+  if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) return ExplainMissing(*app);
   if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr) {
     return ExplainValues(error.what());
   }
@@ -233,6 +251,24 @@ bool IsAvailable(const CommandEntry& entry) {
 }
 
 }  // namespace
+
+CommandLine::CommandLine(CLI::App& app) : app_(app) {
+  app_.formatter(std::make_shared<HelpFormatter>());
+}
+
+CommandLine& CommandLine::Subcommand(const std::string& name, const std::string& help) {
+  app_.require_subcommand(1);
+  CLI::App& app = *app_.add_subcommand(name, help);
+  return *subcommands_.emplace_back(std::make_unique<CommandLine>(app));
+}
+
+int CommandLine::Run() const {
+  for (const auto& subcommand : subcommands_) {
+    if (subcommand->app_.parsed()) return subcommand->Run();
+  }
+  for (const auto& check : checks_) check();
+  return run_();
+}
 
 size_t HelpColumns() { return static_cast<size_t>(std::clamp(TerminalWidth(100), 80, 100)); }
 
@@ -318,6 +354,13 @@ std::string CommandLine::Last(std::string_view name) const {
   return values.empty() ? "" : values.back();
 }
 
+std::string_view CalledCommand(int argc, const char* const* argv) {
+  const auto words = std::span(argv, static_cast<size_t>(argc)).subspan(argc > 0 ? 1 : 0);
+  const auto called =
+      std::ranges::find_if(words, [](std::string_view word) { return !word.starts_with('-'); });
+  return called == words.end() ? std::string_view() : *called;
+}
+
 int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> table,
                std::span<const Command> own, const std::string& footer) {
   CLI::App program(
@@ -336,21 +379,16 @@ int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> 
       program.add_subcommand(std::string(entry.name), std::string(entry.help));
   }
   // Only the called command has arguments.
-  const std::string_view called = argc > 1 ? argv[1] : "";
+  const std::string_view called = CalledCommand(argc, argv);
   const auto command = std::ranges::find(own, called, &Command::name);
   std::optional<CommandLine> line;
   if (command != own.end()) {
-    CLI::App* app = program.get_subcommand(std::string(called));
-    app->formatter(std::make_shared<HelpFormatter>());
-    command->declare(line.emplace(*app));
-    app->callback([&line] {
-      for (const auto& check : line->checks_) check();
-    });
+    command->declare(line.emplace(*program.get_subcommand(std::string(called))));
   }
   try {
     program.parse(argc, argv);
   } catch (const CLI::Success& request) {  // --help and --version
-    if (const std::string unknown = ExplainUnknown(program, program); !unknown.empty()) {
+    if (const std::string unknown = ExplainUnknown(program); !unknown.empty()) {
       throw BadInput(unknown);
     }
     return program.exit(request);
@@ -358,7 +396,7 @@ int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> 
     throw BadInput(Explain(program, error));
   }
   if (!line) throw BadInput(ExplainCommands(program, Printable(std::string(called))));
-  return line->run_();
+  return line->Run();
 }
 
 }  // namespace upswing

@@ -23,10 +23,13 @@ namespace upswing {
 /// one.
 inline constexpr std::string_view kPath = "a path";
 
-/// One command: declares its arguments, then runs it with their values.
+/// One command: declares its arguments or its own commands, then runs with their values.
 class CommandLine {
  public:
-  explicit CommandLine(CLI::App& app) : app_(app) {}
+  explicit CommandLine(CLI::App& app);
+
+  /// Adds a command of this command, such as `check` of `machine`. One of them is required.
+  CommandLine& Subcommand(const std::string& name, const std::string& help);
 
   /// Adds a text: a flag if the name begins with `--`, else a positional argument. --help shows
   /// `type` for the value. `what` names the expected value in the error for an empty one; an empty
@@ -82,7 +85,11 @@ class CommandLine {
                         std::span<const struct CommandEntry> table,
                         std::span<const struct Command> own, const std::string& footer);
 
+  /// Runs the checks and the command, or those of the given subcommand. Returns the exit code.
+  int Run() const;
+
   CLI::App& app_;
+  std::vector<std::unique_ptr<CommandLine>> subcommands_;
   std::vector<std::function<void()>> checks_;
   std::function<int()> run_;
 };
@@ -98,6 +105,9 @@ struct Command {
   std::string_view name;
   void (*declare)(CommandLine&);
 };
+
+/// The first word of the command line that is no flag; empty if there is none.
+std::string_view CalledCommand(int argc, const char* const* argv);
 
 /// Parses the command line, runs one of the program's `own` commands and returns its exit code.
 /// --help lists `table` and ends with `footer`. Throws BadInput with a message of one line if the

@@ -88,9 +88,9 @@ void ChooseVectors() {
   if (path != nullptr && *path != '\0') UseSimdPath(path);
 }
 
-/// Runs a command of another program instead, if the first argument is one.
-void RunOtherProgram(char** argv, std::span<const Command> own) {
-  const std::string_view name = argv[1] == nullptr ? "" : argv[1];
+/// Runs another program instead if the called command is one of its own.
+void RunOtherProgram(int argc, char** argv, std::span<const Command> own) {
+  const std::string_view name = CalledCommand(argc, argv);
   const auto* entry = std::ranges::find(kTable, name, &CommandEntry::name);
   if (entry == std::end(kTable) || std::ranges::find(own, name, &Command::name) != own.end())
     return;
@@ -102,7 +102,7 @@ void RunOtherProgram(char** argv, std::span<const Command> own) {
 
 int Main(int argc, char** argv, std::span<const Command> own) {
   try {
-    RunOtherProgram(argv, own);
+    RunOtherProgram(argc, argv, own);
     ChooseVectors();
     return Finish(RunProgram(argc, argv, kTable, own, kExamples));
   } catch (const Error& error) {
