@@ -56,8 +56,6 @@ def agents():
 
 def help_of(command, *arguments):
     """The help text of a command."""
-    if command == "bench":
-        return output_of(UPSWING.with_name("upswing-bench"), "bench", "--help")
     if command in LAUNCHER_COMMANDS:
         return output_of(ROOT / "upswing", "--no-setup", command, "--help")
     return program(command, *arguments, "--help")
@@ -69,6 +67,8 @@ def flags(command):
     texts = [help_of(command)]
     if command == "train":
         texts += [help_of("train", "--agent", agent) for agent in ALGORITHMS.values()]
+    if command == "machine":
+        texts += [help_of("machine", own) for own in _table(texts[0], "Subcommands")]
     return {flag for text in texts for flag in re.findall(r"(?<![\w-])--[a-z][a-z0-9-]*", text)}
 
 
