@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "base/rng.h"
+#include "base/thread_pool.h"
 #include "mujoco/engines.h"
 #include "pendulum/closed_form.h"
 #include "pendulum/pendulum_env.h"
@@ -41,7 +42,7 @@ class Torques {
 /// MuJoCo's steps as the environment makes them. Includes the task's calculations at every fourth
 /// step, a few percent of the time.
 BenchWork PhysicsInMuJoCo(int num_envs, int threads) {
-  const auto pool = std::make_shared<BenchPool>(threads);
+  const auto pool = std::make_shared<ThreadPool>(threads);
   PendulumEnvConfig config;
   config.num_envs = num_envs;
   config.pool = pool.get();
@@ -56,7 +57,7 @@ BenchWork PhysicsInClosedForm(int num_envs, int threads) {
   const auto n = static_cast<size_t>(num_envs);
   const auto batch = std::make_shared<ClosedFormBatch>(n);
   for (size_t env = 0; env < n; ++env) batch->SetPlant(env, Plant());
-  const auto pool = std::make_shared<BenchPool>(threads);
+  const auto pool = std::make_shared<ThreadPool>(threads);
   const auto torques = std::make_shared<Torques>(num_envs);
   return [=] {
     batch->SetTorque(torques->Next());
@@ -71,7 +72,6 @@ BenchWork PhysicsInClosedForm(int num_envs, int threads) {
 BenchCase PhysicsCase(const std::string& physics, int num_envs, int threads) {
   const bool closed_form = &FindEngine(physics, "physics") == &kClosedForm;
   return {.name = fmt::format("physics/{}/envs:{}/threads:{}", physics, num_envs, threads),
-          .items = "steps",
           .count = static_cast<double>(kPhysicsSteps) * num_envs,
           .threads = threads,
           .prepare = [=]() -> BenchWork {
@@ -84,11 +84,10 @@ BenchCase PhysicsCase(const std::string& physics, int num_envs, int threads) {
 /// reset.
 BenchCase EnvCase(const std::string& physics, int num_envs, int threads) {
   return {.name = fmt::format("env/{}/envs:{}/threads:{}", physics, num_envs, threads),
-          .items = "steps",
           .count = static_cast<double>(num_envs),
           .threads = threads,
           .prepare = [=]() -> BenchWork {
-            const auto pool = std::make_shared<BenchPool>(threads);
+            const auto pool = std::make_shared<ThreadPool>(threads);
             PendulumEnvConfig config;
             config.engine = &FindEngine(physics, "physics");
             config.num_envs = num_envs;

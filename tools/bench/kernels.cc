@@ -47,7 +47,6 @@ struct Layer {
 void AddProducts(int width, int B, BenchCases& cases) {
   const auto add = [&](const char* name, auto multiply) {
     cases.push_back({.name = fmt::format("kernels/{0}/{1}x{1}/batch:{2}", name, width, B),
-                     .items = "products",
                      .flops = 2.0 * width * width * B,
                      .prepare = [=]() -> BenchWork {
                        const auto layer = std::make_shared<Layer>(width, B);
@@ -65,7 +64,6 @@ BenchCase AdamCase(size_t n) {
   constexpr double kNumbers = 9;  // per parameter: five read, four written
   const auto count = static_cast<double>(n);
   return {.name = fmt::format("kernels/adam_polyak/{}", n),
-          .items = "passes",
           .flops = kFlops * count,
           .bytes = kNumbers * sizeof(float) * count,
           .prepare = [n]() -> BenchWork {
@@ -85,7 +83,6 @@ BenchCase AdamCase(size_t n) {
 
 BenchCase TransposeCase(int width) {
   return {.name = fmt::format("kernels/transpose/{0}x{0}", width),
-          .items = "passes",
           .bytes = 2.0 * sizeof(float) * width * width,
           .prepare = [width]() -> BenchWork {
             const auto layer = std::make_shared<Layer>(width, 1);
@@ -98,7 +95,6 @@ BenchCase TransposeCase(int width) {
 BenchCase TriadCase(const char* memory, size_t bytes) {
   const size_t n = bytes / (3 * sizeof(float)) / 16 * 16;
   return {.name = fmt::format("kernels/triad/{}", memory),
-          .items = "passes",
           .bytes = 3.0 * sizeof(float) * static_cast<double>(n),
           .prepare = [n]() -> BenchWork {
             const auto a = std::make_shared<AlignedVector<float>>(n, 1.0F);

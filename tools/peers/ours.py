@@ -111,7 +111,7 @@ def gradient(width, batch, threads, seconds):
     """Gradient steps per second, without the rest of the training."""
     with tempfile.TemporaryDirectory(prefix="upswing-peers-") as folder:
         file = Path(folder, "bench.json")
-        run([PROGRAM, "bench", "gradient", "--network", "plain", "--hidden", f"{width},{width}",
+        run([PROGRAM, "bench", "gradient/plain", "--hidden", f"{width},{width}",
              "--batch", batch, "--threads", threads, "--seconds", seconds, "--repetitions", 1,
              "--json", file])
         return read_bench(file.read_text(encoding="utf-8"))
