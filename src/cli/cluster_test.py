@@ -1,15 +1,14 @@
 #!/usr/bin/env python3
-"""Tests of `upswing study --slurm` on a Slurm of two nodes: a study leaves the same files as on one
+"""Tests of examples/slurm.sh on a Slurm of two nodes: a study leaves the same files as on one
 machine, whatever happens to the tasks."""
 
 import os
-import re
 import signal
 import sys
 import unittest
 from pathlib import Path
 
-from testing import ROOT, ProgramTest, without_seconds
+from testing import ROOT, UPSWING, ProgramTest, without_seconds
 
 sys.path.insert(0, str(ROOT / "tools"))
 from slurm_cluster import NODES, Cluster, enter_namespaces, problem  # noqa: E402
@@ -43,14 +42,18 @@ class ClusterTest(ProgramTest):
         self.seeds = range(1, seeds + 1)
         self.write("little.toml", STUDY.replace("SEEDS", str(seeds)).replace("STEPS", str(steps)))
 
-    def follow(self, tasks, options="--partition=low"):
-        """Starts `study --slurm`. Returns the process, the array's number, and the line with the
-        number."""
-        process = self.start("study", "little.toml", "--slurm", options, "--tasks", tasks)
-        for line in process.stdout:
-            if found := re.search(r"ob array (\d+)", line):
-                return process, found[1], line
-        return self.fail("nothing was queued: " + str(process.wait()))
+    def queue(self, tasks):
+        """Prepares the study and queues a job array of workers. Returns its number."""
+        self.succeed("study", "little.toml", "--prepare")
+        return self.cluster.ask("sbatch", "--parsable", f"--array=1-{tasks}",
+                                f"--chdir={self.folder}", ROOT / "examples/slurm.sh", UPSWING,
+                                "study", "--work", "runs/little").strip()
+
+    def assert_done(self, runs):
+        """Waits until all runs are done, and compares them with those of one machine."""
+        self.cluster.wait(lambda: self.count_in_status("done") == runs, 300)
+        self.assertIn("Written: summary.csv", self.succeed("study", "little.toml"))
+        self.assert_as_on_one_machine()
 
     def assert_as_on_one_machine(self):
         (self.folder / "alone").mkdir()
@@ -93,7 +96,7 @@ class ClusterTest(ProgramTest):
 
     def test_a_node_is_lost_and_tasks_are_killed_and_preempted(self):
         self.write_study(3, 300000)
-        follower, array, _ = self.follow(4)
+        array = self.queue(4)
         self.wait_for(lambda: all(len(self.claims(node)) == 2 for node in NODES))
         lost = self.tasks(array, "node2")
         killed, preempted = self.tasks(array, "node1")
@@ -117,39 +120,22 @@ class ClusterTest(ProgramTest):
         for task in lost:
             self.cluster.hurry(task)
 
-        output = follower.communicate()[0]
-        self.assertEqual(follower.returncode, 0, output)
-        self.assertIn("6 of 6 runs done", output)
-        self.assertIn("Written: summary.csv", output)
-        self.assert_as_on_one_machine()
+        self.assert_done(6)
 
-    def test_who_follows_may_leave_and_come_back_and_cancel(self):
+    def test_cancelled_workers_are_notified_and_their_runs_resumed(self):
         self.write_study(2, 150000)
-        follower, array, _ = self.follow(2)
+        array = self.queue(2)
         self.wait_for(lambda: any(self.claims(node) for node in NODES))
-        code, rest = self.end(follower, signal.SIGINT)
-        self.assertEqual(code, 130)
-        self.assertIn(f"Job array {array} continues; the same command follows it again, "
-                      f"`scancel {array}` cancels it.", rest)
-        follower, _, how = self.follow(2)
-        self.assertIn(f"Following job array {array}: ", how)
         self.cluster.ask("scancel", array)
-        output = follower.communicate()[0]
-        self.assertEqual(follower.returncode, 1, output)
-        self.assertRegex(output, rf"upswing: job array {array} has ended, but [1-4] runs are not done")
-        # The workers were notified: no task is queued again, and the runs can be resumed
-        # immediately.
-        self.assertEqual(self.cluster.job(f"{array}_1")["JobState"], "CANCELLED")
-        self.assertEqual(self.count_in_status("lost"), 0)
-        follower, another, _ = self.follow(3)
-        self.assertNotEqual(another, array)
-        output = follower.communicate()[0]
-        self.assertEqual(follower.returncode, 0, output)
-        self.assert_as_on_one_machine()
+        self.wait_for_state(f"{array}_1", "CANCELLED")
+        self.cluster.wait(lambda: self.cluster.ask("squeue", "--noheader") == "")
+        self.assertEqual(self.count_in_status("lost") + self.count_in_status("running"), 0)
+        self.queue(3)
+        self.assert_done(4)
 
     def test_a_task_that_is_warned_of_its_end_queues_itself_again(self):
         self.write_study(1, 300000)
-        follower, array, _ = self.follow(2)
+        array = self.queue(2)
         self.wait_for(lambda: sum(len(self.claims(node)) for node in NODES) == 2)
         tasks = [f"{array}_1", f"{array}_2"]
         for task in tasks:  # as Slurm does before the time limit: slurm_cluster_test.py
@@ -160,24 +146,7 @@ class ClusterTest(ProgramTest):
         for task in tasks:
             self.wait_for_state(task, "PENDING")
             self.cluster.hurry(task)
-        output = follower.communicate()[0]
-        self.assertEqual(follower.returncode, 0, output)
-        self.assert_as_on_one_machine()
-
-    def test_what_sbatch_refuses_is_said(self):
-        self.write_study(1, 1000)
-        done = self.run_here("study", "little.toml", "--slurm", "--partition=nosuch")
-        self.assert_one_line(done, 1, "sbatch refused: ", "Invalid partition name specified")
-
-    def test_a_folder_may_have_an_odd_name(self):
-        self.write_study(1, 1000)
-        out = "it's 10% $(id) \" #x"
-        self.succeed("study", "little.toml", "--out", out, "--slurm", "")
-        self.assertEqual({path.name for path in (self.folder / out / "slurm").iterdir()},
-                         {"array", *(f"{self.number_in(out)}_{task}.log" for task in (1, 2))})
-
-    def number_in(self, out):
-        return (self.folder / out / "slurm/array").read_text(encoding="utf-8").strip()
+        self.assert_done(2)
 
     def count_in_status(self, column):
         """The sum of a column of `study --status` over the variants."""

@@ -7,19 +7,15 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
-#include <optional>
 
 #include "agents/config_checks.h"
-#include "base/error.h"
 #include "base/format.h"
 #include "base/sample.h"
 #include "base/text.h"
 #include "cli/progress.h"
 #include "cli/say.h"
 #include "cli/signals.h"
-#include "runs/lease.h"
 #include "runs/seeds.h"
-#include "runs/slurm.h"
 
 namespace upswing {
 namespace {
@@ -93,7 +89,10 @@ class ManyRunsView : public ManyRunsObserver {
     for (const Variant& variant : many_.plan.variants) PrintTable(variant);
     const size_t done = Measure().done;
     Say("\nSuccess and return: evaluation of each run's best policy.\n");
-    if (stopped) SayStopped(done);
+    if (stopped) {
+      Say("Stopped with {} of {} runs done; the same command resumes the others.\n", done,
+          runs_->size());
+    }
     const bool can_be_typed = Printable(many_.plan.folder.string()) == many_.plan.folder.string();
     if (can_be_typed && (done < runs_->size() || !many_.compared)) {
       Say("Next:\n  {} compare {}{}\n", LaunchCommand(), ShellQuoted(many_.plan.folder.string()),
@@ -104,22 +103,6 @@ class ManyRunsView : public ManyRunsObserver {
 
   TrainRequest Poll() override { return PollSignals(); }
   int stop_signal() const override { return StopSignal(); }
-
- protected:
-  /// Prints how to continue after a signal to stop.
-  virtual void SayStopped(size_t done) const {
-    Say("Stopped with {} of {} runs done; the same command resumes the others.\n", done,
-        runs_->size());
-  }
-
-  /// Runs that are neither done nor failed.
-  size_t Left() const {
-    return static_cast<size_t>(std::ranges::count_if(
-        *runs_, [](const SeedRun& run) { return !run.finished && run.problem.empty(); }));
-  }
-
-  const ManyRuns& many_;
-  ProgressLine line_;
 
  private:
   /// Progress over all runs.
@@ -162,8 +145,7 @@ class ManyRunsView : public ManyRunsObserver {
     Say("Training {} in {}\n", Printable(many_.what), Printable(many_.plan.folder.string()));
     Say("  {}seed{} {}: {}{}\n", variants == 1 ? "" : fmt::format("{} variants, ", variants),
         many_.plan.seeds.size() == 1 ? "" : "s", SeedsText(many_.plan.seeds),
-        Counted(std::ssize(*runs_), "run"),
-        many_.jobs == 0 ? "" : fmt::format(", {} at a time", many_.jobs));
+        Counted(std::ssize(*runs_), "run"), fmt::format(", {} at a time", many_.jobs));
     for (const Variant& variant : many_.plan.variants) {
       for (const std::string& warning : Warnings(variant.config)) {
         Say("  Warning: {}{}{}\n", Printable(variant.name), variant.name.empty() ? "" : ": ",
@@ -226,111 +208,18 @@ class ManyRunsView : public ManyRunsObserver {
     if (failed > 0) Say("  {} failed\n", Counted(failed, "run"));
   }
 
+  const ManyRuns& many_;
+  ProgressLine line_;
   const std::vector<SeedRun>* runs_ = nullptr;
   std::vector<const SeedRun*> running_;
   double steps_before_ = 0;  // made before this process began
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 
-/// The view of many runs whose workers are the tasks of a job array: queues the array, or finds the
-/// queued one, and shows progress. A signal to stop ends the view; the jobs continue.
-class SlurmView : public ManyRunsView {
- public:
-  /// The plan must outlive the view; many.jobs is 0.
-  SlurmView(const ManyRuns& many, SlurmRequest request)
-      : ManyRunsView(many), request_(std::move(request)) {}
-
-  void Prepare() override { InstallSignalHandlers("\nthe jobs continue\n"); }
-
-  /// Throws Failure if the array cannot be queued.
-  void Begin(const std::vector<SeedRun>& runs) override {
-    ManyRunsView::Begin(runs);
-    if (Left() == 0) return;
-    array_ = SlurmArray::LastOf(many_.plan.folder);
-    const auto queued = array_ ? array_->TasksLeft() : 0;
-    if (!queued) {
-      throw Failure(Concat("squeue: expected the state of job array ", array_->number(),
-                           " of this study, got none"));
-    }
-    if (*queued > 0) {
-      Say("  Following job array {}: {} left, output in {}\n", array_->number(),
-          Counted(*queued, "task"), Logs());
-    } else {
-      const std::string script = SlurmScriptFor(many_.plan, runs, request_);
-      array_ = SlurmArray::Submit(many_.plan.folder, script);
-      Say("  Queued as job array {}, output in {}\n", array_->number(), Logs());
-    }
-    std::fflush(stdout);
-    ask_at_ = Clock::now() + kAskEvery;
-  }
-
-  /// Throws Failure if unfinished runs have no worker.
-  void Watch(const std::vector<const SeedRun*>& running) override {
-    ManyRunsView::Watch(running);
-    const auto now = Clock::now();
-    if (array_ && now >= ask_at_ && Left() > 0) CheckQueue(running, now);
-  }
-
- protected:
-  void SayStopped(size_t done) const override {
-    if (!array_) return ManyRunsView::SayStopped(done);
-    Say("Job array {} continues; the same command follows it again, `{}` cancels it.\n",
-        array_->number(), array_->CancelCommand());
-  }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  static constexpr std::chrono::seconds kAskEvery{15};  // each squeue loads a shared daemon
-
-  void CheckQueue(const std::vector<const SeedRun*>& running, Clock::time_point now) {
-    const auto tasks = array_->TasksLeft();
-    const bool are_none = tasks == 0;
-    // The files of the last task may not be visible yet.
-    const bool were_none = std::exchange(none_left_, are_none);
-    ask_at_ = now + (are_none ? std::chrono::seconds(2) : kAskEvery);
-    if (!are_none || !were_none) return;
-    // Other workers may be running, or the claims of a lost worker may not have expired yet.
-    for (const SeedRun* run : running) {
-      const auto lease = ReadLease(run->claim());
-      if (lease && !lease->lost) return;
-    }
-    line_.Clear();
-    throw Failure(Concat("job array ", array_->number(), " has ended, but ", Left(),
-                         " runs are not done (output: ", Logs(),
-                         "); the same command queues them again"));
-  }
-
-  /// Path of the array's output.
-  std::string Logs() const {
-    return Printable((SlurmFolder(many_.plan.folder) / (array_->number() + "_*.log")).string());
-  }
-
-  SlurmRequest request_;
-  std::optional<SlurmArray> array_;
-  Clock::time_point ask_at_{};
-  bool none_left_ = false;  // result of the last query
-};
-
 }  // namespace
-
-std::string SlurmScriptFor(const StudyPlan& plan, const std::vector<SeedRun>& runs,
-                           const SlurmRequest& request) {
-  int64_t tasks = request.tasks;
-  if (tasks == 0) {
-    const int64_t left =
-        std::ranges::count_if(runs, [](const SeedRun& run) { return !run.finished; });
-    tasks = std::clamp<int64_t>(left, 1, kMostSlurmTasks);
-  }
-  return SlurmScript(plan, request.options, tasks);
-}
 
 int TrainManyAndShow(const ManyRuns& many) {
   ManyRunsView view(many);
-  return TrainMany(many, view);
-}
-
-int TrainOnSlurmAndShow(const ManyRuns& many, const SlurmRequest& request) {
-  SlurmView view(many, request);
   return TrainMany(many, view);
 }
 

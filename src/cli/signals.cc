@@ -81,11 +81,6 @@ void GuardMotors(void (*switch_off)()) {
   }
 }
 
-void StopAtUserSignals() {
-  StopAt(SIGUSR1);
-  StopAt(SIGUSR2);
-}
-
 TrainRequest PollSignals() {
   if (g_stop_signal != 0) return TrainRequest::kStop;
   if (g_checkpoint_wanted.exchange(false)) return TrainRequest::kCheckpoint;

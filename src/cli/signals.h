@@ -26,9 +26,6 @@ void InstallSignalHandlers(std::string_view notice);
 /// ends the program, the handler calls `switch_off`, which must be safe in a signal handler.
 void GuardMotors(void (*switch_off)());
 
-/// Also stops at SIGUSR1 and SIGUSR2, with which clusters announce the end of a job's time.
-void StopAtUserSignals();
-
 /// The request since the last call; kCheckpoint is returned once for each request.
 TrainRequest PollSignals();
 

@@ -14,7 +14,6 @@
 #include "report/figure.h"
 #include "runs/many_runs.h"
 #include "runs/seeds.h"
-#include "runs/slurm.h"
 #include "runs/study_file.h"
 #include "runs/study_worker.h"
 
@@ -30,8 +29,6 @@ struct StudyArguments {
   std::string file, out, seeds, keep, work;
   int64_t jobs = 0;  // 0: one per processor
   bool status = false, prepare = false;
-  SlurmRequest slurm;
-  bool on_slurm = false, print = false;
 
   fs::path folder() const {
     return out.empty() ? fs::path("runs") / fs::path(file).stem() : fs::path(out);
@@ -80,7 +77,6 @@ ManyRuns ReadStudy(const StudyArguments& arguments) {
         Concat(file.string(), ": expected a line such as seeds = 10, or --seeds, got neither"));
   }
   many.jobs = arguments.jobs;
-  if (arguments.on_slurm) return many;
   if (many.jobs == 0) many.jobs = DefaultJobs(plan.variants.front().config.train.threads);
   for (const Variant& variant : plan.variants)
     CheckMemory(variant.config, AvailableMemory(), many.jobs);
@@ -99,14 +95,6 @@ int CompareStudy(const StudyPlan& plan) {
   Say("All evaluations of all runs: evaluations.csv\n");
   PrintComparison(comparison);
   PrintWritten(comparison, plan.folder);
-  return 0;
-}
-
-/// Prints the script that --slurm would submit.
-int PrintSlurmScript(const StudyPlan& plan, const SlurmRequest& request) {
-  std::vector<SeedRun> runs = RunsOf(plan);
-  for (SeedRun& run : runs) run.Read();
-  Say("{}", SlurmScriptFor(plan, runs, request));
   return 0;
 }
 
@@ -129,11 +117,8 @@ int RunStudy(const StudyArguments& arguments) {
         ShellQuoted(Printable(many.plan.folder.string())));
     return 0;
   }
-  if (arguments.print) return PrintSlurmScript(many.plan, arguments.slurm);
   CheckCanDraw();  // fail before hours of training, not after
-  if (arguments.on_slurm) CheckSlurm();
-  const int exit_code =
-      arguments.on_slurm ? TrainOnSlurmAndShow(many, arguments.slurm) : TrainManyAndShow(many);
+  const int exit_code = TrainManyAndShow(many);
   return exit_code != 0 ? exit_code : CompareStudy(many.plan);
 }
 
@@ -152,15 +137,8 @@ void CheckArguments(const CommandLine& line, const StudyArguments& arguments) {
     }
   };
   alone(!arguments.work.empty(), "--work",
-        {"--out", "--seeds", "--jobs", "--keep", "--status", "--prepare", "--slurm"});
+        {"--out", "--seeds", "--jobs", "--keep", "--status", "--prepare"});
   alone(arguments.status, "--status", {"--seeds", "--jobs", "--keep", "--prepare"});
-  for (const std::string flag : {"--tasks", "--print"}) {
-    if (!arguments.on_slurm && line.Has(flag)) {
-      throw BadInput(Concat(flag, ": expected --slurm with it, got none"));
-    }
-  }
-  alone(arguments.on_slurm, "--slurm", {"--jobs", "--status", "--prepare"});
-  CheckSlurmOptions(arguments.slurm.options);
 }
 
 }  // namespace
@@ -178,15 +156,6 @@ void AddStudy(CommandLine& line) {
       "--status", arguments.status,
       "print how many runs are done, running and lost, and exit; also takes the study's folder");
   line.Flag("--prepare", arguments.prepare, "prepare the folder for workers, and exit");
-  line.Text("--slurm", arguments.slurm.options, "OPTIONS",
-            "run the study on a Slurm cluster: queue a job array of workers with these options of "
-            "sbatch ('' for none), follow it, and compare at the end",
-            "");
-  Options slurm;
-  slurm.Add(&arguments.slurm.tasks, "tasks", {1, 100'000}, "", "number of workers in the job array")
-      .usual = Concat("one per run, at most ", kMostSlurmTasks);
-  line.Arguments(slurm);
-  line.Flag("--print", arguments.print, "print the script for sbatch, and exit");
   line.Text("--work", arguments.work, "FOLDER",
             "work on the study in this folder, on any host that shares it: claim and train runs "
             "until none is left");
@@ -205,16 +174,11 @@ void AddStudy(CommandLine& line) {
       "  ./upswing study configs/studies/post.toml --seeds 3 --out runs/short\n"
       "  ./upswing study configs/studies/post.toml --status\n"
       "  ./upswing study --work runs/post          one more worker, on any host\n"
-      "  ./upswing study configs/studies/post.toml \\\n"
-      "    --slurm '--partition=short --time=2:00:00'\n"
       "\nThe folder of a run is FOLDER/VARIANT/seedN, its log is FOLDER/VARIANT/seedN.log. The\n"
       "same command resumes stopped and killed runs; finished runs stay unchanged.\n"
       "Exit code 0: done; 1: a run failed; 2: bad usage or input; 130 or 143: stopped. A\n"
       "worker that a signal stops has exit code 75; any worker can resume its run.\n");
-  line.Check([&line, &arguments] {
-    arguments.on_slurm = line.Has("--slurm");
-    CheckArguments(line, arguments);
-  });
+  line.Check([&line, &arguments] { CheckArguments(line, arguments); });
 }
 
 }  // namespace upswing

@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <cstdio>
-#include <cstdlib>
 #include <map>
 
 #include "base/error.h"
@@ -61,8 +60,6 @@ bool TrainLogged(const SeedRun& run, const std::function<std::unique_ptr<Trainin
 
 int WorkOnStudy(const std::filesystem::path& folder) {
   InstallSignalHandlers(kStoppingTraining);
-  // Slurm announces the end of a job's time with these signals.
-  if (std::getenv("SLURM_JOB_ID") != nullptr) StopAtUserSignals();
   const StudyPlan plan = ReadPlan(folder);
   const WorkerOutcome outcome = WorkOn(plan, TrainLogged, [] { return StopSignal() != 0; });
   Say("{}: this worker finished {}, {} failed{}{}\n", Printable(folder.string()), outcome.done,

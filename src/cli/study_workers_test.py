@@ -12,7 +12,7 @@ import subprocess
 import time
 import unittest
 
-from testing import PATIENCE, ProgramTest, snapshot
+from testing import PATIENCE, ROOT, UPSWING, ProgramTest, snapshot
 
 STUDY = """title = "Little"
 seeds = 4
@@ -134,11 +134,9 @@ class WorkersTest(ProgramTest):
 
     def test_a_worker_that_is_told_to_stop_leaves_its_run_to_be_resumed(self):
         study = self.prepare(ENDLESS)
-        for number, env in ((signal.SIGTERM, {}), (signal.SIGINT, {}),
-                            (signal.SIGUSR1, {"SLURM_JOB_ID": "1"}),
-                            (signal.SIGUSR2, {"SLURM_JOB_ID": "1"})):
+        for number in (signal.SIGTERM, signal.SIGINT):
             with self.subTest(signal=number):
-                worker = self.start_worker(**env)
+                worker = self.start_worker()
                 log = study / "one/seed1/log.txt"
                 before = log.read_text(encoding="utf-8").count("\n") if log.exists() else 0
                 self.wait_for(lambda: log.exists() and
@@ -148,6 +146,29 @@ class WorkersTest(ProgramTest):
                 self.assertFalse(list(study.rglob("*.claim")))
                 self.assertIn("stopped at step", log.read_text(encoding="utf-8"))
         self.assertIn("resumed at step", (study / "one/seed1/log.txt").read_text(encoding="utf-8"))
+
+    def test_a_slurm_task_queues_itself_again_before_its_time_limit_only(self):
+        """Without Slurm; `cluster_test.py` runs with one."""
+        study = self.prepare(ENDLESS)
+        queued = self.folder / "queued"
+        scontrol = self.folder / "scontrol"
+        scontrol.write_text(f'#!/bin/sh\necho "$@" >>{queued}\n', encoding="utf-8")
+        scontrol.chmod(0o755)
+        env = os.environ | {"PATH": f"{self.folder}:{os.environ['PATH']}",
+                            "SLURM_ARRAY_JOB_ID": "7", "SLURM_ARRAY_TASK_ID": "3"}
+        command = ["sh", ROOT / "examples/slurm.sh", UPSWING, "study", "--work", "study"]
+        for number, text in ((signal.SIGTERM, ""), (signal.SIGUSR2, "requeue 7_3\n")):
+            with self.subTest(signal=number):
+                task = subprocess.Popen(command, cwd=self.folder, env=env)
+                self.addCleanup(task.kill)
+                self.wait_for(lambda: list(study.rglob("*.claim")))
+                task.send_signal(number)
+                self.assertEqual(task.wait(PATIENCE), 75)
+                self.assertFalse(list(study.rglob("*.claim")))
+                self.assertEqual(queued.read_text("utf-8") if queued.exists() else "", text)
+        done = subprocess.run([*command[:-1], "none"], cwd=self.folder, env=env, check=False,
+                              stderr=subprocess.DEVNULL)
+        self.assertEqual(done.returncode, 2)
 
     def test_a_run_that_fails_is_left_until_the_study_is_begun_anew(self):
         study = self.prepare()
@@ -339,53 +360,6 @@ class WorkersTest(ProgramTest):
         self.prepare()
         self.work(code=1)
         self.assertEqual((self.folder / "elsewhere.done").read_text(encoding="utf-8"), "{}")
-
-
-class SlurmTest(ProgramTest):
-    """Tests that need no Slurm; `cluster_test.py` runs with one."""
-
-    def test_the_script_is_printed_and_nothing_is_written(self):
-        self.write("little.toml", STUDY)
-        before = snapshot(self.folder)
-        script = self.succeed("study", "little.toml", "--slurm", "--partition=short -t 2:00:00",
-                              "--out", "a b's", "--print")
-        self.assertEqual(snapshot(self.folder), before)
-        lines = script.splitlines()
-        for line in ("#!/bin/sh", "#SBATCH --array=1-8", "#SBATCH --partition=short -t 2:00:00",
-                     "#SBATCH --signal=B:USR2@120"):
-            self.assertIn(line, lines)
-        self.assertIn(f" study --work '{self.folder}/a b'\\''s' &\n", script)
-        checked = subprocess.run(["sh", "-n"], input=script, encoding="utf-8", check=False,
-                                 stderr=subprocess.PIPE)
-        self.assertEqual((checked.returncode, checked.stderr), (0, ""))
-        few = self.succeed("study", "little.toml", "--slurm", "", "--tasks", 3, "--print")
-        self.assertIn("#SBATCH --array=1-3", few.splitlines())
-
-    def test_runs_that_are_done_need_no_task(self):
-        self.write("little.toml", STUDY)
-        self.succeed("study", "little.toml", "--seeds", "1-3")
-        script = self.succeed("study", "little.toml", "--slurm", "", "--print")
-        self.assertIn("#SBATCH --array=1-2", script.splitlines())
-
-    def test_what_makes_no_sense_is_refused(self):
-        self.write("little.toml", STUDY)
-        study = ["study", "little.toml"]
-        self.refuse([*study, "--slurm", "partition=x"], "expected options of sbatch", "partition=x")
-        self.refuse([*study, "--slurm", "-p x\nrm -r /"], "on one line")
-        self.refuse([*study, "--slurm", "", "--out", "a\\b", "--print"], "without \\")
-        self.refuse([*study, "--slurm", "", "--jobs", "2"], "--slurm: expected no --jobs")
-        self.refuse([*study, "--slurm", "", "--status"], "--slurm: expected no --status")
-        self.refuse([*study, "--slurm", "", "--tasks", "0"], "--tasks")
-        self.refuse([*study, "--tasks", "2"], "--tasks: expected --slurm with it, got none")
-        self.refuse([*study, "--print"], "--print: expected --slurm with it, got none")
-        self.refuse(["study", "--work", "x", "--slurm", ""], "--work: expected no --slurm")
-
-    def test_without_slurm_it_does_not_begin(self):
-        self.write("little.toml", STUDY)
-        (self.folder / "bin").mkdir()
-        (self.folder / "bin/gnuplot").symlink_to(shutil.which("gnuplot"))
-        self.refuse(["study", "little.toml", "--slurm", ""], "sbatch", "none in PATH", code=1,
-                    env=os.environ | {"PATH": str(self.folder / "bin")})
 
 
 if __name__ == "__main__":

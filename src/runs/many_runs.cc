@@ -122,7 +122,6 @@ class LocalWorkers {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
     Look();
-    if (many_.jobs == 0) running_.clear();     // runs of other workers go on
     for (const SeedRun* run : running_) {      // runs of stopped workers
       if (fs::exists(run->claim())) continue;  // the run goes on on another host
       auto* stopped = *std::ranges::find(open_, run);

@@ -16,7 +16,7 @@ struct ManyRuns {
   StudyPlan plan;
   std::string what;                  // name of the work, such as `d3qn` or a study's title
   std::string mark_file, mark_text;  // file that marks the folder; empty: settings.toml
-  int64_t jobs = 1;                  // simultaneous runs; 0: none here, other workers train
+  int64_t jobs = 1;                  // simultaneous runs
   bool more_steps = false;           // whether runs with fewer steps may be resumed
   bool compared = false;             // whether a comparison follows when all runs are done
 };
