@@ -11,10 +11,6 @@
 /// The exports of `export` for programs in other languages.
 namespace upswing {
 
-/// Test vectors for implementations of the task in other languages: a JSON document of plants,
-/// states and the formulas' results. Every call returns the same.
-std::string TestVectorsJson();
-
 /// Copies policies (files or run folders) into a page's folder of agents as ID.safetensors. Adds
 /// them to its agents.json, replacing entries with the same ID. `id` names a single policy; empty:
 /// named by its run's folder, else by its agent. Each policy has `checkpoints` versions

@@ -20,6 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "src/cli"))
 from testing import ROOT, UPSWING, ProgramTest, probe, read_csv, read_tensors, small, write_tensors  # noqa: E402
 
 AGENTS = ROOT / "web/public/agents"
+ACTORS = sorted((ROOT / "web/tests/actors").glob("*.safetensors"))
 EXAMPLE = ROOT / "examples/c"
 COUNT = 10_000
 STRICT = ["-pedantic", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion", "-Wshadow"]
@@ -187,12 +188,9 @@ class HeaderTest(ProgramTest):
             for got, q in zip(outputs, row[1:], strict=True):
                 self.assertLessEqual(abs(got - q), 1e-4 * scale)
 
-    def test_actors_of_the_test_vectors(self):
-        vectors = json.loads(self.succeed("export", "--test-vectors", "-"))
-        for i, actor in enumerate(vectors["actors"]):
-            with self.subTest(i):
-                path = self.folder / f"actor-{i}.safetensors"
-                path.write_bytes(bytes.fromhex(actor["file"]))
+    def test_actors_of_other_kinds(self):
+        for path in ACTORS:
+            with self.subTest(path.name):
                 self.check(path)
 
     def test_other_tasks(self):
@@ -507,12 +505,13 @@ class HeaderTest(ProgramTest):
 
     def test_bad_usage(self):
         policy = AGENTS / "fast.safetensors"
+        self.refuse(["export"], "--page, --onnx and --c", "none")
         self.refuse(["export", "--c", "x.h"], "--c", "none")
         self.refuse(["export", policy, policy, "--onnx", "x.onnx"], "--onnx", "got 2")
         self.refuse(["export", policy, "--onnx", "a", "--c", "b"], "--onnx and --c")
         self.refuse(["export", policy, "--onnx", "a", "--prefix", "b"], "--prefix", "--c")
         self.refuse(["export", policy, "--c", "a", "--id", "b"], "--id", "--page")
-        for flags in ([policy, "--page", "p"], ["--test-vectors", "v"], [policy, "--onnx", "a"]):
+        for flags in ([policy, "--page", "p"], [policy, "--onnx", "a"]):
             self.refuse(["export", *flags, "--made-for", "mass2=2"], "controller", "--c")
         self.refuse(["export", policy, "--c", "nowhere/x.h"], "nowhere")
         self.refuse(["export", "nothing", "--c", "x.h"], "nothing: no such file")

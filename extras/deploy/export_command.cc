@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 struct ExportArguments {
   std::vector<std::string> policies;
   PolicyArguments controller;  // settings of a controller
-  std::string page, id, test_vectors, onnx, c, prefix;
+  std::string page, id, onnx, c, prefix;
   int64_t checkpoints = 0;
 };
 
@@ -31,12 +31,11 @@ void CheckOne(const ExportArguments& a) {
   std::vector<std::string> given;
   for (const auto& [flag, value] : {std::pair("--page", &a.page),
                                     {"--onnx", &a.onnx},
-                                    {"--c", &a.c},
-                                    {"--test-vectors", &a.test_vectors}}) {
+                                    {"--c", &a.c}}) {
     if (!value->empty()) given.emplace_back(flag);
   }
   if (given.size() == 1) return;
-  throw BadInput(Concat("export: expected one of --page, --onnx, --c and --test-vectors, got ",
+  throw BadInput(Concat("export: expected one of --page, --onnx and --c, got ",
                         given.empty() ? "none" : Join(given, " and ")));
 }
 
@@ -110,14 +109,7 @@ int RunExport(const ExportArguments& a) {
   }
   if (!a.onnx.empty()) return ExportOnnx(a);
   if (!a.c.empty()) return ExportC(a);
-  if (!a.page.empty()) return ExportPage(a);
-  if (!a.policies.empty() || !a.id.empty()) {
-    throw BadInput(
-        "--test-vectors: expected no policy and no --id, because the vectors depend only on the "
-        "task");
-  }
-  WriteOutput(a.test_vectors, TestVectorsJson());
-  return 0;
+  return ExportPage(a);
 }
 
 }  // namespace
@@ -146,9 +138,6 @@ void AddExport(CommandLine& line) {
           "again; Q-networks only")
       .usual = "none";
   line.Arguments(own);
-  line.Text("--test-vectors", a.test_vectors, "FILE",
-            "JSON file to write, states with the results of the task's formulas, to test other "
-            "implementations; -: standard output");
   line.Footer(
       "Examples:\n"
       "  ./upswing export runs/d3qn-seed1 --onnx policy.onnx\n"
@@ -157,8 +146,7 @@ void AddExport(CommandLine& line) {
       "  ./upswing export runs/d3qn-seed1 --page web/public/agents    for every visitor\n"
       "  ./upswing export runs/* --page build/web/agents        in the page built here\n"
       "  ./upswing export policy.safetensors --id mine --page build/web/agents\n"
-      "  ./upswing export runs/d3qn-seed1 --page web/public/agents --checkpoints 10\n"
-      "  ./upswing export --test-vectors vectors.json\n\n"
+      "  ./upswing export runs/d3qn-seed1 --page web/public/agents --checkpoints 10\n\n"
       "`./upswing demo runs/d3qn-seed1` adds a policy to the page and serves the page.\n");
 }
 

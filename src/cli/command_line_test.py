@@ -215,8 +215,6 @@ class StreamTest(ProgramTest):
         self.succeed("simulate", "--seconds", "0.1", "--csv", "out.csv")
         self.assertEqual((self.folder / "out.csv").read_text(encoding="utf-8"), csv)
         (self.folder / "out.csv").unlink()
-        vectors = self.succeed("export", "--test-vectors", "-")
-        self.assertTrue(json.loads(vectors))
         text = self.succeed("bench", "act", "--seconds", "0.001", "--json", "-")
         self.assertEqual(len(json.loads(text)["benchmarks"]), 3)
         self.assertEqual(list(self.folder.iterdir()), [])
@@ -242,7 +240,7 @@ class StreamTest(ProgramTest):
     def test_a_reader_that_has_seen_enough_ends_it_quietly(self):
         policy = train_once(type(self), steps=8, eval_episodes=1)
         for arguments in (["simulate", "--seconds", 200], ["train", "--help"],
-                          ["export", "--test-vectors", "-"], ["train", "--print-config"],
+                          ["export", policy, "--c", "-"], ["train", "--print-config"],
                           ["info", policy]):
             with self.subTest(arguments=arguments):
                 read_end, write_end = os.pipe()

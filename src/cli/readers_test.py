@@ -147,46 +147,6 @@ class ReadersTest(ProgramTest):
         for output in ("clipped-gaussian", "categorical"):
             self.check_actor(ROOT / f"tools/fuzz/corpus/policy/accepted/{output}.safetensors", output)
 
-    def test_actors_of_the_test_vectors(self):
-        """Reads the test vectors for other languages in Python."""
-        vectors = json.loads(self.succeed("export", "--test-vectors", "-"))
-        self.assertEqual(len(vectors["actors"]), 4)
-        for actor in vectors["actors"]:
-            path = self.folder / "actor.safetensors"
-            path.write_bytes(bytes.fromhex(actor["file"]))
-            about, tensors = load(path)
-            output, network = about["output"], json.loads(about["network"])
-            cases = actor["cases"]
-            obs = np.array([case["observation"] for case in cases], np.float32)
-            outputs = linear(tensors, "output", features(network, tensors, obs))
-            np.testing.assert_allclose([case["outputs"] for case in cases], outputs, atol=1e-5)
-            np.testing.assert_allclose([case["torque"] for case in cases],
-                                       act(output, tensors, outputs), atol=1e-4)
-            sums = [sum(case["probabilities"]) for case in cases]
-            np.testing.assert_allclose(sums, 1, atol=1e-12)
-            if output == "categorical":
-                weights = np.exp(outputs)
-                np.testing.assert_allclose([case["probabilities"] for case in cases],
-                                           weights / weights.sum(axis=1, keepdims=True), atol=1e-5)
-                continue
-            self.check_draws(output, outputs, cases)
-
-    def check_draws(self, output, outputs, cases):
-        """Checks by drawing: the probabilities of tenths of the torque range, and the central
-        68%."""
-        rng = np.random.default_rng(0)
-        draws = 200_000
-        for (mean, log_std), case in zip(outputs, cases, strict=True):
-            u = mean + np.exp(np.clip(log_std, -5, 2)) * rng.standard_normal(draws)
-            torque = 5 * (np.tanh(u) if output == "squashed-gaussian" else np.clip(u, -1, 1))
-            share = np.histogram(torque, bins=np.linspace(-5, 5, 11))[0] / draws
-            np.testing.assert_allclose(case["probabilities"], share, atol=0.006)
-            within = np.mean((torque >= case["low"]) & (torque <= case["high"]))
-            # Clipped torques are at an end of the range, and then the interval holds more than 68%.
-            self.assertGreater(within, 0.677)
-            if max(abs(case["low"]), abs(case["high"])) < 5:
-                self.assertLess(within, 0.688)
-
     def test_dueling_policy(self):
         self.check_policy(hidden="32,24")
 

@@ -34,10 +34,12 @@ export function readPolicy(id: string): ArrayBuffer {
   return new Uint8Array(readFileSync(policyPath(id))).buffer;
 }
 
-/// The files of the untrained actor policies that `upswing export --test-vectors` has.
+/// Untrained actor policies: a Gaussian with a critic that takes its action, one without a critic, a clipped
+/// one, a categorical one.
+export const ACTORS = ['squashed', 'squashed-tanh', 'clipped', 'categorical'].map((name) =>
+  fileURLToPath(new URL(`actors/${name}.safetensors`, import.meta.url)),
+);
+
 export function actorFiles(): ArrayBuffer[] {
-  const { actors } = JSON.parse(runProgram('export', '--test-vectors', '-')) as {
-    actors: { file: string }[];
-  };
-  return actors.map(({ file }) => new Uint8Array(Buffer.from(file, 'hex')).buffer);
+  return ACTORS.map((path) => new Uint8Array(readFileSync(path)).buffer);
 }
