@@ -10,7 +10,9 @@
 
 namespace upswing {
 
-/// A server of files for browsers on this machine: it listens on 127.0.0.1 only.
+/// A server of files for browsers on this machine: it listens on 127.0.0.1 only. Own code, because
+/// cpp-httplib (0.11 to 0.53) has no limit for the time of a request, and Debian 12's none for the
+/// number of header fields.
 class WebServer {
  public:
   /// Without a given port, the server takes this one or the next free one.

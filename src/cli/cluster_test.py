@@ -138,7 +138,7 @@ class ClusterTest(ProgramTest):
         array = self.queue(2)
         self.wait_for(lambda: sum(len(self.claims(node)) for node in NODES) == 2)
         tasks = [f"{array}_1", f"{array}_2"]
-        for task in tasks:  # as Slurm does before the time limit: slurm_cluster_test.py
+        for task in tasks:  # as Slurm does before the time limit: see the next test
             self.cluster.ask("scancel", "--batch", "--signal=USR2", task)
         for task in tasks:
             self.cluster.wait(lambda of=task: self.cluster.job(of)["Restarts"] == "1")
@@ -147,6 +147,15 @@ class ClusterTest(ProgramTest):
             self.wait_for_state(task, "PENDING")
             self.cluster.hurry(task)
         self.assert_done(2)
+
+    def test_slurm_warns_a_job_before_its_time_limit(self):
+        # Slurm checks time limits about every half minute.
+        trap = f"trap 'echo USR2 >{self.folder}/notes; exit 4' USR2\n"
+        job = self.cluster.submit("--time=1", "--signal=B:USR2@30", "--output=/dev/null",
+                                  script="#!/bin/sh\n" + trap + 600 * "sleep 1\n")
+        self.cluster.wait(lambda: self.cluster.job(job)["JobState"] == "FAILED", 100)
+        self.assertEqual(self.cluster.job(job)["ExitCode"], "4:0")
+        self.assertEqual((self.folder / "notes").read_text("utf-8"), "USR2\n")
 
     def count_in_status(self, column):
         """The sum of a column of `study --status` over the variants."""

@@ -12,8 +12,6 @@ struct CommandResult {
   int exit_code = 0;
   int signal = 0;  // signal that ended the program; 0: none
   std::string output, errors;
-
-  bool succeeded() const { return exit_code == 0 && signal == 0; }
 };
 
 /// Runs a program from the PATH and waits for its end. The first word is its name; no shell is
