@@ -4,7 +4,6 @@
     python3 tools/figures.py                  draw all figures
     python3 tools/figures.py pareto maps      draw these
     python3 tools/figures.py --measure        run the program for the data of episode, maps and lqr-catch
-    python3 tools/figures.py --values FOLDER  collect FOLDER/*/evals.csv for values-over-training
 
 Each figure is a function with @figure. It reads docs/results/data/*.json or docs/figures/**/*.csv. Drawing
 needs matplotlib (tools/docs-requirements.txt) and no built program. Draw again when a data file changes:
@@ -272,13 +271,10 @@ def ablation(name, agent, reference):
     return fig
 
 
-for _name, _agent, _reference in (("extensions", "fast", "all"), ("dqn-family", "dqn", "dqn"), ("post", "dqn", "dqn"),
-                                  ("reward", "fast", "all"), ("curriculum", "fast", "hanging"),
-                                  ("sac-extensions", "sac-fast", "all"), ("ppo-parts", "ppo", "all")):
+for _name, _agent, _reference in (("extensions", "fast", "all"), ("post", "dqn", "dqn")):
     DRAWN[f"study-{_name}"] = lambda name=_name, agent=_agent, reference=_reference: ablation(name, agent, reference)
 
 ROBOTS = ("pendubot", "acrobot")
-CHALLENGES = ("model", "velocity noise", "torque noise", "response", "delay", "pushes")
 
 
 def entries(columns_of):
@@ -337,25 +333,6 @@ def realaigym_scores():
     return fig
 
 
-@figure("realaigym-robustness")
-def realaigym_robustness():
-    """The six robustness rows: our entries and the published ones."""
-    blocks = list(entries(CHALLENGES))
-    _, top, _, rows = blocks[-1]
-    fig = canvas(800, top + 22 * len(rows) + 62)
-    for k, name in enumerate(CHALLENGES):
-        left = 140 + 109 * k
-        note(fig, left + 44, 14, name, ha="center", color=MUTED)
-        for robot, top, columns, rows in blocks:
-            if k == 0:
-                note(fig, 128, top - 14, robot, ha="right", color=MUTED, style="italic")
-            axes = dots(fig, left, 88, top, rows, [number(row[columns.index(name)]) for row in rows], k == 0, (-4, 104))
-            axes.set_xticks([0, 50, 100], [] if robot != blocks[-1][0] else None)
-            axes.grid(axis="x", visible=True)
-    note(fig, 460, top + 22 * len(rows) + 46, "simulations passed [%]", ha="center")
-    return fig
-
-
 @figure("machine-motion")
 def machine_motion():
     """Measured angles of left-out runs, and those that the twin and the benchmark's own model predict."""
@@ -386,34 +363,6 @@ def machine_motion():
              Line2D([], [], color=LINK1, linewidth=5), Line2D([], [], color=LINK2, linewidth=5)]
     fig.legend(lines, ["measured", *names, "joint 1", "joint 2"], loc="upper center", ncols=5, handlelength=2.2,
                bbox_to_anchor=(0.52, 0.99))
-    return fig
-
-
-@figure("machine-outcomes")
-def machine_outcomes():
-    """Successes of the published TVLQR: the real runs with Wilson's 95% intervals, and the twin's machines."""
-    columns, rows = table("machine-closed-loop")
-    fig = canvas(800, 60 + 52 * len(rows) + 60)
-    axes = panel(fig, 170, 50, 600, 52 * len(rows))
-    for y, row in enumerate(rows):
-        successes, runs = (int(text) for text in row[columns.index("real successes")].split(" of "))
-        low, high = wilson(successes, runs)
-        axes.hlines(y, 100 * low, 100 * high, color=LINK1, linewidth=3)
-        axes.plot(100 * successes / runs, y, "o", color=LINK1, markersize=11, markeredgecolor=PAPER, clip_on=False)
-        axes.plot(number(row[columns.index("twin")]), y, "D", color=LINK2, markersize=10, markeredgecolor=PAPER,
-                  clip_on=False)
-    from matplotlib.lines import Line2D
-    real = Line2D([], [], color=LINK1, marker="o", markersize=11, linewidth=3)
-    twin = Line2D([], [], color=LINK2, marker="D", markersize=10, linestyle="none")
-    fig.legend([real, twin], ["ten real runs, bar: 95% interval", "1,000 machines of the twin"], loc="upper center",
-               ncols=2, bbox_to_anchor=(0.6, 0.99))
-    axes.set_yticks(range(len(rows)), [row[0] for row in rows])
-    axes.set_ylim(len(rows) - 0.5, -0.5)
-    axes.set_xlim(-2, 102)
-    axes.grid(axis="y", visible=False)
-    axes.spines["left"].set_visible(False)
-    axes.tick_params(axis="y", length=0)
-    axes.set_xlabel("successes [%]")
     return fig
 
 
@@ -563,39 +512,6 @@ def place_label(axes, name, at, taken):
                   color=AGENTS[name], fontweight="bold", annotation_clip=False)
 
 
-@figure("values-over-training")
-def values_over_training():
-    """Expected over attained discounted return: median and range of the seeds, over training."""
-    rows = data_of(DATA / "values-over-training.csv")
-    from statistics import median
-    fig = canvas(800, 420)
-    axes = panel(fig, 80, 20, 690, 335)
-    axes.set_yscale("log")
-    axes.axhline(1, color=INK, linewidth=1.2)
-    for agent in dict.fromkeys(row["agent"] for row in rows):
-        steps = {}
-        for row in rows:
-            if row["agent"] == agent:
-                steps.setdefault(int(row["step"]), []).append(float(row["ratio"]))
-        most = max(map(len, steps.values()))
-        steps = {step: ratios for step, ratios in sorted(steps.items()) if len(ratios) == most}  # all seeds have it
-        axes.fill_between(list(steps), [min(each) for each in steps.values()], [max(each) for each in steps.values()],
-                          color=AGENTS[agent], alpha=0.2, linewidth=0)
-        axes.plot(list(steps), [median(each) for each in steps.values()], color=AGENTS[agent], label=agent)
-    low, high = axes.get_ylim()
-    low, high = max(low, 0.1), min(high, 4)
-    axes.set_ylim(low, high)
-    ticks = [tick for tick in (0.1, 0.2, 0.5, 0.75, 1, 1.5, 2, 3, 4) if low <= tick <= high]
-    axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
-    axes.minorticks_off()
-    axes.xaxis.set_major_formatter("{x:,.0f}")
-    axes.set_xlim(left=0)
-    axes.set_xlabel("steps")
-    axes.set_ylabel("expected / attained return")
-    axes.legend(loc="upper right", ncols=3)
-    return fig
-
-
 @figure("success-by-delta")
 def success_by_delta():
     """Success over |δ|, with Wilson's 95% intervals."""
@@ -727,19 +643,6 @@ def keep_lqr(folder, write):
           [[f"{q2:g}", *line.values()] for q2, line in grid.items()])
 
 
-def collect_values(folder):
-    """Writes values-over-training.csv from the evals.csv of runs named AGENT-seedN."""
-    lines = []
-    for path in sorted(folder.glob("*/evals.csv")):
-        agent, _, seed = path.parent.name.rpartition("-seed")
-        if agent not in AGENTS:
-            sys.exit(f"figures: {path.parent}: expected a name such as fast-seed1")
-        lines += [[agent, seed, row["step"], f"{float(row['value']) / float(row['discounted_return']):.4g}"]
-                  for row in rows_of(path) if float(row["discounted_return"]) > 0]
-    with open(DATA / "values-over-training.csv", "w", newline="", encoding="utf-8") as file:
-        csv.writer(file, lineterminator="\n").writerows([["agent", "seed", "step", "ratio"], *lines])
-
-
 def draw(name):
     """The SVG of a figure, or None if its data do not exist."""
     style()
@@ -754,15 +657,12 @@ def main():
     parser.add_argument("figures", nargs="*", metavar="FIGURE", help=f"figures to draw [all]: {', '.join(DRAWN)}")
     parser.add_argument("--measure", action="store_true", help="run the program for episode, maps and lqr-catch first")
     parser.add_argument("--program", default=str(ROOT / "upswing"), help="program that --measure runs")
-    parser.add_argument("--values", type=Path, metavar="FOLDER", help="folder of runs AGENT-seedN to collect first")
     a = parser.parse_args()
     for name in a.figures:
         if name not in DRAWN:
             parser.error(f"FIGURE: expected one of {', '.join(DRAWN)}, got {name}")
     if a.measure:
         measure(a.program)
-    if a.values:
-        collect_values(a.values)
     for name in a.figures or DRAWN:
         text = draw(name)
         if text is None:

@@ -16,8 +16,9 @@ docs/results/data/ID.json holds one table, as it is displayed:
 Pages show it between `<!-- table: ID -->` and `<!-- end -->`, above a line that names version, date,
 machine and first command. They show one cell of it in a sentence as
 `<!-- value: ID ROW COLUMN -->text<!-- end -->`. ROW is the text of the first cell without
-backticks; COLUMN is an index or a header. GENERATED lists the tables that come from the program:
-`<!-- generated: machines -->` … `<!-- end -->`.
+backticks; COLUMN is an index or a header. GENERATED lists what else a page can show, such as tables
+that come from the program (`<!-- generated: machines -->` … `<!-- end -->`) and lines of a recorded
+output (`<!-- generated: output first-training 12-13 -->` … `<!-- end -->`).
 """
 
 import argparse
@@ -105,22 +106,10 @@ def generated(name):
     return add
 
 
-@generated("hyperparameters")
-def hyperparameters_table(algorithm, *names):
-    """A table with named agents as columns (default: all of the algorithm) and settings as rows.
-    Rows: all settings of network and algorithm, those of training and task that change learning,
-    and those of plant, sensors, random plants and reward in which the agents differ."""
-    return settings_table(algorithm, names, LEARNING)
-
-
 @generated("differences")
 def differences_table(algorithm, *names):
-    """A table with named agents as columns and the settings in which they differ as rows."""
-    return settings_table(algorithm, names, set())
-
-
-def settings_table(algorithm, names, sections):
-    """A table of agents: the settings of these sections, and those in which the agents differ."""
+    """A table with named agents as columns (default: all of the algorithm) and the settings in which
+    they differ as rows."""
     known = [name for name in program.agents() if program.algorithm_of(name) == algorithm]
     default = program.ALGORITHMS.get(algorithm)
     names = names or sorted(known, key=lambda name: name != default)
@@ -129,14 +118,13 @@ def settings_table(algorithm, names, sections):
                       f"{' '.join([algorithm, *names])}")
     columns = [program.settings(name) for name in names]
     rows = []
-    for setting, first in columns[0].items():
+    for setting in columns[0]:
         values = [column[setting].default for column in columns]
-        if setting not in BOOKKEEPING and (first.section in sections or len(set(values)) > 1):
+        if setting not in BOOKKEEPING and len(set(values)) > 1:
             rows.append([f"`{setting}`", *(readable(value) for value in values)])
     return markdown_table(["setting", *(f"`{name}`" for name in names)], rows)
 
 
-LEARNING = {"train", "task", "network", "agent"}  # sections
 BOOKKEEPING = {"agent", "algorithm", "seed", "log_every", "checkpoint_every", "threads"}
 
 
@@ -151,6 +139,23 @@ def machines_table():
                           [[f"`{name}`", each["cpu"], str(each["cores"]), each["memory"],
                             each["system"]] for name, each in machines().items()
                            if name != UNRECORDED])
+
+
+@generated("output")
+def output_lines(table_id, *ranges):
+    """Lines of a recorded output as an indented block. A range is `7` or `7-9`, from 1; `…` stands
+    for lines that are left out."""
+    lines = [row[0] for row in load(table_id)["rows"]]
+    text = ""
+    for each in ranges:
+        if each == "…":
+            text += "      …\n"
+            continue
+        first, _, last = each.partition("-")
+        if not 1 <= int(first) <= int(last or first) <= len(lines):
+            raise Problem(f"{table_id}: expected lines within 1-{len(lines)}, got {each}")
+        text += "".join(f"    {line}\n" for line in lines[int(first) - 1:int(last or first)])
+    return f"\n{text}\n"
 
 
 # --- Pages --------------------------------------------------------------------------------------
@@ -330,6 +335,16 @@ def overview(lab):
                      f"{nominal['torque_variation']['mean']:.1f}", seconds.get(name, NONE)])
     return ["agent", "success", "swing-up [s]", "return / bound", "±25% plants",
             "torque variation [N·m/s]", "time to train [s]"], rows
+
+
+@recipe("first-training")
+def first_training(lab):
+    """The output of a training, with the vector instructions that most processors have."""
+    os.environ["UPSWING_VECTORS"] = "avx2"
+    text = lab.run("train", "--agent", "fast", *(["--steps", 4000] if lab.few else []),
+                   "--out", lab.folder / "fast-seed1")
+    lab.commands = ["UPSWING_VECTORS=avx2 ./upswing train --agent fast"]
+    return ["output"], [[line] for line in text.replace(str(lab.folder), "runs").splitlines()]
 
 
 @recipe("time-to-solve")

@@ -10,7 +10,7 @@
 
 /// Statistics over independent runs. Source: Agarwal, Schwarzer, Castro, Courville and Bellemare
 /// (2021), "Deep Reinforcement Learning at the Edge of the Statistical Precipice".
-/// docs/howto/compare.md has the formulas. A score may be infinite (a run that never solved its
+/// docs/results/seeds.md has the formulas. A score may be infinite (a run that never solved its
 /// task), but not NaN.
 namespace upswing {
 

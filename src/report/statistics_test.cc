@@ -147,7 +147,7 @@ double Coverage(size_t runs) {
 
 TEST(Statistics, IntervalsOfFewRunsAreTooNarrowAndOfManyRight) {
   // 1,000 samples give the coverage to ±0.01 (one standard deviation at 0.85).
-  // docs/howto/compare.md has these coverages.
+  // docs/results/seeds.md has these coverages.
   const double five = Coverage(5), ten = Coverage(10), thirty = Coverage(30);
   RecordProperty("five", std::to_string(five));
   RecordProperty("ten", std::to_string(ten));

@@ -24,7 +24,7 @@ LEVEL = 0.05
 
 
 def interquartile_mean(x):
-    """The interquartile mean over the last axis, as docs/howto/compare.md defines it."""
+    """The interquartile mean over the last axis, as docs/results/seeds.md defines it."""
     cut = x.shape[-1] // 4
     return np.sort(x, axis=-1)[..., cut:x.shape[-1] - cut].mean(axis=-1)
 
