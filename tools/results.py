@@ -14,7 +14,7 @@ docs/results/data/ID.json holds one table, as it is displayed:
    "columns": […], "rows": [[…], …]}
 
 Pages show it between `<!-- table: ID -->` and `<!-- end -->`, above a line that names version, date,
-machine and first command. They show one cell of it in a sentence as
+machine and first command; `<!-- table: ID ROW ROW -->` shows some rows. They show one cell of it in a sentence as
 `<!-- value: ID ROW COLUMN -->text<!-- end -->`. ROW is the text of the first cell without
 backticks; COLUMN is an index or a header. GENERATED lists what else a page can show, such as tables
 that come from the program (`<!-- generated: machines -->` … `<!-- end -->`) and lines of a recorded
@@ -176,10 +176,14 @@ def origin(table, page):
 
 
 def render(kind, name, page=MACHINES_PAGE):
-    if kind == "table":
-        table = load(name)
-        return markdown_table(table["columns"], table["rows"]) + origin(table, page)
     function, *arguments = name.split()
+    if kind == "table":
+        table = load(function)
+        rows = {row[0].replace("`", ""): row for row in table["rows"]}
+        if unknown := set(arguments) - set(rows):
+            raise Problem(f"expected rows of {function}, got {', '.join(sorted(unknown))}")
+        chosen = [rows[row] for row in arguments] or table["rows"]
+        return markdown_table(table["columns"], chosen) + origin(table, page)
     if function not in GENERATED:
         raise Problem(f"generated: expected one of {', '.join(GENERATED)}, got {function}")
     return GENERATED[function](*arguments)
