@@ -33,7 +33,7 @@ def run(*command, **more):
 
 
 PORTABLE = ["base", "nn", "pendulum", "rl", "control"]
-EXAMPLES = ["control_loop", "dqn_on_one_page", "own_task", "train_and_judge"]
+EXAMPLES = ["control_loop", "dqn_on_one_page", "library_tour", "own_task", "train_and_judge"]
 
 # A project that finds the library, with one target for each part to build.
 PROJECT = f"""cmake_minimum_required(VERSION 3.25)
@@ -42,13 +42,13 @@ foreach(name IN ITEMS {" ".join(EXAMPLES)})
   add_subdirectory({ROOT}/examples/${{name}} ${{name}})
 endforeach()
 target_compile_options(dqn_on_one_page PRIVATE -O2)
-add_subdirectory(docs)
+add_subdirectory(portable)
 add_subdirectory(headers)
 add_subdirectory(wants)
 """
-DOCS = """find_package(upswing REQUIRED COMPONENTS pendulum rl control)
-add_executable(docs docs.cc)
-target_link_libraries(docs PRIVATE upswing::pendulum upswing::rl upswing::control)
+PORTABLE_HEADERS = """find_package(upswing REQUIRED COMPONENTS pendulum rl control)
+add_library(portable OBJECT portable.cc)
+target_link_libraries(portable PRIVATE upswing::pendulum upswing::rl upswing::control)
 """
 HEADERS = """find_package(upswing REQUIRED)
 add_library(all_of_them OBJECT all.cc)
@@ -78,8 +78,8 @@ class Library(unittest.TestCase):
         cls.prefix = (cls.folder / "before").rename(cls.folder / "moved")  # installations can move
         cls.include = cls.prefix / "include/upswing"
         source = cls.folder / "source"
-        for path, text in (("CMakeLists.txt", PROJECT), ("docs/CMakeLists.txt", DOCS),
-                           ("docs/docs.cc", "\n".join([*cls.blocks(), cls.all_headers(PORTABLE)])),
+        for path, text in (("CMakeLists.txt", PROJECT), ("portable/CMakeLists.txt", PORTABLE_HEADERS),
+                           ("portable/portable.cc", cls.all_headers(PORTABLE)),
                            ("headers/CMakeLists.txt", HEADERS),
                            ("headers/all.cc", cls.all_headers(FOLDERS)),
                            ("wants/CMakeLists.txt", WANTS)):
@@ -100,12 +100,6 @@ class Library(unittest.TestCase):
         # Failures are reported by each part's own test, which builds it again.
         subprocess.run(["cmake", "--build", cls.build_folder, "--", "-k", "0"], check=False,
                        env=cls.environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-
-    @staticmethod
-    def blocks():
-        """The C++ code of the documentation."""
-        text = (ROOT / "docs/howto/cpp-library.md").read_text(encoding="utf-8")
-        return re.findall(r"^```cpp\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
 
     @classmethod
     def all_headers(cls, layers):
@@ -152,9 +146,8 @@ class Library(unittest.TestCase):
         self.assertEqual((bad.returncode, bad.stdout), (2, ""))
         self.assertIn("four numbers", bad.stderr)
 
-    def test_blocks_of_the_documentation_are_one_program(self):
-        self.assertEqual(len(self.blocks()), 4)
-        lines = run(self.build("docs")).splitlines()
+    def test_library_tour(self):
+        lines = run(self.build("library_tour")).splitlines()
         self.assertRegex(lines[-1], r"20000 steps, a checkpoint of \d{6,} bytes")
         for begin in ("reward of random torques: ", "return of a brake: ", "loss "):
             self.assertEqual(sum(line.startswith(begin) for line in lines), 1, begin)
@@ -169,7 +162,7 @@ class Library(unittest.TestCase):
     def test_every_header_can_be_included(self):
         self.assertEqual({path.name for path in self.include.iterdir()}, {*LAYERS, "extras"})
         self.assertEqual({path.name for path in (self.include / "extras").iterdir()}, set(EXTRAS))
-        self.build("docs", "all_of_them")  # docs links only portable layers
+        self.build("portable", "all_of_them")
 
     def test_package_refuses_what_it_is_not(self):
         answers = dict(re.findall(r"^-- wants (.*?): (\d)$", self.configured, re.MULTILINE))

@@ -271,7 +271,8 @@ def ablation(name, agent, reference):
     return fig
 
 
-for _name, _agent, _reference in (("extensions", "fast", "all"), ("post", "dqn", "dqn")):
+for _name, _agent, _reference in (("reward", "fast", "all"), ("curriculum", "fast", "hanging"),
+                                  ("sac-extensions", "sac-fast", "all"), ("ppo-parts", "ppo", "all")):
     DRAWN[f"study-{_name}"] = lambda name=_name, agent=_agent, reference=_reference: ablation(name, agent, reference)
 
 ROBOTS = ("pendubot", "acrobot")
