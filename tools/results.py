@@ -351,6 +351,15 @@ def first_training(lab):
     return ["output"], [[line] for line in text.replace(str(lab.folder), "runs").splitlines()]
 
 
+@recipe("perf-c")
+def exported_headers(lab):
+    rows = []
+    for agent in ("ppo", "fast", "sac", "d3qn-randomized", "d3qn"):
+        text = lab.run("export", PAGE_AGENTS / f"{agent}.safetensors", "--c", lab.folder / "policy.h")
+        rows.append([f"`{agent}`", *re.findall(r"([\d,]+) (?:KB|bytes|multiply-adds)", text)])
+    return ["agent", "header [KB]", "constants [B]", "state [B]", "stack [B]", "multiply-adds"], rows
+
+
 @recipe("time-to-solve")
 def time_to_solve(lab):
     rows = []
