@@ -1,7 +1,7 @@
 import { defineConfig } from '@playwright/test';
 import { launchOptions } from './tests/chromium.mjs';
 
-/// The built page in Chromium. tools/web_test says which build, on which port, in which browser.
+/// The built page in Chromium. tools/web_test sets the build, the port and the browser.
 const page = process.env.UPSWING_PAGE ?? '../build/web';
 const port = Number(process.env.UPSWING_PAGE_PORT ?? 4174);
 
@@ -12,7 +12,7 @@ export default defineConfig({
   workers: 2,
   forbidOnly: process.env.UPSWING_REQUIRE_WEB === '1',
   reporter: 'list',
-  // For a machine twenty times slower than two idle cores; what passes does not wait.
+  // Enough for a machine twenty times slower than two idle cores. Passing tests do not wait.
   timeout: 2_400_000,
   expect: { timeout: 300_000 },
   use: {

@@ -7,11 +7,11 @@ import type { State } from './pendulum';
 import { Policy } from './policy';
 import { BadInput } from './bad_input';
 
-/// Actor policies, against what the C++ program makes of the same files.
+/// Actor policies, compared with results of the C++ program for the same files.
 
 const actors = actorFiles();
 
-test('of every kind of output', () => {
+test('every kind of output has a policy', () => {
   const outputs = actors.map((file) => new Policy(file).about('output'));
   expect(new Set(outputs).size).toBe(3);
   expect(actors.map((file) => new Policy(file).controller.text)).toEqual([
@@ -79,7 +79,7 @@ describe('is refused', () => {
     expect(() => new Policy(withMetadata(file, key, text))).toThrow(BadInput);
   });
 
-  test('with numbers that are none, or that it does not compute', () => {
+  test('with numbers that are not finite or not its own results', () => {
     for (const file of actors) {
       const names = tensorNames(file);
       expect(names).toContain('action_limit');
@@ -102,7 +102,7 @@ describe('is refused', () => {
   });
 });
 
-test('a large number is told in full, as the program does', () => {
+test('messages give a large number in full, as in the program', () => {
   const file = actors[0]!;
   const plant = JSON.parse(new Policy(file).about('plant')) as object;
   for (const mass1 of [9007199254740994, 9999999999999998, 1234567890123456]) {
@@ -111,14 +111,14 @@ test('a large number is told in full, as the program does', () => {
   }
 });
 
-test('numbers that overflow on the way move nothing', () => {
+test('numbers that overflow give no torque', () => {
   for (const file of actors) {
     const decision = new Policy(file).act(new Float32Array(8).fill(3e38));
     expect(Number.isFinite(decision.torque)).toBe(true);
   }
 });
 
-test('what it says of a decision', () => {
+test('describes a decision', () => {
   const text = (which: number) => {
     const policy = new Policy(actors[which]!);
     return decisionText(policy.act(new Float32Array(policy.controller.inputs)), 0.1);

@@ -1,7 +1,7 @@
-/// Input from outside that is not as expected; the message says in one line what was expected.
+/// Unexpected input from outside. The message names the expected input in one line.
 export class BadInput extends Error {}
 
-/// Policies and lists that are longer are not read.
+/// Largest policy file or list that is read.
 export const MAX_FILE_BYTES = 16 * 1024 * 1024;
 
 export function largerThan(bytes: number): string {

@@ -5,14 +5,14 @@ import { readPolicy } from '../tests/program';
 import { CoreController } from './controller';
 import { core } from './core';
 
-test('what nobody holds any more is freed', async () => {
+test('frees a controller without references', async () => {
   setFlagsFromString('--expose-gc');
   const collect = runInNewContext('gc') as () => void;
   const file = readPolicy('d3qn');
   async function openAndForget(times: number): Promise<number> {
     for (let k = 0; k < times; ++k) {
       new CoreController(file.slice(0));
-      if (k % 5 > 0) continue; // a collection takes longer than an opening
+      if (k % 5 > 0) continue; // a garbage collection takes longer than opening a policy
       collect();
       await new Promise((resolve) => setTimeout(resolve, 0));
     }

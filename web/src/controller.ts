@@ -2,14 +2,14 @@ import { core } from './core';
 import type { Core } from './core';
 import type { Controller, Decision, Memory } from './decision';
 
-/// What the core says of a policy file (web/wasm/api.cc).
+/// Description of a policy file by the core (web/wasm/api.cc).
 interface About {
   kind: 'q' | 'squashed-gaussian' | 'clipped-gaussian' | 'categorical' | 'computed';
   text: string;
   inputs: number;
-  columns: number; // numbers of a decision
+  columns: number; // of a decision's row
   torques: number[]; // N·m
-  limit: number; // N·m, of what has no table of torques
+  limit: number; // N·m; for policies without a table of torques
   memory: number; // steps
   identifies: boolean;
   selfCheckError: number;
@@ -18,7 +18,8 @@ interface About {
 
 const forgotten = new FinalizationRegistry<() => void>((close) => close());
 
-/// Frees what a policy has in the core. Made here, where it cannot hold the policy itself.
+/// Frees a policy's memory in the core. Outside the class, so that it cannot hold the policy
+/// itself.
 function closer({ exports }: Core, policy: number, ...places: readonly number[]): () => void {
   return () => {
     exports.policy_close(policy);
@@ -38,14 +39,14 @@ class CoreMemory implements Memory {
   }
 }
 
-/// A policy in the core, and what its decisions are made of.
+/// A policy in the core, with its buffers.
 export class CoreController implements Controller {
   readonly about: Readonly<About>;
-  /// Frees its memory now; else that happens some time after its last reference is gone.
+  /// Frees the memory now. Otherwise the garbage collector frees it later.
   readonly close: () => void;
   private readonly policy: number;
-  private readonly observation: number; // where one is put
-  private readonly row: number; // where what is made of it lies
+  private readonly observation: number; // address of the input
+  private readonly row: number; // address of the decision
   private readonly torques: Float64Array;
 
   /// Reads and checks a policy file, or makes the controller of a name. Throws BadInput.
@@ -100,7 +101,7 @@ export class CoreController implements Controller {
     );
   }
 
-  /// From a row of torque, V, and what its kind has (web/wasm/api.cc).
+  /// The decision in a row: torque, V, and the numbers of its kind (web/wasm/api.cc).
   private decision(row: Float64Array): Decision {
     const { kind, limit } = this.about;
     const { torques } = this;

@@ -1,9 +1,9 @@
 import { BadInput } from './bad_input';
 
-/// Our own core in C++ (web/wasm/api.cc), compiled to WebAssembly: what the page computes of policies,
-/// formulas and learning. Only this file knows its memory.
+/// Our own core in C++ (web/wasm/api.cc), compiled to WebAssembly: policies, formulas and learning.
+/// Only this file knows its memory.
 
-/// What the module exports. Objects and memory are addresses; 0 is failure.
+/// The module's exports. Objects and memory are addresses; 0 is failure.
 interface Exports {
   memory: WebAssembly.Memory;
   _initialize(): void;
@@ -95,28 +95,28 @@ export class Core {
     return new Core(exports);
   }
 
-  /// The text that the last call left.
+  /// Text left by the last call.
   get text(): string {
     const { memory, text_at, text_size } = this.exports;
     return this.decoder.decode(new Uint8Array(memory.buffer, text_at(), text_size()));
   }
 
-  /// A copy of the file that the last call left.
+  /// A copy of the file left by the last call.
   get file(): ArrayBuffer {
     const { memory, bytes_at, bytes_size } = this.exports;
     return memory.buffer.slice(bytes_at(), bytes_at() + bytes_size()) as ArrayBuffer;
   }
 
-  /// `result`, unless it is 0. Throws BadInput, with the reason.
+  /// `result` if it is not 0. Otherwise throws BadInput with the reason.
   expect(result: number): number {
     if (result === 0) throw new BadInput(this.text);
     return result;
   }
 
-  /// Space for so many bytes in the module's memory. Throws BadInput.
+  /// Address of `size` free bytes in the module's memory. Throws BadInput.
   reserve(size: number): number {
     const at = this.exports.reserve(Math.max(1, size));
-    if (at === 0) throw new BadInput('it does not fit into the memory that a page has');
+    if (at === 0) throw new BadInput("it does not fit into a page's memory");
     return at;
   }
 
@@ -142,7 +142,7 @@ export class Core {
     }
   }
 
-  /// The formulas' numbers: what `work` makes of `input`. A view of the core's memory, so good until the
+  /// The numbers that `work` computes from `input`: a view of the core's memory, valid until the
   /// next call.
   formula(input: readonly number[], work: () => void): Float64Array {
     const numbers = () => new Float64Array(this.exports.memory.buffer, this.exports.numbers(), 32);
@@ -155,13 +155,13 @@ export class Core {
 let started: Core | null = null;
 let compiled: WebAssembly.Module | null = null;
 
-/// Starts the page's core, before anything else is computed.
+/// Starts the core. Call this before anything else.
 export async function startCore(module: WebAssembly.Module): Promise<void> {
   started = await Core.start(module);
   compiled = module;
 }
 
-/// Its module, for workers to start their own.
+/// The compiled module, from which workers start their own core.
 export function coreModule(): WebAssembly.Module {
   if (!compiled) throw new Error('the core has not been started');
   return compiled;

@@ -1,4 +1,4 @@
-/// What a policy makes of an observation, for the motor and for who watches.
+/// A policy's decision about an observation, for the motor and for display.
 
 interface Choice {
   torque: number; // N·m
@@ -10,29 +10,29 @@ export interface QDecision extends Choice {
   kind: 'q';
   torques: Float64Array; // (A) N·m
   q: Float64Array; // (A)
-  action: number; // which of them
+  action: number; // index of the chosen torque
 }
 
-/// Of an actor that draws from a Gaussian: its mean.
+/// Of a Gaussian actor: its mean.
 export interface GaussianDecision extends Choice {
   kind: 'gaussian';
   limit: number; // N·m
-  low: number; // N·m, the ends of the central 68% of the torques that it would draw
+  low: number; // N·m, lower end of the central 68% of its distribution
   high: number;
-  /// The probability of being cut off at -limit, of each of so many equal pieces of the range, and of
+  /// Probabilities: of being cut off at -limit, of each of N equal pieces of the range, and of
   /// being cut off at limit.
   probabilities(pieces: number): Float64Array;
 }
 
-/// Of an actor that draws one of some torques: the likeliest.
+/// Of a categorical actor: the likeliest torque.
 export interface CategoricalDecision extends Choice {
   kind: 'categorical';
   torques: Float64Array; // (A) N·m
   probabilities: Float64Array; // (A)
-  action: number; // which of them
+  action: number; // index of the chosen torque
 }
 
-/// Of a controller that is made from the equations of motion.
+/// Of a controller computed from the equations of motion.
 export interface ComputedDecision extends Choice {
   kind: 'computed';
   limit: number; // N·m
@@ -40,23 +40,23 @@ export interface ComputedDecision extends Choice {
 
 export type Decision = QDecision | GaussianDecision | CategoricalDecision | ComputedDecision;
 
-/// What a policy remembers of an episode.
+/// A policy's memory of an episode.
 export interface Memory {
   close(): void;
 }
 
 /// The part of a policy that chooses torques.
 export interface Controller {
-  readonly inputs: number; // how many numbers an observation has
-  readonly isLearned: boolean; // or else made from the equations of motion
-  readonly text: string; // what it is, for people
+  readonly inputs: number; // size of an observation
+  readonly isLearned: boolean; // false: computed from the equations of motion
+  readonly text: string; // description for people
   readonly strongest: number; // N·m, the largest torque
   /// Largest |difference| between the outputs in the file and those computed here.
   readonly selfCheckError: number;
-  /// Without a memory as at the beginning of an episode.
+  /// `memory` null: as at the beginning of an episode.
   decide(observation: Float32Array, memory: Memory | null): Decision;
-  /// Begins an episode; null where nothing of it is remembered.
+  /// Begins an episode. Null if the policy has no memory.
   begin(): Memory | null;
-  /// Frees what it holds; nothing may be asked of it after.
+  /// Frees its memory. Use nothing of it afterwards.
   close(): void;
 }

@@ -1,12 +1,11 @@
 import { CONTROL_PERIOD } from './pendulum';
 import type { Range, State } from './pendulum';
 
-/// Errors of sensors and motor; all zero: none. Those from `sensor_latency` on are as in
-/// src/pendulum/sensors.h.
+/// Errors of sensors and motor; 0: none. src/pendulum/sensors.h describes the last four.
 export interface Disturbance {
   sensor_noise: number; // standard deviation, on each measured angle and velocity, rad and rad/s
   delay: number; // from the choice of a torque to its effect, in control periods
-  sensor_latency: number; // age of what is measured, s
+  sensor_latency: number; // age of the measured state, s
   encoder_counts: number; // per revolution
   velocity_window: number; // over which velocities are differences of angles, s
   velocity_filter: number; // time constant of their low-pass, s
@@ -36,7 +35,7 @@ function normal(): number {
   return Math.sqrt(-2 * Math.log(1 - Math.random())) * Math.cos(2 * Math.PI * Math.random());
 }
 
-/// Whether sensors measure the true present state, but for noise.
+/// Whether sensors show the present state, apart from noise.
 export function exact(disturbance: Readonly<Disturbance>): boolean {
   const { sensor_latency, encoder_counts, velocity_window, velocity_filter } = disturbance;
   return sensor_latency + encoder_counts + velocity_window + velocity_filter === 0;
@@ -49,7 +48,7 @@ export function blurred(s: State, noise: number): State {
   return { q1: blur(s.q1), q2: blur(s.q2), w1: blur(s.w1), w2: blur(s.w2) };
 }
 
-/// A motor with a delay of some control periods; until the first torque arrives it applies none.
+/// A motor with a delay of some control periods. It applies no torque until the first one arrives.
 export class DelayLine {
   private underWay: number[] = [];
 
@@ -57,8 +56,8 @@ export class DelayLine {
     this.underWay = [];
   }
 
-  /// Takes the torque chosen now, gives the one that acts now. A shorter delay than before skips the
-  /// oldest torques that wait.
+  /// Takes the torque chosen now and returns the one that acts now. If the delay has become
+  /// shorter, the oldest waiting torques are skipped.
   apply(torque: number, delay: number): number {
     this.underWay.push(torque);
     if (this.underWay.length <= delay) return 0;

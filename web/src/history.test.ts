@@ -15,19 +15,19 @@ test('keeps the last seconds, oldest first', () => {
   expect(history.from(101)).toEqual([]);
 });
 
-test('the oldest of a window counts, whenever it began', () => {
+test('a window includes its oldest moment, whenever it began', () => {
   for (let start = 0; start < 1000; ++start) {
     const history = new History(60);
     const time = (k: number) => (start + 4 * k) / STEPS_PER_SECOND; // as World.time
     for (let k = 0; k <= 4000; ++k) history.add(moment(time(k)));
-    // Control steps 0.02 s apart: 65 in 1.3 s, and the one at its beginning.
+    // Control steps 0.02 s apart: 65 in 1.3 s, and the first one.
     expect(history.from(time(4000) - 1.3).length, `${start}`).toBe(66);
     expect(history.from(time(4000) - 10).length, `${start}`).toBe(501);
     expect(history.from(0).length, `${start}`).toBe(3001);
   }
 });
 
-test('as CSV, with time from its start', () => {
+test("writes CSV with time from the history's start", () => {
   const history = new History(10);
   history.add(moment(3));
   history.add({ ...moment(3.02), state: { q1: 0.1, q2: -1 / 3, w1: 0, w2: 2 } });

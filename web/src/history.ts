@@ -1,14 +1,13 @@
 import { STEPS_PER_SECOND } from './world';
 import type { Moment } from './world';
 
-// Times lie whole physics steps apart. Half a step of margin decides about the one on the edge, not how
-// a difference of two times is rounded.
+// Half a physics step of margin, so that rounding does not decide about a moment on the edge.
 const MARGIN = 0.5 / STEPS_PER_SECOND; // s
 
 /// The last moments, oldest first.
 export class History {
   private moments: Moment[] = [];
-  private first = 0; // index of the oldest that counts
+  private first = 0; // index of the oldest moment that is kept
   private readonly seconds: number;
 
   constructor(seconds: number) {
@@ -18,13 +17,13 @@ export class History {
   add(moment: Moment): void {
     this.moments.push(moment);
     while (this.moments[this.first]!.t < moment.t - this.seconds - MARGIN) ++this.first;
-    // Cut from time to time, not at each step.
+    // Removes old moments in bulk, not at each step.
     if (this.first < 1000) return;
     this.moments = this.moments.slice(this.first);
     this.first = 0;
   }
 
-  /// The moments from time t (s) on; one exactly at t counts.
+  /// The moments from time t (s) on, inclusive.
   from(t: number): Moment[] {
     let first = this.moments.length;
     while (first > this.first && this.moments[first - 1]!.t >= t - MARGIN) --first;

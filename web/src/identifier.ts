@@ -10,7 +10,7 @@ function numbers({ q1, q2, w1, w2 }: State): number[] {
 
 const forgotten = new FinalizationRegistry<() => void>((close) => close());
 
-/// The estimate of an unknown plant while it moves, as in src/pendulum/identification.h.
+/// Estimates an unknown plant from its motion, as src/pendulum/identification.h.
 export class Identifier {
   private readonly at: number;
 
@@ -24,19 +24,19 @@ export class Identifier {
     forgotten.register(this, () => exports.identifier_close(at));
   }
 
-  /// Nothing is known of the plant.
+  /// Forgets everything about the plant.
   begin(measured: State): void {
     core().formula(numbers(measured), () => core().exports.identifier_begin(this.at));
   }
 
-  /// After a control period in which `torque` (N·m) acted, with this noise of the sensors.
+  /// Call after a control period under `torque` (N·m). `noise`: of the sensors.
   update(measured: State, torque: number, noise: number): void {
     core().formula([...numbers(measured), torque, noise], () =>
       core().exports.identifier_update(this.at),
     );
   }
 
-  /// What is added to the observation of a state.
+  /// The numbers that identification adds to the observation of a state.
   observe(state: State): Float64Array {
     return core()
       .formula(numbers(state), () => core().exports.identifier_observe(this.at))

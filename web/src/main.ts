@@ -48,7 +48,7 @@ const page = await start().catch((error: unknown) => {
 });
 element('loading').hidden = true;
 
-// MuJoCo is larger than all else together: the pendulum does not wait for it.
+// MuJoCo is larger than everything else, so the pendulum does not wait for it.
 try {
   if (page) page.continueIn(await fetchMujoco());
 } catch (error) {

@@ -14,7 +14,7 @@ beforeAll(async () => {
 
 const STATE = { q1: 2.8, q2: 0.3, w1: -0.7, w2: 1.1 };
 
-test('a share of an axis is the value that is there, and angles come back after a turn', () => {
+test('shares of an axis map to values, and angles repeat after a turn', () => {
   for (const axis of Object.values(AXES)) {
     for (const share of [0, 0.25, 0.5, 0.99]) {
       const state = { ...STATE, [axis.name]: valueAt(axis, share) };
@@ -26,7 +26,7 @@ test('a share of an axis is the value that is there, and angles come back after 
   }
 });
 
-/// The same, asked of the agent as if it were there.
+/// The decision of an agent in that state.
 function direct(map: ValueMap, column: number, row: number): number {
   const there = {
     ...STATE,
@@ -40,7 +40,7 @@ function direct(map: ValueMap, column: number, row: number): number {
 }
 
 test.each(['d3qn', 'sac', 'd3qn-adaptive', 'd3qn-randomized'])(
-  '%s: the map is what it decides there',
+  '%s: each cell is a decision in its state',
   (agent) => {
     world.policy = new Policy(readPolicy(agent));
     world.plant = { ...NOMINAL, mass2: 1.1 };
@@ -66,7 +66,7 @@ test.each(['d3qn', 'sac', 'd3qn-adaptive', 'd3qn-randomized'])(
   },
 );
 
-test('it is computed in slices, all of the state at which it was begun', () => {
+test('a map is computed in slices, all for the state at its beginning', () => {
   world.policy = new Policy(readPolicy('fast'));
   world.reset(STATE);
   const whole = new ValueMap(8);
@@ -82,14 +82,14 @@ test('it is computed in slices, all of the state at which it was begun', () => {
   expect(sliced.cells).toEqual(whole.cells);
 });
 
-test('without a policy there is none', () => {
+test('without a policy there is no map', () => {
   world.policy = null;
   const map = new ValueMap(4);
   expect(map.work(world, 1e9)).toBeNull();
   expect(map.cells).toBeNull();
 });
 
-test('a plant that changes meanwhile begins the map anew', () => {
+test('a change of the plant starts the map again', () => {
   world.policy = new Policy(readPolicy('d3qn'));
   world.plant = NOMINAL;
   world.reset(STATE);
@@ -106,7 +106,7 @@ test('a plant that changes meanwhile begins the map anew', () => {
   }
 });
 
-test('a map is of the state that it was begun in', () => {
+test('a map belongs to the state at its beginning', () => {
   world.plant = NOMINAL;
   world.reset(STATE);
   const map = new ValueMap(6);
@@ -116,19 +116,20 @@ test('a map is of the state that it was begun in', () => {
   expect(map.work(world, 1e9)!.w1).toBe(5);
 });
 
-test('the colours of a map whose values hardly differ are nearly the same', () => {
+test('a nearly even map has nearly even colours', () => {
   const share = (cells: Float32Array, scale: number) => {
     const [low, high] = rangeOfValues(cells, scale);
     return [(Math.min(...cells) - low) / (high - low), (Math.max(...cells) - low) / (high - low)];
   };
-  // An untrained network (0.02 of a reward apart, at a reward scale of 0.1): about the middle.
+  // An untrained network gets the middle of the colours: values 0.02 of a reward apart, at a reward
+  // scale of 0.1.
   const untrained = Float32Array.of(0.051, 0.053);
   expect(isEven(untrained, 0.1)).toBe(true);
   for (const one of share(untrained, 0.1)) expect(Math.abs(one - 0.5)).toBeLessThan(0.01);
   // 979 to 992.6 is 1.4% apart.
   const [from, to] = share(Float32Array.of(979, 992.6), 1) as [number, number];
   expect(to - from).toBeLessThan(0.3);
-  // Values that differ use the whole scale.
+  // Values that differ use all colours.
   const different = Float32Array.of(-10, 700);
   expect(isEven(different, 1)).toBe(false);
   expect(share(different, 1)).toEqual([0, 1]);

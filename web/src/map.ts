@@ -2,17 +2,18 @@ import type { Decision } from './decision';
 import type { Plant, State } from './pendulum';
 import type { World } from './world';
 
-/// What the agent expects, or does, over two of the four state variables, the others as they are now.
+/// A map of the agent's value or torque over two of the four state variables; the others keep their
+/// present values.
 
 export type Variable = keyof State;
 export type Quantity = 'value' | 'torque';
 
-/// A variable over a side of the map, from `middle` - `reach` to `middle` + `reach`.
+/// A variable along a side of the map, from `middle` - `reach` to `middle` + `reach`.
 export interface Axis {
   name: Variable;
   middle: number; // rad, rad/s
   reach: number;
-  turns: boolean; // comes back after a turn
+  turns: boolean; // an angle, which repeats
 }
 
 /// Upright at rest is in the middle. (q2 is relative: 0 is straight.)
@@ -23,7 +24,7 @@ export const AXES: Readonly<Record<Variable, Axis>> = {
   w2: { name: 'w2', middle: 0, reach: 20, turns: false },
 };
 
-/// Where a state is on an axis, 0 to 1; beyond these for a velocity that is faster.
+/// A state's place on an axis, 0 to 1; outside this range for a faster velocity.
 export function shareOf({ name, middle, reach, turns }: Axis, state: State): number {
   const share = (state[name] - middle + reach) / (2 * reach);
   return turns ? share - Math.floor(share) : share;
@@ -33,32 +34,32 @@ export function valueAt({ middle, reach }: Axis, share: number): number {
   return middle + (2 * share - 1) * reach;
 }
 
-/// V of a decision: of a Q-network the largest Q-value. NaN where nothing is estimated.
+/// V of a decision; for a Q-network the largest Q-value. NaN if the policy estimates none.
 export function valueOf(decision: Decision): number {
   return decision.kind === 'q' ? decision.q[decision.action]! : decision.value;
 }
 
-/// A grid that is computed a little at each frame, so that the page stays smooth.
+/// A grid that is computed in slices, one at each frame, so that the page stays smooth.
 export class ValueMap {
-  readonly size: number; // cells of a side
+  readonly size: number; // cells along a side
   x = AXES.q1;
   y = AXES.q2;
   quantity: Quantity = 'value';
-  atRest = false; // whether the velocities are 0, not as they are now
+  atRest = false; // zero velocities instead of the present ones
   /// The last complete map (size × size), rows from below: V in units of the network, or torque (N·m).
   /// Null before there is one.
   cells: Float32Array | null = null;
   private begun: Float32Array;
-  private next = 0; // cell of it
-  private around: State | null = null; // the other variables, of the map that is being computed
-  private plant: Readonly<Plant> | null = null; // of which it is
+  private next = 0; // cell to compute next
+  private around: State | null = null; // values of the other variables
+  private plant: Readonly<Plant> | null = null; // of the map in progress
 
   constructor(size: number) {
     this.size = size;
     this.begun = new Float32Array(size * size);
   }
 
-  /// Forgets what is known: other axes, another quantity or another agent.
+  /// Drops the map: other axes, another quantity or another agent.
   clear(): void {
     this.cells = null;
     this.restart();
@@ -69,9 +70,8 @@ export class ValueMap {
     this.next = 0;
   }
 
-  /// Computes for so long at most, one cell at least. When a map has become complete, the state that it
-  /// was begun in, else null; the next call begins another one, of the state then. A change of the plant
-  /// begins it again.
+  /// Computes for up to `milliseconds`, at least one cell. Returns the state at which a map was
+  /// begun when that map is complete, else null. A change of the plant starts the map again.
   work(world: World, milliseconds: number): State | null {
     const end = performance.now() + milliseconds;
     if (this.plant !== world.plant) this.restart();
@@ -100,13 +100,13 @@ export class ValueMap {
   }
 }
 
-/// The least and the largest.
+/// The smallest and the largest value.
 export function endsOf(cells: Float32Array): [number, number] {
   return [cells.reduce((a, b) => Math.min(a, b)), cells.reduce((a, b) => Math.max(a, b))];
 }
 
-/// How far values (V / reward scale) lie apart at least where the colours use their whole scale: what
-/// balancing earns in a few steps, and a share of the values themselves.
+/// Smallest range of values (V / reward scale) that uses all colours: the reward of a few balanced
+/// steps, or a share of the values themselves.
 const LEAST = 20; // reward
 const LEAST_SHARE = 0.05;
 
@@ -114,14 +114,14 @@ function leastRange([low, high]: [number, number], rewardScale: number): number 
   return Math.max(LEAST * rewardScale, (LEAST_SHARE * Math.abs(low + high)) / 2);
 }
 
-/// Whether values hardly differ.
+/// Whether the values hardly differ.
 export function isEven(cells: Float32Array, rewardScale: number): boolean {
   const ends = endsOf(cells);
   return ends[1] - ends[0] < leastRange(ends, rewardScale);
 }
 
-/// The ends of the colours: least and largest value, or farther apart where a map is even, so that it
-/// looks so.
+/// The values at the ends of the colours. A nearly even map gets a wider range, so that it looks
+/// even.
 export function rangeOfValues(cells: Float32Array, rewardScale: number): [number, number] {
   const ends = endsOf(cells);
   const wider = Math.max(0, leastRange(ends, rewardScale) - (ends[1] - ends[0])) / 2;

@@ -23,7 +23,7 @@ function expectSame(got: State, expected: State, tolerance: number): void {
   });
 }
 
-test('a plant that is written into the model is the one that a new model would have', () => {
+test("changing the model's plant equals a new model", () => {
   const model = mujoco.MjModel.from_xml_string(mjcf(OTHER))!;
   const data = new mujoco.MjData(model);
   data.qpos.set([START.q1, START.q2]);
@@ -48,7 +48,7 @@ test.each([
   { link: 1, along: 0.2 },
   { link: 2, along: 0.35 },
   { link: 2, along: 0.5 },
-] as const)('a push on link $link is the one that mj_applyFT applies', ({ link, along }) => {
+] as const)('a push on link $link equals mj_applyFT', ({ link, along }) => {
   const push: Push = { link, along, force: { x: 30, z: -20 } };
   const model = mujoco.MjModel.from_xml_string(mjcf(NOMINAL))!;
   const data = new mujoco.MjData(model);
@@ -68,7 +68,7 @@ test.each([
     simulator.step(0, acting);
     return simulator.state;
   };
-  // Ours keeps its direction within the step, mj_applyFT's is that of the beginning.
+  // Our push keeps its direction within a step; mj_applyFT's keeps the one of the step's beginning.
   const distance = (a: State, b: State) =>
     Math.hypot(...numbers(a).map((x, i) => x - numbers(b)[i]!));
   const effect = distance(after(null), expected);
@@ -76,7 +76,7 @@ test.each([
   expect(distance(after(push), expected)).toBeLessThan(0.05 * effect);
 });
 
-test('a state that blows up is told, and the pendulum hangs again', () => {
+test('a state that blows up is reported, and the pendulum hangs again', () => {
   const simulator = new Mujoco(mujoco);
   simulator.state = { q1: 0, q2: 0, w1: 1e9, w2: -1e9 };
   let sound = true;

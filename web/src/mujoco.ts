@@ -13,7 +13,7 @@ export class Mujoco implements Simulator {
 
   constructor(mujoco: MainModule) {
     this.mujoco = mujoco;
-    // Compiled once: plants are written into the model.
+    // Compiled once; later plants are written into the model.
     this.model = mujoco.MjModel.from_xml_string(mjcf(NOMINAL))!;
     this.data = new mujoco.MjData(this.model);
     mujoco.mj_forward(this.model, this.data);
@@ -38,7 +38,7 @@ export class Mujoco implements Simulator {
     return this._plant;
   }
 
-  /// Changes the plant, as if the MJCF had been written with it.
+  /// Changes the plant, with the same result as a new MJCF.
   set plant(plant: Readonly<Plant>) {
     this._plant = { ...plant };
     const { model, mujoco } = this;
@@ -75,7 +75,7 @@ export class Mujoco implements Simulator {
     return false;
   }
 
-  /// MuJoCo takes forces at a link's centre: the push, and the torque about +y of moving it there.
+  /// MuJoCo applies forces at a link's centre, so a torque about +y moves the push there.
   private apply({ link, along, force }: Push): void {
     const centre = -this.model.body_ipos[3 * link + 2];
     const { q1, q2 } = this.state;

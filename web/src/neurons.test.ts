@@ -2,7 +2,7 @@ import { expect, test } from 'vitest';
 import { readPolicy } from '../tests/program';
 import { Neurons, tensorsOf } from './neurons';
 
-/// Q-values of the last hidden layer's output: u of the value, v of the advantages.
+/// Q-values of the last hidden layer's output: u for the value, v for the advantages.
 function qOf(tensors: Map<string, Float32Array>, x: Float32Array): number[] {
   const linear = (name: string, input: Float32Array) =>
     [...tensors.get(`${name}.bias`)!].map((bias, i) =>
@@ -37,6 +37,6 @@ test.each(['d3qn', 'fast', 'dqn'])(
   },
 );
 
-test('an actor has none to show', () => {
+test('an actor has no neurons to show', () => {
   expect(Neurons.of(readPolicy('sac'))).toBeNull();
 });

@@ -1,11 +1,11 @@
-/// The neurons of a Q-network while it decides, for display only: the core computes the decisions.
+/// The neurons of a Q-network, for display only: the core computes the decisions.
 
 const EPSILON = 1e-5; // of the layer normalisation
 
 interface Layer {
   weight: Float32Array; // (out × in)
   bias: Float32Array; // (out)
-  gain: Float32Array | null; // of the layer normalisation, (out); null: there is none
+  gain: Float32Array | null; // of the layer normalisation, (out); null: no normalisation
   shift: Float32Array | null;
 }
 
@@ -16,8 +16,8 @@ export class Neurons {
     this.layers = layers;
   }
 
-  /// Of a policy file that the core has checked (docs/reference/policy-format.md). Null if it is no Q-network
-  /// in 32-bit floats.
+  /// From a policy file that the core has checked (docs/reference/policy-format.md). Null if it is
+  /// not a Q-network in 32-bit floats.
   static of(file: ArrayBuffer): Neurons | null {
     const tensors = tensorsOf(file);
     const names = [...tensors.keys()]
@@ -35,7 +35,7 @@ export class Neurons {
     return whole && tensors.has('sample.q') ? new Neurons(layers as Layer[]) : null;
   }
 
-  /// What each hidden layer puts out for an observation.
+  /// The output of each hidden layer for an observation.
   active(observation: Float32Array): Float32Array[] {
     let x = observation;
     return this.layers.map((layer) => (x = activate(layer, x)));

@@ -4,7 +4,7 @@ import { DelayLine, DISTURBANCE_LIMITS } from './disturbance';
 import * as pendulum from './pendulum';
 import type { State } from './pendulum';
 
-/// What the page asks of the core: in the order in which the core answers, as the C++ program computes it.
+/// Formulas of the core, compared with the C++ program.
 
 const PLANT = { ...pendulum.NOMINAL, mass1: 1.2, length2: 0.4, gravity: 5, torque_limit: 3 };
 
@@ -20,7 +20,7 @@ function rows(): number[][] {
     .map((row) => row.split(',').map(Number));
 }
 
-/// Equal but for the rounding of sines and cosines.
+/// Equal within the rounding of sines and cosines.
 function expectClose(got: ArrayLike<number>, expected: number[], tolerance = 1e-9): void {
   expect(got.length).toBe(expected.length);
   expected.forEach((x, i) => {
@@ -51,7 +51,7 @@ test('energy, height, upright, reward, observation', () => {
   expect(seen.size).toBe(2);
 });
 
-test('what can be set is what the program takes', () => {
+test("parameters and their ranges equal the program's", () => {
   const { CONTROL_PERIOD: period, PLANT_LIMITS } = pendulum;
   const takes = (name: string, value: number) => {
     try {
@@ -80,7 +80,7 @@ test('the model has the numbers of the plant', () => {
   expect(pendulum.mjcf(PLANT)).toContain('gravity="0 0 -5"');
 });
 
-test('what an observation remembers', () => {
+test('memory of an observation', () => {
   const [first, second, third] = [0, 1, 2].map((k) => {
     const observation = new Float32Array(8 + 6); // of two control steps
     observation.set(pendulum.observe(PLANT, { q1: k, q2: 0, w1: 2 * k, w2: 5 * k * k }));
@@ -96,7 +96,7 @@ test('what an observation remembers', () => {
   expect(twice[10]! / once[10]!).toBeCloseTo(-1 / 3, 5);
 });
 
-test('a motor that is late', () => {
+test('a delayed motor', () => {
   const chosen = [1, -2, 3, 0, 5, 1, -1];
   for (const steps of [0, 1, 3]) {
     const motor = new DelayLine();

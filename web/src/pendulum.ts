@@ -10,8 +10,8 @@ export const CONTROL_PERIOD = 0.02; // s between two actions
 export const PHYSICS_STEPS = 4; // in a control period
 export const CAPSULE_RADIUS = 0.04; // of both links, m
 
-/// What can be set at run time. The capsules keep their radius; inertia and centre of mass follow
-/// mass and length.
+/// The plant's parameters. The capsules keep their radius; inertia and centre of mass follow mass
+/// and length.
 export interface Plant {
   mass1: number; // kg
   mass2: number;
@@ -79,19 +79,19 @@ export function capsuleInertia(m: number, r: number, l: number) {
   return { across: across!, along: along! };
 }
 
-/// All that the core says of a state under a torque, in its order (web/wasm/api.cc). It takes 3 µs, a tenth
-/// of a policy's decision: too little to ask for each number by itself.
+/// All the core's numbers about a state under a torque, in its order (web/wasm/api.cc). A call
+/// takes 3 µs, a tenth of a policy's decision, so one call for all is cheap enough.
 function at(plant: Plant, { q1, q2, w1, w2 }: State, torque = 0): Float64Array {
   const numbers = [...plantNumbers(plant), q1, q2, w1, w2, torque];
   return core().formula(numbers, core().exports.pendulum_at);
 }
 
-/// The plant in an object that may have other keys too.
+/// The plant's parameters of an object with more keys.
 export function plantIn(given: Plant): Plant {
   return Object.fromEntries(PARAMETERS.map((name) => [name, given[name]])) as unknown as Plant;
 }
 
-/// As the core takes them.
+/// In the core's order.
 export function plantNumbers(plant: Plant): number[] {
   return PARAMETERS.map((name) => plant[name]);
 }
@@ -116,7 +116,7 @@ export function tipHeight(plant: Plant, s: State): number {
   return at(plant, s)[11]!;
 }
 
-/// The same over l1 + l2, as in the observation: -1 hanging, 1 upright.
+/// tipHeight over l1 + l2, as in the observation: -1 hanging, 1 upright.
 export function relativeHeight(plant: Plant, s: State): number {
   return at(plant, s)[7]!;
 }
@@ -133,8 +133,8 @@ export function observe(plant: Plant, s: State): Float32Array {
   return Float32Array.from(at(plant, s).subarray(0, OBSERVATION_SIZE));
 }
 
-/// The observation with what it remembers of so many control steps, its last numbers: `before` is that of a
-/// step earlier, at which `torque` (N·m) was chosen.
+/// Writes the memory of `steps` control steps into the end of `observation`. `before` is the
+/// observation one step earlier, when `torque` (N·m) was chosen.
 export function remember(
   before: Float32Array,
   torque: number,
@@ -158,8 +158,8 @@ export function rewardTerms(plant: Plant, s: State, tau: number): number[] {
   return [...at(plant, s, tau).subarray(13, 18)];
 }
 
-/// The model as MJCF, with the plant's numbers to the last digit. Nothing touches and nothing is
-/// constrained: without these stages a step takes less time and the trajectory is the same.
+/// The model as MJCF, with all digits of the plant's numbers. Contacts and constraints are off: a
+/// step takes less time and the trajectory is the same.
 export function mjcf(plant: Plant): string {
   core().formula(plantNumbers(plant), core().exports.pendulum_mjcf);
   return core().text;

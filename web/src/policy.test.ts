@@ -6,7 +6,7 @@ import { NOMINAL } from './pendulum';
 import { Policy } from './policy';
 import { BadInput } from './bad_input';
 
-/// What comes from a stranger is refused with a reason, whatever it is.
+/// Files from strangers are refused with a reason.
 
 const DATA = new Uint8Array(new Float32Array([1, 2, 3, 4]).buffer);
 const tensor = (shape: unknown, offsets: unknown, dtype: unknown = 'F32') => ({
@@ -30,7 +30,7 @@ test.each<[string, Record<string, unknown> | string]>([
   ['three offsets', tensor([4], [0, 16, 16])],
   ['fewer bytes than the shape asks for', tensor([4], [0, 12])],
   ['a gap', tensor([2], [8, 16])],
-  ['bytes that nobody claims', tensor([2], [0, 8])],
+  ['bytes outside of all tensors', tensor([2], [0, 8])],
   [
     'tensors that share bytes',
     { ...tensor([4], [0, 16]), y: { dtype: 'F32', shape: [2], data_offsets: [8, 16] } },
@@ -41,7 +41,7 @@ test.each<[string, Record<string, unknown> | string]>([
   expect(read).toThrow('not a valid safetensors file');
 });
 
-test('refuses what is cut off, or says so', () => {
+test('refuses a file that is cut off', () => {
   expect(() => new Policy(new ArrayBuffer(0))).toThrow('expected at least 8 bytes, got 0');
   const long = fileOf({});
   new DataView(long).setBigUint64(0, 2n ** 63n, true);
@@ -100,7 +100,7 @@ describe('a policy', () => {
     const policy = new Policy(
       changed(({ header }) => {
         const about = header.__metadata__ as Record<string, string>;
-        about.plant = JSON.stringify({ ...plant, other: 7 }); // which is nobody's
+        about.plant = JSON.stringify({ ...plant, other: 7 }); // on no slider
         about.config =
           'randomize_mass1 = 1e300\nrandomize_gravity = 0.5\nrandomize_delay = 1e9\ndelay = -3\n';
       }),
@@ -111,7 +111,7 @@ describe('a policy', () => {
     expect(policy.trainedDisturbance('delay')).toEqual([0, 50]);
   });
 
-  test('is refused in one short line, whatever it says', () => {
+  test('is refused in one short line, whatever it contains', () => {
     const evil = `\u001b[31m\n${'x'.repeat(100_000)}`;
     for (const key of ['format', 'format_version', 'control_period']) {
       let line = '';
@@ -126,7 +126,7 @@ describe('a policy', () => {
     }
   });
 
-  test('is refused when one weight is another', () => {
+  test('is refused after one weight changed', () => {
     const file = changed(({ header, data }) => {
       const [begin] = header['feature.0.weight']!.data_offsets as [number];
       new DataView(data.buffer).setFloat32(begin, 50, true);

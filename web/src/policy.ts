@@ -14,18 +14,19 @@ const LONGEST_REASON = 200; // characters; a file's own text may be part of it
 export class Policy {
   readonly metadata: ReadonlyMap<string, string>;
   readonly controller: Controller;
-  /// How many past steps an observation remembers.
+  /// Number of past steps in an observation.
   readonly memory: number;
-  /// Whether an observation holds an estimate of the plant.
+  /// Whether an observation contains an estimate of the plant.
   readonly identifies: boolean;
-  /// The plant that it was trained on, or made for.
+  /// The training plant, or a controller's design plant.
   readonly plant: Plant;
-  /// Factor by which rewards, and so its values, were multiplied during training.
+  /// Factor of the rewards, and so of its values, during training.
   readonly rewardScale: number;
   private readonly file: ArrayBuffer | null; // null: a controller
-  private _neurons: Neurons | null | undefined; // undefined: not made yet
+  private _neurons: Neurons | null | undefined; // undefined: not read yet
 
-  /// Reads and checks the file, as the program does, or makes the controller of a name. Throws BadInput.
+  /// Reads and checks a file, as the program does, or designs the controller with this name. Throws
+  /// BadInput.
   constructor(from: ArrayBuffer | string) {
     this.file = typeof from === 'string' ? null : from;
     try {
@@ -36,14 +37,14 @@ export class Policy {
       this.metadata = new Map(Object.entries(controller.about.metadata));
     } catch (error) {
       if (!(error instanceof BadInput)) throw error;
-      // The core names its source, which the page names itself.
+      // The page names the source itself.
       throw new BadInput(printable(error.message.replace(/^the file: /, ''), LONGEST_REASON));
     }
     this.plant = plantIn(JSON.parse(this.about('plant')) as Plant);
     this.rewardScale = Number(this.metadata.get('reward_scale') ?? 1);
   }
 
-  /// Its neurons, for display; null where there are none to show.
+  /// Its neurons, for display; null if it has none to show.
   get neurons(): Neurons | null {
     if (this._neurons === undefined) this._neurons = this.file && Neurons.of(this.file);
     return this._neurons;
@@ -53,12 +54,12 @@ export class Policy {
     return this.controller.isLearned;
   }
 
-  /// Whether hundreds of decisions from new states can be had while one watches.
+  /// Whether it decides fast enough for a map of hundreds of states.
   get isQuick(): boolean {
     return this.metadata.get('agent') !== 'mpc';
   }
 
-  /// Whether it can do more than hold what is upright already.
+  /// Whether it can swing up, not only hold the pendulum upright.
   get swingsUp(): boolean {
     return this.isLearned || this.metadata.get('agent') !== 'lqr';
   }
@@ -69,7 +70,7 @@ export class Policy {
     return text;
   }
 
-  /// Without a memory as at the beginning of an episode.
+  /// Decides as at the beginning of an episode, without a memory.
   act(observation: Float32Array, memory: Memory | null = null): Decision {
     return this.controller.decide(observation, memory);
   }
@@ -81,7 +82,7 @@ export class Policy {
     return within(PLANT_LIMITS[name], nominal * (1 - share), nominal * (1 + share));
   }
 
-  /// The same for the errors of sensors and motor, in the units of Disturbance.
+  /// The range of an error of sensors or motor during training, in the units of Disturbance.
   trainedDisturbance(name: keyof Disturbance): Range {
     const unit = name === 'delay' ? CONTROL_PERIOD : 1;
     const least = this.setting(name) / unit;
@@ -89,7 +90,7 @@ export class Policy {
     return within(DISTURBANCE_LIMITS[name], least, most);
   }
 
-  /// A positive number from the training's configuration; 0 if there is none.
+  /// A positive number of the training's configuration; 0 if it is missing.
   private setting(name: string): number {
     const line = new RegExp(`^${name} = ([0-9.eE+-]+)$`, 'm');
     const value = Number(line.exec(this.metadata.get('config') ?? '')?.[1] ?? 0);
@@ -97,7 +98,7 @@ export class Policy {
   }
 }
 
-/// The part of a range that is within limits.
+/// Clips a range to limits.
 function within([least, most]: Range, low: number, high: number): Range {
   const clamp = (x: number) => Math.min(Math.max(x, least), most);
   return [clamp(low), clamp(high)];

@@ -2,11 +2,11 @@ import { core } from './core';
 import type { Disturbance } from './disturbance';
 import type { State } from './pendulum';
 
-/// What the sensors show at a control step.
+/// Output of the sensors at a control step.
 export interface Reading {
   state: State;
-  torque: number; // N·m, under which the velocities changed last
-  noise: number; // rad/s, that rounding adds to their change, standard deviation
+  torque: number; // N·m, during the last change of the velocities
+  noise: number; // rad/s, standard deviation of that change by rounding
 }
 
 const forgotten = new FinalizationRegistry<() => void>((close) => close());
@@ -22,12 +22,12 @@ export class Sensors {
     forgotten.register(this, () => exports.sensors_close(at));
   }
 
-  /// Before this state the joints moved at its velocities.
+  /// Begins in a state, as if the joints had moved with its velocities before.
   begin({ q1, q2, w1, w2 }: State): void {
     core().formula([q1, q2, w1, w2], () => core().exports.sensors_begin(this.at));
   }
 
-  /// At each control step, after a control period of this torque (N·m).
+  /// Call at each control step, after a control period under this torque (N·m).
   measure({ q1, q2, w1, w2 }: State, before: number, model: Readonly<Disturbance>): Reading {
     const { sensor_latency, encoder_counts, velocity_window, velocity_filter } = model;
     const input = [q1, q2, w1, w2, before];

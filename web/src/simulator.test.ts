@@ -19,13 +19,13 @@ test.each([
   ['without a push', null],
   ['under a push on link 1', { link: 1, along: 0.2, force: { x: 9, z: -5 } }],
   ['under a push on link 2', { link: 2, along: 0.6, force: { x: -7, z: 4 } }],
-] as const)('the closed form moves as MuJoCo does %s', (_, push: Push | null) => {
+] as const)('the closed form moves like MuJoCo %s', (_, push: Push | null) => {
   const [ours, theirs] = [new ClosedForm(), new Mujoco(mujoco)];
   for (const simulator of [ours, theirs]) {
     simulator.plant = OTHER;
     simulator.state = { q1: 0.4, q2: -0.3, w1: 1.2, w2: -2 };
   }
-  let largest = 0; // of one step
+  let largest = 0; // from one step
   for (let k = 0; k < 400; ++k) {
     const torque = 6 * Math.sin(k / 30); // beyond the limit of 4 too
     expect(ours.step(torque, push)).toBe(true);
@@ -33,19 +33,19 @@ test.each([
     largest = Math.max(largest, difference(ours.state, theirs.state));
     ours.state = theirs.state;
   }
-  // Rounding: both compute the same formulas in another order, at up to tens of rad/s.
+  // Rounding: both compute the same formulas in different orders, at up to tens of rad/s.
   expect(largest).toBeLessThan(1e-12);
   expect(difference(ours.state, { q1: 0.4, q2: -0.3, w1: 1.2, w2: -2 })).toBeGreaterThan(0.1);
 });
 
-test('a state that spins too fast is told, and the pendulum hangs again', () => {
+test('a state that spins too fast is reported, and the pendulum hangs again', () => {
   const simulator = new ClosedForm();
   simulator.state = { q1: 0, q2: 0, w1: 1e9, w2: -1e9 };
   expect(simulator.step(0, null)).toBe(false);
   expect(simulator.state).toEqual(HANGING);
 });
 
-test('a world goes on in MuJoCo where it was', () => {
+test('a world continues in MuJoCo from its state', () => {
   const world = new World(new ClosedForm());
   world.plant = { ...NOMINAL, mass2: 1.4, length1: 0.6 };
   world.reset({ q1: 2, q2: 0.5, w1: 0, w2: 1 });
@@ -58,6 +58,6 @@ test('a world goes on in MuJoCo where it was', () => {
   expect(difference(world.state, before)).toBe(0);
   for (let k = 0; k < 100; ++k) world.advance();
   for (let k = 0; k < 200; ++k) never.advance();
-  // The whole motion: differences of rounding grow, a jump or another plant would be seen.
+  // The whole motion. Rounding differences grow, but a jump or another plant would differ more.
   expect(difference(world.state, never.state)).toBeLessThan(1e-9);
 });

@@ -20,21 +20,21 @@ export interface Push {
 /// The double pendulum's physics.
 export interface Simulator {
   state: State;
-  /// A new plant leaves the state as it is.
+  /// Changes the plant and keeps the state.
   plant: Readonly<Plant>;
-  /// Another pendulum of the same engine.
+  /// A new pendulum in the same engine.
   another(): Simulator;
-  /// One physics step, 0.005 s, under a torque (N·m) and perhaps a push. False if the state has blown
-  /// up, or spins so fast that steps of this size do not follow it: then it hangs again.
+  /// One physics step, 0.005 s, under a torque (N·m) and an optional push. Returns false and hangs
+  /// the pendulum again if the state blew up or spins too fast for this step size.
   step(torque: number, push: Push | null): boolean;
 }
 
-/// Whether steps of this size follow the state.
+/// Whether this step size is small enough for the state's velocities.
 export function isSound({ q1, q2, w1, w2 }: State): boolean {
   return Number.isFinite(q1 + q2) && Math.abs(w1) < FASTEST && Math.abs(w2) < FASTEST;
 }
 
-/// The pendulum's equations of motion in our own core (web/wasm/step.h), which is here long before MuJoCo.
+/// The equations of motion in our own core (web/wasm/step.h), which loads long before MuJoCo.
 export class ClosedForm implements Simulator {
   state: State = { ...HANGING };
   plant: Readonly<Plant> = { ...NOMINAL };

@@ -31,7 +31,7 @@ function run(seconds: number): Moment[] {
   return moments;
 }
 
-/// State by state and torque by torque what the C++ program computes with its own MuJoCo.
+/// Compares states and torques with the C++ program and its own MuJoCo.
 function expectTrajectory(
   moments: Moment[],
   rows: number[][],
@@ -58,7 +58,7 @@ test.each(['d3qn', 'd3qn-adaptive', 'd3qn-randomized'])(
   },
 );
 
-// Their torques are any number, computed with other roundings.
+// Their torques are continuous, and rounding differs.
 test.each([
   ['lqr', 3.13],
   ['energy', 0],
@@ -82,7 +82,7 @@ test.each([
   expect(world.uprightFor).toBeGreaterThan(20);
 });
 
-test('a controller that looks, or is asked of other states, keeps its plan', () => {
+test("looking, or asking about other states, keeps a controller's plan", () => {
   world.policy = tvlqr;
   world.agentOn = true;
   const torques = (disturb: () => void) => {
@@ -107,7 +107,7 @@ test('another plant, too', () => {
   expectTrajectory(run(5), simulate(policyPath('d3qn'), '--seconds', '5', ...other), 1e-6);
 });
 
-test('an agent identifies a plant of which it is not told, with a motor that is late', () => {
+test('an agent identifies an unknown plant with a delayed motor', () => {
   agentOn('d3qn-adaptive');
   world.plant = { ...NOMINAL, mass2: 0.75, torque_limit: 4 };
   world.disturbance.delay = 2;
@@ -134,7 +134,7 @@ test.each([
   expectTrajectory(run(seconds), rows, 1e-6);
 });
 
-test('a decision that is looked at changes nothing of what the sensors show', () => {
+test('looking at a decision does not change the sensors', () => {
   agentOn('d3qn');
   Object.assign(world.disturbance, { encoder_counts: 1000, velocity_window: 0.03 });
   const torques = (look: () => void) => {
@@ -146,7 +146,7 @@ test('a decision that is looked at changes nothing of what the sensors show', ()
   expect(torques(() => world.look())).toEqual(torques(() => {}));
 });
 
-test('what is remembered is what was chosen, also where the motor cannot give it', () => {
+test("the memory holds the chosen torque, even beyond the motor's limit", () => {
   agentOn('d3qn-randomized');
   world.plant = { ...NOMINAL, torque_limit: 4 };
   const rows = simulate(policyPath('d3qn-randomized'), '--seconds', '5', '--set', 'torque_limit=4');
@@ -173,7 +173,7 @@ test('a pull throws the balanced pendulum down, and the agent brings it back', (
   expect(world.uprightFor).not.toBeNull();
 });
 
-test('a hand pulls no harder than it may, and its damper calms', () => {
+test("a hand's pull is limited, and its damper calms the motion", () => {
   world.drag = { link: 2, along: 0.5, target: { x: 5, z: 5 } };
   world.advance();
   const { force } = world.push!;
@@ -186,7 +186,7 @@ test('a hand pulls no harder than it may, and its damper calms', () => {
   expect(Math.hypot(velocity.x, velocity.z)).toBeLessThan(0.01);
 });
 
-test('a motor that is late holds what was chosen before', () => {
+test('a delayed motor holds the torque chosen before', () => {
   agentOn('d3qn');
   const start = { ...HANGING, q1: 0.5 };
   world.reset(start);
@@ -210,7 +210,7 @@ test('the sensors blur angles and velocities by as much as they should', () => {
   const act = policy.act.bind(policy);
   const seen: number[][] = [];
   policy.act = (observation) => {
-    const [, sin1, w1, , sin2, w2] = observation; // hanging at rest: all 0 but for noise
+    const [, sin1, w1, , sin2, w2] = observation; // hanging at rest: all 0 except for noise
     seen.push([Math.asin(sin1!), w1! * 10, Math.asin(sin2!), w2! * 20]);
     return act(observation);
   };

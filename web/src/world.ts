@@ -32,7 +32,7 @@ const SHOVE_STEPS = 20; // 0.1 s
 export interface Moment {
   t: number; // s
   state: State;
-  torque: number; // N·m, that the motor holds from then on
+  torque: number; // N·m, held by the motor from then on
   energy: number; // 0 hanging, 1 upright
   height: number; // of the tip over l1 + l2
 }
@@ -42,36 +42,36 @@ export class World {
   simulator: Simulator;
   readonly disturbance: Disturbance = { ...PERFECT };
   agentOn = false;
-  /// N·m, that a visitor asks of the motor while the agent is off.
+  /// The visitor's torque (N·m), applied while the agent is off.
   byHand = 0;
-  /// Where on the pendulum a hand holds it, and where the hand is.
+  /// The hand's grip on the pendulum, and the hand's place.
   drag: { link: 1 | 2; along: number; target: Vec } | null = null;
   onMoment: (moment: Moment) => void = () => {};
-  /// Hears when state, plant, policy or decision may be others.
+  /// Called when state, plant, policy or decision may have changed.
   onChange: () => void = () => {};
-  /// Another pendulum, to which happens what happens to this one: start, plant, hand, shoves, errors of
-  /// sensors and motor. Its policy is its own.
+  /// A second pendulum with its own policy. Start, plant, hand, shoves and errors of sensors and
+  /// motor are the same for both.
   twin: World | null = null;
 
-  torque = 0; // N·m, that the motor holds now
-  push: Push | null = null; // that acts now
-  /// The last shove, and when it ended (s).
+  torque = 0; // N·m, held by the motor now
+  push: Push | null = null; // force that acts now
+  /// The last shove, and the time of its end (s).
   shoved: { push: Push; at: number } | null = null;
-  /// The agent's decision at the last control step, whether it is on or not; see also look().
+  /// The agent's decision at the last control step, even while it is off; see also look().
   decision: Decision | null = null;
 
   private _plant: Plant = { ...NOMINAL };
   private _policy: Policy | null = null;
-  private observation: Float32Array | null = null; // of the last control step; null at a start
-  private chosen = 0; // N·m, at that step
-  private memory: Memory | null = null; // of the policy, since the start
-  /// What the policy knows of the plant, if it identifies it, and whether it has begun to.
+  private observation: Float32Array | null = null; // at the last control step; null at the start
+  private chosen = 0; // N·m, chosen at that step
+  private memory: Memory | null = null; // the policy's, since the start
+  /// Estimate of the plant, if the policy identifies it, and whether it has begun.
   private identifier: Identifier | null = null;
   private identifies = false;
   private readonly motor = new DelayLine();
   private readonly sensors = new Sensors();
-  private reading: Reading | null = null; // at the last control step; null at a start
-  private steps = 0; // of physics, in all
+  private reading: Reading | null = null; // at the last control step; null at the start
+  private steps = 0; // physics steps since the page was opened
   private uprightSince: number | null = null; // physics step; null if the links are not upright
   private untilControl = 0; // steps until the agent chooses again
   private shove = { force: 0, steps: 0 };
@@ -104,7 +104,7 @@ export class World {
     this.look();
   }
 
-  /// The policy starts again, without memory.
+  /// Restarts the policy without memory.
   private forget(): void {
     this.memory?.close();
     this.memory = this._policy?.controller.begin() ?? null;
@@ -126,8 +126,8 @@ export class World {
     return this.steps / STEPS_PER_SECOND;
   }
 
-  /// How long (s) both links have been upright without a break; null if they are not. A count of
-  /// steps, so that 1 s is 1 s whenever it began.
+  /// How long (s) both links have been upright without a break; null if they are not. Counted in
+  /// steps, so that 1 s is exact.
   get uprightFor(): number | null {
     return this.uprightSince === null ? null : (this.steps - this.uprightSince) / STEPS_PER_SECOND;
   }
@@ -159,8 +159,8 @@ export class World {
     this.twin?.shoveTo(direction);
   }
 
-  /// One physics step. The agent chooses a torque before each fourth. False if the state blew up and
-  /// the pendulum hangs again.
+  /// One physics step; every fourth begins with a decision of the agent. Returns false if the state
+  /// blew up and the pendulum hangs again.
   advance(): boolean {
     if (this.untilControl === 0) {
       this.control();
@@ -185,7 +185,7 @@ export class World {
     twin.advance();
   }
 
-  /// To the next moment at which the agent chooses.
+  /// Steps to the agent's next decision.
   advanceToControl(): boolean {
     let valid = this.advance();
     while (valid && this.untilControl > 0) valid = this.advance();
@@ -198,12 +198,12 @@ export class World {
     this.onChange();
   }
 
-  /// The observation that the last decision is about.
+  /// The observation behind the last decision.
   get seen(): Float32Array {
     return this.observation ?? this.observe();
   }
 
-  /// What the agent would decide in another state, with the memory that it has now.
+  /// The agent's decision in another state, with its present memory.
   decisionAt(state: State): Decision | null {
     const { policy } = this;
     if (!policy) return null;
@@ -213,15 +213,15 @@ export class World {
     return policy.act(observation);
   }
 
-  /// The observation of a measured state without memory. A policy that identifies the plant is not
-  /// told of it.
+  /// The observation of a measured state without memory. A policy that identifies the plant gets
+  /// its estimate instead of the true plant.
   private present(measured: State): Float32Array {
     const { plant, policy, identifier } = this;
     if (!policy || !identifier) return observe(plant, measured);
     return Float32Array.of(...observe(policy.plant, measured), ...identifier.observe(measured));
   }
 
-  /// The observation at this moment; encoders show what they showed at the last control step.
+  /// The present observation. Encoders show their values of the last control step.
   private observe(measured = this.measured()): Float32Array {
     const { policy, observation: before, chosen } = this;
     const now = this.present(measured);
@@ -238,7 +238,7 @@ export class World {
     return blurred(shown?.state ?? this.state, this.disturbance.sensor_noise);
   }
 
-  /// Learns of the plant from the last control period.
+  /// Updates the estimate of the plant with the last control period.
   private identify(measured: State, { torque, noise }: Reading): void {
     if (this.identifies) this.identifier?.update(measured, torque, noise);
     else this.identifier?.begin(measured);
@@ -268,11 +268,11 @@ export class World {
     });
   }
 
-  /// The force of a spring and a damper between the hand and what it holds.
+  /// The force of a spring and a damper between the hand and its grip.
   private hand(): Push | null {
     if (!this.drag) return null;
     const { link, target } = this.drag;
-    // The link may have become shorter since it was taken.
+    // The link may have become shorter since the hand took it.
     const along = Math.min(this.drag.along, link === 1 ? this.plant.length1 : this.plant.length2);
     const { position, velocity } = pointOn(this.plant, this.state, link, along);
     const x = SPRING * (target.x - position.x) - DAMPER * velocity.x;
@@ -290,7 +290,7 @@ export class World {
   }
 }
 
-/// Position (m) and velocity (m/s) of the point of a link at `along` m from its hinge.
+/// Position (m) and velocity (m/s) of the point `along` m from a link's hinge.
 export function pointOn(plant: Plant, s: State, link: 1 | 2, along: number) {
   const swing = (angle: number, rate: number, length: number) => ({
     position: { x: -length * Math.sin(angle), z: -length * Math.cos(angle) },

@@ -5,11 +5,11 @@ import { readFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { open, test } from './page';
 
-/// The rules of WCAG 2.2 AA and good practice that axe-core can check, in each theme and view.
+/// Checks axe-core's rules of WCAG 2.2 AA and good practice in each theme and view.
 
 const axe = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
 
-/// What axe finds in a part of the page by its rules, or by those of colour alone.
+/// The problems that axe finds in a part of the page, by all its rules or only those of colour.
 async function violations(page: Page, rules: 'all' | 'colours', part: string): Promise<string[]> {
   return page.evaluate(
     async ({ rules, part }) => {
@@ -28,7 +28,7 @@ async function violations(page: Page, rules: 'all' | 'colours', part: string): P
   );
 }
 
-// A theme changes nothing but colours.
+// A theme changes only colours.
 const THEMES = [
   ['light', { colorScheme: 'light', forcedColors: 'none' }, 'all'],
   ['dark', { colorScheme: 'dark', forcedColors: 'none' }, 'colours'],
@@ -42,7 +42,7 @@ async function expectNone(page: Page, what: string, part = 'html'): Promise<void
   }
 }
 
-test('axe finds nothing in any step of the tour, nor in everything, in any theme', async ({
+test('axe finds no problem in any step of the tour or in everything, in any theme', async ({
   page,
 }) => {
   await open(page, '#tour');
@@ -50,7 +50,7 @@ test('axe finds nothing in any step of the tour, nor in everything, in any theme
   const steps = await page.locator('.step').count();
   for (let step = 1; step <= steps; ++step) {
     if (step > 1) await page.locator('#tour-next').click();
-    // What else is there stays.
+    // The remaining parts.
     await expectNone(page, `step ${step}`, step === 1 ? 'html' : '.step:not([inert])');
   }
   await open(page, '#learn');
@@ -62,16 +62,16 @@ test('axe finds nothing in any step of the tour, nor in everything, in any theme
   await page.getByRole('link', { name: 'Everything', exact: true }).click();
   await page.evaluate(async () => {
     for (const details of document.querySelectorAll('details')) details.open = true;
-    // Formulas that are too wide can then be focused, a frame later.
+    // A frame later, formulas that are too wide can be focused.
     for (let k = 0; k < 3; ++k) await new Promise(requestAnimationFrame);
   });
   await expectNone(page, 'everything');
   await page.setViewportSize({ width: 320, height: 256 }); // 1280 × 1024 at 400%
-  await page.locator('#pause').click(); // with the sliders of a paused pendulum
+  await page.locator('#pause').click(); // shows the sliders of a paused pendulum
   await expectNone(page, 'paused, at 400%');
 });
 
-test('at 400% the tour goes down, not sideways, and all of it can be reached', async ({
+test('at 400% the tour scrolls down, not sideways, and all of it can be reached', async ({
   stage: page,
 }) => {
   await page.setViewportSize({ width: 320, height: 256 });
@@ -88,7 +88,7 @@ test('at 400% the tour goes down, not sideways, and all of it can be reached', a
       await page.evaluate(() => document.documentElement.scrollWidth),
       `step ${step}`,
     ).toBeLessThanOrEqual(320);
-    // A finger meets every number of a step.
+    // Every number of a step is large enough for a finger.
     for (const dot of await page.locator('#dots button').all()) {
       const { width, height } = (await dot.boundingBox())!;
       expect(Math.min(width, height)).toBeGreaterThanOrEqual(24);

@@ -4,8 +4,8 @@ import type { Page } from '@playwright/test';
 import { open, run, startFrom, test } from './page';
 import { actorFiles, simulate } from './program';
 
-/// Actor policies, brought by a visitor: a Gaussian with a critic that takes its action, one without
-/// a critic, a clipped one, a categorical one.
+/// Actor policies as a visitor's files: a Gaussian with a critic of its actions, one without a
+/// critic, a clipped one, a categorical one.
 
 const bring = (page: Page, file: ArrayBuffer) =>
   page
@@ -19,7 +19,7 @@ const CHARTS = [
   /^likeliest \d+%, V −?\d+\.\d$/,
 ];
 
-test('the chart is that of the policy, and Q-values come back with a Q-network', async ({
+test('an actor has its own chart, and Q-values return with a Q-network', async ({
   stage: page,
 }) => {
   await open(page);
@@ -38,19 +38,19 @@ test('the chart is that of the policy, and Q-values come back with a Q-network',
   }
 });
 
-test('the curve is in the middle of its mean, and moves with what is seen', async ({
+test('the curve is centred on its mean, and moves with the observation', async ({
   stage: page,
 }) => {
   await open(page);
   await page.locator('#pause').click();
-  /// Where the line at the mean is (0 left, 1 right), and the share of the chart that is painted.
+  /// Place of the mean's line (0 left, 1 right), and the painted share of the chart.
   const chart = () =>
     page.evaluate(async () => {
       for (let k = 0; k < 4; ++k) await new Promise(requestAnimationFrame);
       const canvas = document.getElementById('q') as HTMLCanvasElement;
       const { width, height } = canvas;
       const { data } = canvas.getContext('2d')!.getImageData(0, 0, width, height);
-      // In its top rows nothing else stands but the curve's own peak.
+      // The top rows contain only the curve's own peak.
       const alpha = (x: number, y: number) => data[4 * (y * width + x) + 3]!;
       let painted = 0;
       for (let at = 3; at < data.length; at += 4) painted += data[at]! > 0 ? 1 : 0;
@@ -80,7 +80,7 @@ test('the curve is in the middle of its mean, and moves with what is seen', asyn
   expect(means.size).toBeGreaterThan(6);
 });
 
-test('its torque is that of `upswing simulate`', async ({ stage: page }, info) => {
+test('its torque equals that of `upswing simulate`', async ({ stage: page }, info) => {
   await open(page);
   for (const [i, file] of actorFiles().entries()) {
     const path = info.outputPath(`actor${i}.safetensors`);
@@ -98,7 +98,7 @@ test('its torque is that of `upswing simulate`', async ({ stage: page }, info) =
       }
     });
     expect(new Set(rows.map((row) => row[5])).size).toBeGreaterThan(i === 3 ? 1 : 40);
-    // So that the next one's arrival can be seen.
+    // So that the arrival of the next one is visible.
     await page.locator('#agent').selectOption('d3qn');
     await expect(page.locator('#agent')).toHaveValue('d3qn');
   }
@@ -113,7 +113,7 @@ const SIZES = [
   [1440, 900],
 ] as const;
 
-test('at any size the chart is seen with the pendulum, and its numbers in full', async ({
+test('at any size the chart with its numbers and the pendulum are visible together', async ({
   stage: page,
 }) => {
   await open(page);
@@ -124,7 +124,7 @@ test('at any size the chart is seen with the pendulum, and its numbers in full',
       await page.setViewportSize({ width, height });
       const seen = await page.evaluate(async () => {
         await document.fonts.ready;
-        // What follows the size is drawn again a frame later.
+        // Drawings adapt to the size a frame later.
         for (let k = 0; k < 3; ++k) await new Promise(requestAnimationFrame);
         document.getElementById('stage')!.scrollIntoView({ behavior: 'instant' });
         const caption = document.querySelector('#q-figure figcaption')!;
@@ -149,7 +149,7 @@ test('at any size the chart is seen with the pendulum, and its numbers in full',
   }
 });
 
-test('further down it is explained, and the chart goes on', async ({ stage: page }) => {
+test('the explanation is below, and the chart keeps moving', async ({ stage: page }) => {
   await page.setViewportSize({ width: 390, height: 844 });
   await open(page);
   await bring(page, actorFiles()[0]!);

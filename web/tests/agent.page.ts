@@ -3,7 +3,7 @@ import type { QDecision } from '../src/decision';
 import { advance, balanced, largestDifference, open, run, startFrom, test } from './page';
 import { policyPath, simulate } from './program';
 
-test('the agent, when it may act, swings up and balances', async ({ stage: page }) => {
+test('the agent swings up and balances when it is switched on', async ({ stage: page }) => {
   await open(page);
   await expect(page.locator('#badge')).toHaveText('hanging');
   await page.getByRole('button', { name: 'Run the agent' }).click();
@@ -14,9 +14,7 @@ test('the agent, when it may act, swings up and balances', async ({ stage: page 
   await expect(page.locator('#badge')).toHaveText('swinging freely');
 });
 
-test('the first 5 s are those of `upswing simulate`: states and torques', async ({
-  stage: page,
-}) => {
+test('states and torques of the first 5 s equal `upswing simulate`', async ({ stage: page }) => {
   await open(page, '#agent=d3qn&on=1');
   await startFrom(page, 0);
   const rows = await run(page, 5);
@@ -26,9 +24,7 @@ test('the first 5 s are those of `upswing simulate`: states and torques', async 
   expect(rows.map((row) => row[5])).toEqual(expected.slice(0, 250).map((row) => row[5]));
 });
 
-test('another agent can be chosen, and has its own text, curve and mark', async ({
-  stage: page,
-}) => {
+test('choosing another agent shows its text, curve and mark', async ({ stage: page }) => {
   await open(page);
   await expect(page.locator('#agent-what')).toContainText('the pendulum that it learned with');
   await page.locator('#agent').selectOption('d3qn-adaptive');
@@ -44,7 +40,7 @@ test('another agent can be chosen, and has its own text, curve and mark', async 
   await expect.poll(width).toBeLessThan(wide / 2);
 });
 
-// That each is up within 10 s and holds is in src/agents.test.ts and src/world.test.ts.
+// src/agents.test.ts and src/world.test.ts check that each is up within 10 s and holds.
 test('every agent can be chosen', async ({ stage: page }) => {
   await open(page);
   const ids = await page.evaluate(() => upswing.agents.list.map(({ id }) => id));
@@ -58,7 +54,7 @@ test('every agent can be chosen', async ({ stage: page }) => {
 test('a link brings controllers that were not learned', async ({ stage: page }) => {
   await open(page, '#agent=lqr&twin=mpc&on=1');
   await expect(page.locator('#agent-what')).toContainText('cannot swing them up');
-  await expect(page.locator('#trained-on')).toHaveText('what the agent was made for');
+  await expect(page.locator('#trained-on')).toHaveText('design plant');
   await expect(page.locator('#agent-command')).toHaveText('./upswing simulate lqr');
   await expect(page.locator('#twin-name')).toHaveText('MPC: always plans');
   await expect(page.locator('#q-name')).toHaveText('Decision');
@@ -76,7 +72,7 @@ test('a link brings controllers that were not learned', async ({ stage: page }) 
   await expect(page).toHaveURL(/agent=mpc&twin=mpc/);
 });
 
-test('of two agents that are asked for, the last one counts', async ({ page }) => {
+test('the last of two requested agents counts', async ({ page }) => {
   await open(page);
   await page.route(/dueling-dqn\.safetensors$/, async (route) => {
     await new Promise((resolve) => setTimeout(resolve, 500));
@@ -91,7 +87,7 @@ test('of two agents that are asked for, the last one counts', async ({ page }) =
   expect(await page.evaluate(() => upswing.world.policy!.controller.text)).toContain('8-48-32');
 });
 
-test('a pendulum that is posed is judged at once', async ({ stage: page }) => {
+test('a posed pendulum is judged at once', async ({ stage: page }) => {
   await open(page, '#agent=d3qn');
   await startFrom(page, 0);
   const best = () => page.evaluate(() => Math.max(...(upswing.world.decision as QDecision).q));
@@ -104,14 +100,14 @@ test('a pendulum that is posed is judged at once', async ({ stage: page }) => {
   await expect(page.locator('#badge')).toHaveText('paused, upright');
 });
 
-/// What a preset says of the default agent and the adaptive one, as they balance or do not.
+/// The text of a preset for the default and the adaptive agent, depending on whether they balance.
 const CLAIMS: Readonly<Record<string, string>> = {
   'no, no': 'neither balances',
   'no, yes': 'only the adaptive one balances',
   'yes, yes': 'both balance',
 };
 
-test('what the laboratory promises is so, of each agent', async ({ stage: page }) => {
+test('each agent does what the laboratory promises', async ({ stage: page }) => {
   await open(page);
   await expect(page.locator('#presets a').first()).toBeInViewport({ ratio: 1 });
   await expect(page.locator('#presets a')).toHaveCount(6);

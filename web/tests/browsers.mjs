@@ -14,7 +14,7 @@ const SEED = 42;
 const SETTINGS = { balance_weight: 0 };
 const recipe = new URLSearchParams({ learn: AGENT, seed: SEED, ...SETTINGS });
 
-/// In the page: the steps of its training and the SHA-256 of its policy, when it has ended.
+/// Runs in the page: the steps of its training and the SHA-256 of its policy at the end.
 async function hashInPage() {
   const wait = () => new Promise((resolve) => setTimeout(resolve, 200));
   while (!globalThis.upswing?.learn.sessions[0]?.last?.finished) await wait();
@@ -30,7 +30,7 @@ async function inChromium(address) {
   });
 }
 
-/// Firefox answers commands on a socket, whose address it prints.
+/// Firefox accepts commands on a socket and prints its address.
 async function inFirefox(address) {
   const profile = mkdtempSync(join(tmpdir(), 'upswing-firefox-'));
   const program = process.env.UPSWING_FIREFOX ?? 'firefox-esr';

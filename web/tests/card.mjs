@@ -1,5 +1,5 @@
-// npm run card: public/card.png, which others show for a link to the page (Open Graph). It is the stage of
-// the page itself, in the middle of a swing-up, with name and sentence over it.
+// npm run card: makes public/card.png, which other sites show for a link to the page (Open Graph).
+// It is the page's stage in the middle of a swing-up, with a name and a sentence over it.
 import { fileURLToPath } from 'node:url';
 import { ready, serve, visit } from './visit.mjs';
 
@@ -26,7 +26,7 @@ const path = fileURLToPath(new URL('../public/card.png', import.meta.url));
 const options = {
   viewport: { width: 1200, height: 630 },
   colorScheme: 'dark',
-  bypassCSP: true, // for the style alone
+  bypassCSP: true, // only for the style
 };
 await visit(options, async (page) => {
   await page.goto(`${server.address}#agent=d3qn&speed=0.1`);

@@ -2,14 +2,14 @@ import { existsSync } from 'node:fs';
 
 const debians = ['/usr/bin/chromium-headless-shell', '/usr/bin/chromium'].find(existsSync);
 
-/// How tests, figures and pictures start their browser: the one that UPSWING_CHROMIUM names, Debian's,
-/// or else Playwright's own.
+/// The browser of tests, figures and pictures: UPSWING_CHROMIUM, Debian's Chromium, or else
+/// Playwright's own.
 export const launchOptions = {
   executablePath: process.env.UPSWING_CHROMIUM ?? debians,
   args: [
-    '--no-sandbox', // there is none for root, nor in most containers
+    '--no-sandbox', // root and most containers have none
     '--disable-gpu',
-    // No requests to other hosts.
+    // Forbids requests to other hosts.
     '--disable-quic',
     '--no-first-run',
     '--disable-background-networking',

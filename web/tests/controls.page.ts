@@ -20,9 +20,7 @@ test('pause stands still, step goes on by 0.02 s, reset hangs', async ({ stage: 
   await expect.poll(() => page.evaluate(time)).toBeGreaterThan(stopped + 0.1);
 });
 
-test('a link whose agent arrives late does not disturb the one that was opened after it', async ({
-  page,
-}) => {
+test('a link with a slow agent does not disturb the link opened after it', async ({ page }) => {
   await open(page);
   let arrive = () => {};
   const late = new Promise<void>((resolve) => (arrive = resolve));
@@ -36,7 +34,7 @@ test('a link whose agent arrives late does not disturb the one that was opened a
   const answer = page.waitForResponse(/sac\.safetensors$/);
   arrive();
   await (await answer).finished();
-  await page.evaluate(() => upswing.choose('sac')); // loaded by then
+  await page.evaluate(() => upswing.choose('sac')); // it has loaded by now
   expect(await page.evaluate(() => upswing.world.state.q1)).toBe(1.5);
 });
 
@@ -52,23 +50,23 @@ test('speed', async ({ stage: page }) => {
   const slow = await rate();
   await slide(page, 'speed', 2);
   const fast = await rate();
-  // A busy machine may drop frames, and then the page does not jump.
+  // A busy machine may drop frames. Then the page does not jump.
   expect(slow).toBeLessThan(0.15);
   expect(fast).toBeGreaterThan(5 * slow);
   expect(fast).toBeLessThan(2.2);
 });
 
-test('by keyboard alone', async ({ page }) => {
+test('only by keyboard', async ({ page }) => {
   await open(page);
   await page.keyboard.press('g');
   await expect(page.locator('#agent-on')).toHaveAttribute('aria-pressed', 'true');
   await page.keyboard.press('Space');
   await expect(page.locator('#pause')).toHaveText('Resume');
-  await page.keyboard.press('.'); // to the next moment at which the agent chooses
+  await page.keyboard.press('.'); // to the agent's next decision
   const stopped = await page.evaluate(time);
   await page.keyboard.press('.');
   expect(await page.evaluate(time)).toBeCloseTo(stopped + 0.02, 9);
-  // Everything can be reached with the tabulator, and sliders take the arrows for themselves.
+  // The tab key reaches every control, and sliders keep the arrow keys.
   const reached = new Set<string>();
   for (let k = 0; k < 60; ++k) {
     await page.keyboard.press('Tab');
@@ -117,7 +115,7 @@ test('while paused, the keyboard sets the start', async ({ stage: page }) => {
   await page.keyboard.press('End');
   const state = () => page.evaluate(() => upswing.world.state);
   let posed = await state();
-  expect(posed).toEqual({ q1: Math.PI, q2: -1, w1: 2, w2: 1 }); // the others as they were
+  expect(posed).toEqual({ q1: Math.PI, q2: -1, w1: 2, w2: 1 }); // the other variables as before
   await page.keyboard.press('ArrowLeft');
   const lower = page.getByLabel('Angle of the lower link to it', { exact: true });
   await expect(lower).toHaveAttribute('aria-valuetext', '−57°');
@@ -132,12 +130,10 @@ test('while paused, the keyboard sets the start', async ({ stage: page }) => {
   await expect(page.locator('#pose')).toBeHidden();
 });
 
-test('the trail is that of the last 20 s, at any rate of frames and any speed', async ({
-  stage: page,
-}) => {
+test('the trail shows the last 20 s, at any frame rate and speed', async ({ stage: page }) => {
   await open(page);
   await startFrom(page, 0);
-  await page.locator('#reset').click(); // and what was before is forgotten
+  await page.locator('#reset').click(); // and clears the trail
   const ages = () =>
     page.evaluate(async () => {
       const { scene, world } = upswing;
@@ -152,7 +148,7 @@ test('the trail is that of the last 20 s, at any rate of frames and any speed', 
       scene.draw = draw;
       return result;
     });
-  await run(page, 0.5); // without a frame in between
+  await run(page, 0.5); // no frame in between
   expect((await ages()).length).toBe(25);
   await run(page, 25);
   const long = await ages();
@@ -160,7 +156,7 @@ test('the trail is that of the last 20 s, at any rate of frames and any speed', 
   expect(Math.max(...long)).toBeCloseTo(20, 9);
 });
 
-test("a policy of one's own", async ({ stage: page }) => {
+test("a visitor's own policy", async ({ stage: page }) => {
   await open(page);
   await page.locator('#file').setInputFiles(policyPath('fast'));
   await expect(page.locator('#agent')).toHaveValue('own');
@@ -168,7 +164,7 @@ test("a policy of one's own", async ({ stage: page }) => {
   await expect(page.locator('#message')).toBeHidden();
 });
 
-test('a policy that is dropped on the page', async ({ stage: page }) => {
+test('a policy dropped on the page', async ({ stage: page }) => {
   await open(page);
   const bytes = [...readFileSync(policyPath('fast'))];
   await page.evaluate((content) => {

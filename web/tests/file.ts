@@ -1,4 +1,4 @@
-/// Policy files taken apart and made anew, for tests.
+/// Takes policy files apart and builds changed ones, for tests.
 
 export type Header = Record<string, Record<string, unknown>>;
 
@@ -37,7 +37,7 @@ export function float32Of(file: ArrayBuffer, tensor: string): Float32Array {
   return new Float32Array(data.slice(begin, end).buffer);
 }
 
-/// The file as another program writes it, without a checksum, and with a change.
+/// A changed file as another program would write it, without a checksum.
 export function changed(file: ArrayBuffer, change: (parts: Parts) => void): ArrayBuffer {
   const parts = partsOf(file);
   delete parts.header.__metadata__!.upswing_version;
@@ -46,7 +46,7 @@ export function changed(file: ArrayBuffer, change: (parts: Parts) => void): Arra
   return fileOf(parts.header, parts.data);
 }
 
-/// The same with another text of a metadatum; undefined: without it.
+/// A file with another text of a metadatum; undefined: without the metadatum.
 export function withMetadata(file: ArrayBuffer, key: string, text: string | undefined) {
   return changed(file, ({ header }) => {
     if (text === undefined) delete header.__metadata__![key];
@@ -54,7 +54,7 @@ export function withMetadata(file: ArrayBuffer, key: string, text: string | unde
   });
 }
 
-/// The same with another first number of a tensor, of F32 or F64.
+/// A file with another first number of a tensor of F32 or F64.
 export function withNumber(file: ArrayBuffer, tensor: string, value: number, at = 0): ArrayBuffer {
   return changed(file, ({ header, data }) => {
     const { dtype, data_offsets } = header[tensor] as { dtype: string; data_offsets: number[] };

@@ -22,7 +22,7 @@ test('a drag pulls the balanced pendulum down, and the agent brings it back', as
   await expect(page.locator('#badge')).toHaveText(/balanced for [1-9]/);
 });
 
-test('a shove moves it, to the side of its arrow', async ({ stage: page }) => {
+test('a shove moves the pendulum to the side of its arrow', async ({ stage: page }) => {
   await open(page);
   for (const [name, key, side] of [
     ['Shove to the right', 'ArrowRight', -1],
@@ -32,12 +32,12 @@ test('a shove moves it, to the side of its arrow', async ({ stage: page }) => {
     await page.getByRole('button', { name }).click();
     await run(page, 0.3);
     const shoved = await page.evaluate(state);
-    // The arrow is still there when the shove is over.
+    // The arrow outlasts the shove.
     const [arrow, none] = await page.evaluate((side) => {
       const { scene, world } = upswing;
       const { context, element, width } = scene.canvas;
       const { q1, q2 } = world.state;
-      scene.draw(world, world.state, []); // at the size that the canvas has by now
+      scene.draw(world, world.state, []); // at the canvas's present size
       const [x, y] = scene.at({
         x: -(Math.sin(q1) + Math.sin(q1 + q2)) / 2,
         z: -(Math.cos(q1) + Math.cos(q1 + q2)) / 2,
@@ -61,9 +61,7 @@ test('a shove moves it, to the side of its arrow', async ({ stage: page }) => {
   }
 });
 
-test('the agent holds against one shove, not against ten, and gets up again', async ({
-  stage: page,
-}) => {
+test('the agent withstands one shove, not ten, and gets up again', async ({ stage: page }) => {
   await open(page, '#agent=d3qn&on=1');
   await startFrom(page, Math.PI);
   await run(page, 3);
@@ -141,7 +139,7 @@ test('while paused, dragging sets the start', async ({ stage: page }) => {
   expect([posed.w1, posed.w2]).toEqual([0, 0]);
 });
 
-test('a finger that takes hold of the pendulum does not scroll', async ({ browser }) => {
+test('a finger on the pendulum does not scroll', async ({ browser }) => {
   const context = await browser.newContext({
     hasTouch: true,
     viewport: { width: 390, height: 700 },
@@ -163,7 +161,7 @@ test('a finger that takes hold of the pendulum does not scroll', async ({ browse
         return !canvas.dispatchEvent(event);
       });
     });
-  // On a slow machine the canvas still changes its size after the page is ready.
+  // On a slow machine the canvas changes its size even after the page is ready.
   await expect.poll(prevented).toEqual([true, false]);
   await context.close();
 });

@@ -2,7 +2,7 @@ import { expect } from '@playwright/test';
 import type { Page } from '@playwright/test';
 import { open, test } from './page';
 
-/// Where things stand at many sizes of the window, and that nothing covers anything else.
+/// Layout at many sizes of the window: nothing covers anything else.
 
 const WIDTHS = [360, 700, 768, 1024, 1440, 1920];
 const HEIGHTS = [600, 850, 1100];
@@ -24,7 +24,7 @@ const openDetails = (page: Page) =>
     for (const details of document.querySelectorAll('details')) details.open = true;
   });
 
-/// Opens the page, at this size, with all explanations open.
+/// Opens the page at a size with all explanations open.
 async function openAt(page: Page, size: { width: number; height: number }): Promise<void> {
   await page.setViewportSize(size);
   await open(page);
@@ -58,7 +58,7 @@ test('at any size every link and control can be clicked, every text can be seen'
   }
 });
 
-test('while one scrolls, the pendulum covers nothing else', async ({ stage: page }) => {
+test('while the page scrolls, the pendulum covers nothing else', async ({ stage: page }) => {
   await openAt(page, SIZES[0]!);
   for (const size of [...SIZES, ...SMALL]) {
     await page.setViewportSize(size);
@@ -81,7 +81,7 @@ test('while one scrolls, the pendulum covers nothing else', async ({ stage: page
   }
 });
 
-test('the pendulum keeps its size, and the badge stays beside it', async ({ stage: page }) => {
+test('the pendulum keeps its size, and the badge stays next to it', async ({ stage: page }) => {
   await open(page);
   await page.locator('#pause').click(); // the longest badge
   for (const size of [...SMALL, ...SIZES]) {
@@ -92,7 +92,7 @@ test('the pendulum keeps its size, and the badge stays beside it', async ({ stag
     const what = JSON.stringify(size);
     expect(Math.min(scene!.width, scene!.height), what).toBeGreaterThanOrEqual(170);
     expect(badge!.y + badge!.height, what).toBeLessThanOrEqual(scene!.y);
-    // What the stage holds does not stick out of it.
+    // Nothing on the stage sticks out of it.
     expect(hint!.y + hint!.height, what).toBeLessThanOrEqual(stage!.y + stage!.height);
     const scrolls = await page.evaluate(() => document.documentElement.scrollWidth > innerWidth);
     expect(scrolls, what).toBe(false);
@@ -123,9 +123,7 @@ test('on phones and tablets pendulum and Q-values are on one screen', async ({ s
   }
 });
 
-test('an example leads back to the pendulum, also when it is chosen again', async ({
-  stage: page,
-}) => {
+test('an example leads back to the pendulum, even the second time', async ({ stage: page }) => {
   await page.setViewportSize({ width: 390, height: 700 });
   await page.emulateMedia({ reducedMotion: 'reduce' });
   await open(page);
@@ -135,18 +133,18 @@ test('an example leads back to the pendulum, also when it is chosen again', asyn
     await example.evaluate((link) => link.scrollIntoView({ behavior: 'instant' }));
     await expect(page.locator('#scene')).not.toBeInViewport();
     if (k === 1) {
-      // Whatever the address has become: the very same again.
+      // The same example again, whatever the address is now.
       await example.evaluate((link) => history.replaceState(null, '', link.getAttribute('href')));
     }
     await example.press('Enter');
     await expect(page.locator('#scene')).toBeInViewport({ ratio: 1 });
     await expect(page.locator('#stage')).toBeFocused();
     await expect(page.locator('#agent-on')).toHaveAttribute('aria-pressed', 'true');
-    await expect(page.locator('#badge')).toHaveText(/swinging up|balanced/); // it is paused no more
+    await expect(page.locator('#badge')).toHaveText(/swinging up|balanced/); // no longer paused
   }
 });
 
-test('a message is in sight wherever the page is scrolled to', async ({ stage: page }) => {
+test('a message stays in sight while the page scrolls', async ({ stage: page }) => {
   await page.setViewportSize({ width: 360, height: 640 });
   await open(page);
   await page.locator('#file').scrollIntoViewIfNeeded();
@@ -171,14 +169,14 @@ test('a formula that is too wide takes the focus and scrolls by keyboard', async
   await expect(reward).toBeFocused();
   await page.keyboard.press('ArrowRight');
   await expect.poll(() => reward.evaluate((math) => math.scrollLeft)).toBeGreaterThan(0);
-  expect(await page.evaluate(() => upswing.world.push)).toBeNull(); // and shoves nothing
+  expect(await page.evaluate(() => upswing.world.push)).toBeNull(); // does not shove
   await page.setViewportSize({ width: 740, height: 900 });
   await expect(reward).not.toHaveAttribute('tabindex');
 });
 
 test.describe('with forced colours', () => {
   for (const colorScheme of ['light', 'dark'] as const) {
-    test(`${colorScheme}: button and pendulum can be seen`, async ({ stage: page }) => {
+    test(`${colorScheme}: button and pendulum are visible`, async ({ stage: page }) => {
       await page.emulateMedia({ forcedColors: 'active', colorScheme });
       await open(page, '#on=1');
       await page.locator('#pause').click();
@@ -205,7 +203,7 @@ test.describe('with forced colours', () => {
         );
       expect(filled.length).toBeGreaterThan(2);
       expect(filled).not.toContain(false);
-      // What is drawn: the cone above hides neither links nor background.
+      // Opaque drawings: the light's cone hides neither links nor background.
       const drawn = await page.evaluate(() => {
         const { scene, world } = upswing;
         world.reset({ q1: Math.PI, q2: 0, w1: 0, w2: 0 });

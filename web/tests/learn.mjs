@@ -1,6 +1,6 @@
-// npm run measure:learn: how long an agent takes to learn in the built page, seed by seed, how smoothly
-// the page runs meanwhile, and whether trainings one after another leave anything behind. Measurements of
-// this machine for docs/howto/page.md, not a test. UPSWING names the program, whose time stands beside.
+// npm run measure:learn: learning time of an agent in the built page for several seeds, the page's
+// frame rate meanwhile, and memory left behind by trainings. Measurements for docs/howto/page.md,
+// not a test. UPSWING: program to compare with.
 import { execFileSync } from 'node:child_process';
 import { mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
@@ -11,7 +11,7 @@ const SEEDS = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10];
 const PATIENCE = 300_000; // ms
 const median = (values) => values.toSorted((a, b) => a - b)[Math.floor(values.length / 2)];
 
-/// The program with one thread, as the page learns: steps, and seconds of all of it.
+/// A training by the program with one thread, like the page's: steps, and its seconds.
 function program(seed) {
   const folder = mkdtempSync(join(tmpdir(), 'upswing-'));
   const began = performance.now();
@@ -30,7 +30,7 @@ function program(seed) {
   return { seconds, text };
 }
 
-/// Learns with a seed in the page: steps and seconds from the click to the end, frames a second.
+/// A training in the page: steps, seconds from the click to the end, and frames per second.
 async function learn(page, seed) {
   await page.fill('#learn-seed', String(seed));
   return page.evaluate(
@@ -63,7 +63,7 @@ await visit({ viewport: { width: 1300, height: 860 } }, async (page) => {
   await ready(page);
   const devtools = await page.context().newCDPSession(page);
   await devtools.send('Performance.enable');
-  /// What the page holds, once what nobody holds is gone.
+  /// The page's memory after garbage collection.
   const held = async () => {
     await devtools.send('HeapProfiler.collectGarbage');
     const { metrics } = await devtools.send('Performance.getMetrics');
@@ -85,7 +85,7 @@ await visit({ viewport: { width: 1300, height: 860 } }, async (page) => {
     const here = await learn(page, seed);
     const there = program(seed);
     rows.push({ here, there });
-    before ??= await held(); // after the first, which brings what is kept
+    before ??= await held(); // after the first training, which fills caches
     console.log(
       [
         String(seed).padStart(4),

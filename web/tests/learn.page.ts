@@ -11,13 +11,13 @@ import { coreModule } from './core';
 import { advance, balanced, open, test } from './page';
 import { policyPath, runProgram } from './program';
 
-/// Seed 9 needs among the fewest steps of seeds 1 to 20.
+/// Among seeds 1 to 20, seed 9 needs nearly the fewest steps.
 const SEED = 9;
 
 const status = (page: Page) => page.locator('#learn-status');
 const hash = (file: Uint8Array) => createHash('sha256').update(file).digest('hex');
 
-/// Opens the view in which agents learn, as it is at first.
+/// Opens the view of learning in its initial state.
 async function openLearn(page: Page): Promise<void> {
   await open(page, '#learn');
   await page.evaluate(() => {
@@ -32,7 +32,7 @@ async function openLearn(page: Page): Promise<void> {
   await expect(page.locator('#learn-start')).toHaveText('Learn');
 }
 
-/// What is saved by a click.
+/// The file saved by a click.
 async function saved(page: Page): Promise<Uint8Array> {
   const download = page.waitForEvent('download');
   await page.getByRole('button', { name: 'Save policy.safetensors' }).click();
@@ -45,13 +45,13 @@ function stopTime(page: Page): Promise<void> {
   return page.evaluate(() => void (upswing.clock.advance = () => true));
 }
 
-/// What a film of the stage says below its picture.
+/// The title below the picture of a film.
 function filmTitle(page: Page): Promise<string[]> {
   return page.evaluate(async () => {
     const drawn = new Set<string>();
     const { fillText } = CanvasRenderingContext2D.prototype;
     CanvasRenderingContext2D.prototype.fillText = function (...given) {
-      if (!this.canvas.isConnected) drawn.add(given[0]); // the film's own canvas is on no page
+      if (!this.canvas.isConnected) drawn.add(given[0]); // the film's canvas is outside of the page
       fillText.apply(this, given);
     };
     document.getElementById('learn-film')!.click();
@@ -61,7 +61,7 @@ function filmTitle(page: Page): Promise<string[]> {
   });
 }
 
-/// Whether the agent on the stage is up 15 s after it hung.
+/// Whether the agent on the stage is up 15 s after hanging.
 async function swingsUp(page: Page): Promise<boolean> {
   await stopTime(page);
   await page.evaluate(() => upswing.world.reset());
@@ -69,7 +69,7 @@ async function swingsUp(page: Page): Promise<boolean> {
   return (await balanced(page)) > 5;
 }
 
-test('in the tour an agent learns from nothing and stays, and is what Node and the program say', async ({
+test('an agent that learns in the tour stays, and equals that of Node and the program', async ({
   page,
 }) => {
   await openLearn(page);
@@ -77,7 +77,7 @@ test('in the tour an agent learns from nothing and stays, and is what Node and t
   await page.getByRole('link', { name: 'Tour' }).click();
   await page.getByRole('button', { name: 'Step 3:' }).click();
   const step = page.locator('#step-learn');
-  /// All that a screen reader hears.
+  /// All texts that a screen reader announces.
   await page.evaluate(() => {
     const heard: string[] = [];
     Object.assign(globalThis, { heard });
@@ -95,7 +95,7 @@ test('in the tour an agent learns from nothing and stays, and is what Node and t
   expect(page.workers().length).toBe(1);
   const learned = () => page.evaluate(() => upswing.world.policy!.metadata.get('agent'));
   await expect.poll(learned).toBe('fast');
-  // It goes on while the visitor is elsewhere, and comes back.
+  // Training goes on during other steps, and its result is there on return.
   await page.locator('#tour-back').click();
   await expect.poll(learned).toBe('d3qn');
   await page.locator('#tour-next').click();
@@ -104,7 +104,7 @@ test('in the tour an agent learns from nothing and stays, and is what Node and t
   await expect.poll(() => page.workers().length).toBe(0);
   await expect(page.locator('#agent')).toHaveValue('own');
   const heard = await page.evaluate(() => (globalThis as never as { heard: string[] }).heard);
-  // Each milestone once, and once more what was the last when the visitor comes back.
+  // Each milestone once, and the last one again when the visitor returns.
   const milestones = heard.filter((text) => /Learning|first|most|Solved/.test(text));
   expect(new Set(milestones).size).toBeGreaterThanOrEqual(milestones.length - 1);
   expect(heard.length).toBeLessThanOrEqual(12);
@@ -130,7 +130,7 @@ test('in the tour an agent learns from nothing and stays, and is what Node and t
   await expect(tries.first()).toHaveText(/^trial 0\s0\.0 s up$/);
   await expect(tries.last()).toHaveText(/^at the end\s[1-9]\.\d s up$/);
 
-  // The same seed, in Node, and what it reports on the way.
+  // A training with the same seed in Node, and its reports.
   const learner = new Learner(await Core.start(await coreModule()), 'fast', SEED);
   const reports = [learner.report()];
   expect(reports[0]).toMatchObject({ steps: 0, updates: 0, solved: false, episodes: [] });
@@ -155,21 +155,21 @@ test('in the tour an agent learns from nothing and stays, and is what Node and t
     rmSync(folder, { recursive: true });
   }
 
-  // Along the curve: from flailing to balance, the untrained one beside it.
+  // Along the curve from flailing to balance, with the untrained policy next to it.
   const scrub = page.locator('#learn-scrub');
   await page.getByLabel('show the untrained agent too').check();
   await expect(page.locator('#twin-name')).toHaveText('untrained');
   await scrub.fill('0');
   await expect(page.locator('#learn-where')).toHaveText('on the stage: after 0 steps');
   expect(await swingsUp(page)).toBe(false);
-  // Numbers and file are those of the agent on the stage.
+  // Numbers and file belong to the agent on the stage.
   await expect(page.locator('#learn-trials')).toHaveText('0');
   expect(Buffer.from(await saved(page)).toString('latin1')).toContain('"step":"0"');
   await scrub.press('End');
   await expect(page.locator('#learn-where')).toHaveText('on the stage: as it is now');
   expect(await swingsUp(page)).toBe(true);
 
-  // At the next visit it is still there.
+  // It is still there at the next visit.
   await page.goto('about:blank');
   await page.goto('./#agent=own&on=1');
   await expect(page.locator('#agent')).toHaveValue('own');
@@ -180,7 +180,7 @@ test('in the tour an agent learns from nothing and stays, and is what Node and t
   expect(await page.evaluate(() => upswing.agents.ownIsLearned)).toBe(true);
 });
 
-test('the default agent: from an untrained policy to the one of the page, fetched when asked for', async ({
+test("the default agent's checkpoints, from untrained to final, are fetched on demand", async ({
   page,
 }) => {
   const fetched: string[] = [];
@@ -195,7 +195,7 @@ test('the default agent: from an untrained policy to the one of the page, fetche
   await expect(page.locator('#learn-success')).toHaveText('100%');
   expect(checkpoints()).toEqual([]);
 
-  /// Of swing-ups from hanging and from other poses, how many end upright.
+  /// The share of swing-ups, from hanging and other poses, that end upright.
   const successes = () =>
     page.evaluate(() => {
       const { world } = upswing;
@@ -208,7 +208,7 @@ test('the default agent: from an untrained policy to the one of the page, fetche
       return upright.length;
     });
   const scrub = page.locator('#learn-scrub');
-  // It was tested after its best policy too, in episodes that are longer than a trial.
+  // Its tests continued after its best policy, with episodes longer than a trial.
   await expect(scrub).toHaveAttribute('max', '250016');
   await expect(page.locator('#learn-return-of')).toHaveText('in a test');
   await expect(page.getByRole('button', { name: 'Share this training' })).toBeDisabled();
@@ -243,7 +243,7 @@ test('the default agent: from an untrained policy to the one of the page, fetche
   const step = await page.evaluate(() => upswing.world.twin!.policy!.metadata.get('step'));
   expect(step).toBe('0');
 
-  // One that is not there is told, and the one before stays.
+  // A missing policy is reported, and the policy before stays.
   await page.route(/-at-20000\.safetensors$/, (route) =>
     route.fulfill({ status: 200, body: 'no' }),
   );
@@ -253,7 +253,7 @@ test('the default agent: from an untrained policy to the one of the page, fetche
   expect(await page.evaluate(() => upswing.world.policy!.metadata.get('step'))).toBe('240000');
 });
 
-test('a link grows an agent by its recipe, on a stage with the pendulums that train', async ({
+test('a link trains an agent by its recipe, and the stage shows the training pendulums', async ({
   page,
 }) => {
   await open(page, '#learn=sac-fast&seed=5&balance_weight=0');
@@ -273,7 +273,7 @@ test('a link grows an agent by its recipe, on a stage with the pendulums that tr
   await page.locator('#learn-start').click();
 });
 
-test('what was learned while you were elsewhere is on the stage when you come back', async ({
+test('a policy learned while you were elsewhere is on the stage when you return', async ({
   page,
 }) => {
   await open(page, `#learn=fast&seed=${SEED}`);
@@ -293,7 +293,7 @@ test('what was learned while you were elsewhere is on the stage when you come ba
   expect(await swingsUp(page)).toBe(true);
 });
 
-test('the view has one pause, that of the training', async ({ stage: page }) => {
+test('the view has one pause, for the training', async ({ stage: page }) => {
   await openLearn(page);
   await page.getByRole('button', { name: 'Learn', exact: true }).click();
   await expect(page.getByRole('button', { name: /pause/i })).toHaveCount(1);
@@ -336,16 +336,16 @@ test('pause, go on, another seed, start over', async ({ stage: page }) => {
   await expect(page.locator('#learn-start')).toHaveText('Resume training');
   const steps = async () =>
     Number((await page.locator('#learn-steps').innerText()).replace(',', ''));
-  // What was under way when it was told arrives, and then nothing.
+  // The last report before the pause arrives, and then none.
   let before = -1;
   const rests = async () => before === (before = await steps());
   await expect.poll(rests, { intervals: [1000] }).toBe(true);
-  // It waits in the tour, too.
+  // It stays paused in the tour.
   await page.evaluate(() => (location.hash = '#tour=3'));
   await page.getByRole('button', { name: 'Resume', exact: true }).click();
   await expect.poll(steps).toBeGreaterThan(before);
   await page.evaluate(() => (location.hash = '#learn'));
-  // Watched from the click on: a moment later it may have more steps again.
+  // Watched from the click on, because the number of steps may grow at once.
   await page.evaluate(
     (before) =>
       new Promise<void>((fewer) => {
@@ -362,7 +362,7 @@ test('pause, go on, another seed, start over', async ({ stage: page }) => {
   await page.locator('#learn-start').click();
 });
 
-test('four seeds from the largest on are four that a link can have', async ({ stage: page }) => {
+test('four seeds from the largest seed on are valid in links', async ({ stage: page }) => {
   await openLearn(page);
   await page.getByLabel('four seeds at once').check();
   await page.getByLabel('Seed', { exact: true }).fill('1000000000');
@@ -372,13 +372,11 @@ test('four seeds from the largest on are four that a link can have', async ({ st
   await page.locator('#learn-start').click();
 });
 
-test('four seeds at once, each of which can be watched, and one of them takes over once', async ({
-  page,
-}) => {
+test('four seeds at once can each be watched, and one takes over once', async ({ page }) => {
   await page.addInitScript(() => {
-    // What is kept never is, so that taking over takes its time, during which the others have news.
+    // Keeping a policy never ends here, so that other trainings report meanwhile.
     IDBFactory.prototype.open = () => ({}) as IDBOpenDBRequest;
-    // The workers are real, but seed 2 counts as solved as soon as the test says so.
+    // The workers are real, but seed 2 counts as solved when the test says so.
     globalThis.Worker = class extends Worker {
       private seed = 0;
       override postMessage(order: Order): void {
@@ -426,7 +424,7 @@ test('four seeds at once, each of which can be watched, and one of them takes ov
   expect(await page.evaluate(() => document.body.dataset.kept)).toBe('learned here, fast, seed 2;');
 });
 
-test('a finger on the line under the chart holds it, and numbers are those of the worker', async ({
+test("a finger holds the slider under the chart, and the numbers match the worker's", async ({
   stage: page,
 }) => {
   await openLearn(page);
@@ -443,7 +441,7 @@ test('a finger on the line under the chart holds it, and numbers are those of th
   expect(await scrub.inputValue()).toBe(held);
   await page.mouse.up();
 
-  // News that arrive all at once, as the page was busy, make no trainings faster.
+  // Many reports at once, from a busy page, do not speed up trainings.
   const rates = await page.evaluate(async () => {
     const rate = () => Number(document.getElementById('learn-rate')!.textContent);
     const usual = rate();
@@ -459,7 +457,7 @@ test('a finger on the line under the chart holds it, and numbers are those of th
   expect(rates.usual).toBeGreaterThan(0);
   expect(rates.highest).toBeLessThan(20 * rates.usual);
 
-  // Nobody sees it in the tour: it waits.
+  // Hidden in the tour, it waits.
   await page.getByRole('link', { name: 'Tour' }).click();
   await expect(page.locator('#step-watch h2')).toBeVisible();
   await page.getByRole('link', { name: 'Learn', exact: true }).click();
@@ -467,10 +465,10 @@ test('a finger on the line under the chart holds it, and numbers are those of th
   await page.evaluate(() => upswing.learn.stop());
 });
 
-test('an agent that is chosen before the first news stays', async ({ stage: page }) => {
+test('an agent chosen before the first report stays', async ({ stage: page }) => {
   await openLearn(page);
   await page.evaluate(async () => {
-    // Both are loaded, so that choosing one takes no time.
+    // Both are loaded, so choosing one takes no time.
     for (const id of ['fast', 'd3qn']) await upswing.choose(id);
     document.getElementById('learn-start')!.click();
     await upswing.choose('fast');
@@ -479,16 +477,14 @@ test('an agent that is chosen before the first news stays', async ({ stage: page
   expect(await page.evaluate(() => upswing.world.policy!.metadata.get('step'))).toBe('210016');
 });
 
-test('settings are those of the program, which says what is wrong with them', async ({
-  stage: page,
-}) => {
+test("settings and messages about wrong values equal the program's", async ({ stage: page }) => {
   await openLearn(page);
   await page.getByText('Training settings', { exact: true }).click();
   const rate = page.getByLabel('learning rate');
   await expect(rate).toHaveValue('0.002');
   await page.getByRole('button', { name: 'Learn', exact: true }).click();
   await expect(page.locator('#learn-updates')).not.toHaveText('0');
-  // A wrong one is said at its field, and what learns goes on.
+  // A wrong value is reported at its field, and the current training goes on.
   for (const [name, wrong] of [
     ['learning rate', '-1'],
     ['n step', '2.5'],
@@ -507,7 +503,7 @@ test('settings are those of the program, which says what is wrong with them', as
   await expect(page.locator('#learn-updates')).not.toHaveText('0');
   const network = await page.evaluate(() => upswing.world.policy!.metadata.get('network'));
   expect(network).toContain('"layer_norm":false');
-  await page.getByLabel('What learns').selectOption('sac-fast');
+  await page.getByLabel('Agent to train').selectOption('sac-fast');
   await expect(page.getByLabel('twin', { exact: true })).not.toBeChecked();
   await page.getByRole('button', { name: 'Start over' }).click();
   await expect(page.locator('#q-name')).toHaveText(/Policy/);
@@ -531,9 +527,9 @@ test("the visitor's own file is not replaced, and another agent keeps the stage"
   await page.locator('#learn-start').click();
 });
 
-test.describe('what is missing', () => {
+test.describe('missing parts', () => {
   test.use({ complains: true });
-  test('a worker that does not start is told', async ({ page }) => {
+  test('a worker that does not start is reported', async ({ page }) => {
     await page.route(/worker-.*\.js$/, (route) => route.abort());
     await openLearn(page);
     await page.getByRole('button', { name: 'Learn', exact: true }).click();

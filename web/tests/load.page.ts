@@ -3,7 +3,7 @@ import type { Page, Response } from '@playwright/test';
 import { gzipSync } from 'node:zlib';
 import { open, test } from './page';
 
-test('the page loads at most 2.3 MB compressed, and asks nobody else', async ({ page }) => {
+test('the page loads at most 2.3 MB compressed, and asks no other host', async ({ page }) => {
   const responses: Response[] = [];
   page.on('response', (response) => responses.push(response));
   const hosts = new Set<string>();
@@ -20,7 +20,7 @@ test('the page loads at most 2.3 MB compressed, and asks nobody else', async ({ 
   expect(sizes.reduce((sum, size) => sum + size, 0)).toBeLessThan(2.3e6);
 });
 
-test('the pendulum swings before the default agent and MuJoCo are here, which then go on with it', async ({
+test('the pendulum swings before the default agent and MuJoCo have loaded, then continues with them', async ({
   page,
 }) => {
   let arrive = () => {};
@@ -44,7 +44,7 @@ test('the pendulum swings before the default agent and MuJoCo are here, which th
   expect(await page.evaluate(() => upswing.world.agentOn)).toBe(true);
 });
 
-test.describe('what the policy of the page forbids', () => {
+test.describe("limits of the page's content security policy", () => {
   test.use({ complains: true });
   test('text is never run as code', async ({ page }) => {
     await open(page);
@@ -69,10 +69,10 @@ test.describe('what the policy of the page forbids', () => {
   });
 });
 
-test.describe('what is missing or broken is told', () => {
+test.describe('missing or broken parts are reported', () => {
   test.use({ complains: true });
 
-  /// That the page says why, and no longer that it loads.
+  /// The page shows the reason instead of its loading text.
   async function expectProblem(page: Page, words: string | RegExp): Promise<void> {
     await expect(page.locator('#problem')).toContainText(words);
     await expect(page.locator('#loading')).toBeHidden();
@@ -80,7 +80,7 @@ test.describe('what is missing or broken is told', () => {
     await expect(page.locator('#agent-on')).toBeDisabled();
   }
 
-  test('a browser without WebAssembly is told so', async ({ page }) => {
+  test('a browser without WebAssembly gets a message', async ({ page }) => {
     await page.addInitScript(() => Reflect.deleteProperty(globalThis, 'WebAssembly'));
     await page.goto('./#everything');
     await expectProblem(page, 'no WebAssembly');
@@ -108,7 +108,7 @@ test.describe('what is missing or broken is told', () => {
     });
   }
 
-  test('a policy: the page runs without it, and another one can be chosen', async ({ page }) => {
+  test('without a policy the page runs, and offers the others', async ({ page }) => {
     for (const [answer, words] of [
       [{ status: 200, body: 'broken' }, 'not a valid safetensors file'],
       [{ status: 404 }, 'agents/d3qn.safetensors is missing'],

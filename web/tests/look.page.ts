@@ -2,9 +2,9 @@ import { expect } from '@playwright/test';
 import type { Page } from '@playwright/test';
 import { onScreen, open, startFrom, test } from './page';
 
-/// Faces, numbers, nouns, and what others show of the page.
+/// Typefaces, numbers, nouns, and the page's card on other sites.
 
-/// How far what is seen has moved by itself, since the page was opened (layout shift).
+/// Layout shift since the page was opened.
 async function shift(page: Page): Promise<number> {
   return page.evaluate(
     () =>
@@ -31,7 +31,7 @@ for (const [width, height] of [
   });
 }
 
-test('both faces are those of the page, and their licence is beside them', async ({ page }) => {
+test('the page uses its own two typefaces, with their licence next to them', async ({ page }) => {
   await open(page);
   const loaded = await page.evaluate(async () => {
     await document.fonts.ready;
@@ -75,7 +75,7 @@ test('a noun lights its thing, under a mouse and from a tap to the next', async 
   expect(new Set(colors).size).toBe(4);
 });
 
-test('what others show of the page: a card of 1200 × 630, at most 150 kB', async ({ page }) => {
+test("the page's card is 1200 × 630, at most 150 kB", async ({ page }) => {
   await open(page);
   const card = page.locator('meta[property="og:image"]');
   const response = await page.request.get((await card.getAttribute('content'))!);

@@ -1,5 +1,5 @@
-// npm run measure: how large the built page is, how soon it paints, how smoothly it runs, and how much
-// of a processor it takes. Measurements of this machine for docs/howto/page.md, not a test.
+// npm run measure: size of the built page, time to its first paint, frame rate, and processor time.
+// Measurements for docs/howto/page.md, not a test.
 import { gzipSync } from 'node:zlib';
 import { ready, serve, visit } from './visit.mjs';
 
@@ -21,13 +21,13 @@ async function measure(page) {
   const sizes = (await Promise.all(bodies)).map((body) => gzipSync(body).length);
 
   const devtools = await page.context().newCDPSession(page);
-  // Of the thread's own time, as other programs may run on the processor meanwhile.
+  // Processor time of the thread only, because other programs may run.
   await devtools.send('Performance.enable', { timeDomain: 'threadTicks' });
   const metrics = async () => {
     const { metrics } = await devtools.send('Performance.getMetrics');
     return Object.fromEntries(metrics.map(({ name, value }) => [name, value]));
   };
-  // With the agent on and the map in sight: one pendulum, two side by side, one whose agent plans.
+  // With the agent on and the map in sight: one pendulum, two, and one with a planning agent.
   const run = async () => {
     await page.evaluate(() => document.getElementById('map').scrollIntoView({ block: 'end' }));
     const before = await metrics();
@@ -49,8 +49,8 @@ async function measure(page) {
   return { ...start, kilobytes: sizes.reduce((sum, size) => sum + size) / 1000, one, two, mpc };
 }
 
-/// Seconds until a new visitor sees the pendulum swing. With `bits`, the network carries that many bits a
-/// second and answers after 40 ms; 0: as fast as this machine is.
+/// Seconds until a new visitor sees the pendulum swing. `bits`: bits per second of a network that
+/// answers after 40 ms; 0: no limit.
 async function firstSwing(page, bits) {
   if (bits) {
     const devtools = await page.context().newCDPSession(page);
@@ -68,7 +68,7 @@ async function firstSwing(page, bits) {
   return swings.jsonValue();
 }
 
-/// Frames a second, in the page.
+/// Runs in the page: frames per second.
 function framesIn(seconds) {
   return new Promise((resolve) => {
     const begin = performance.now();

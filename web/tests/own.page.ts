@@ -5,7 +5,7 @@ import { changed as changedFile } from './file';
 import { open, slide, test } from './page';
 import { policyPath, readPolicy } from './program';
 
-/// A visitor's own policy: kept over a reload, removed when asked, and never more than text.
+/// A visitor's own policy: kept over a reload, removed on request, and shown only as text.
 
 /// The policy `fast` with some of its metadata changed.
 const changed = (metadata: Record<string, string>) =>
@@ -36,7 +36,7 @@ test('a reload keeps it, until it is removed', async ({ stage: page }) => {
   await expect(page.locator('#agent option:checked')).toHaveText('fast.safetensors (yours)');
   await expect(page.locator('#agent-text')).toContainText('8-48-32');
   await expect(page.locator('#message')).toBeHidden();
-  // A plain visit begins with the default agent, and still offers it.
+  // Without settings the page begins with the default agent, and still offers the visitor's own.
   await page.goto('about:blank');
   await open(page);
   await expect(page.locator('#agent')).toHaveValue('d3qn');
@@ -69,14 +69,14 @@ test('a link for others has no agent of your own', async ({ stage: page }) => {
     .toMatch(/#everything$/);
 });
 
-test('what is kept in the browser and cannot be a policy is left alone', async ({ page }) => {
+test('kept data that cannot be a policy is ignored', async ({ page }) => {
   await open(page);
   await page.locator('#file').setInputFiles({
     ...{ name: 'learned here, mine', mimeType: '' },
     buffer: Buffer.from(readPolicy('fast')),
   });
   await expect(page.locator('#own')).toContainText('learned here, mine');
-  // A visitor's file, whatever its name: what the page learns does not replace it.
+  // The page's policies never replace a visitor's file, whatever its name.
   expect(await page.evaluate(() => upswing.agents.ownIsLearned)).toBe(false);
   await page.evaluate(
     () =>
@@ -96,7 +96,7 @@ test('what is kept in the browser and cannot be a policy is left alone', async (
   expect(await page.evaluate(() => upswing.agents.ownName)).toBeNull();
 });
 
-test('a browser that keeps nothing still runs it', async ({ page }) => {
+test('a browser that keeps nothing still runs the policy', async ({ page }) => {
   await page.addInitScript(() => {
     const refuse = () => {
       throw new DOMException('private', 'SecurityError');
@@ -130,7 +130,7 @@ test('a plant with a parameter of 0 is refused, and the charts go on', async ({ 
   }
 });
 
-test('Q-values that are not finite do not spoil the chart for the next ones', async ({
+test('Q-values that are not finite do not spoil the chart for later ones', async ({
   stage: page,
 }) => {
   await open(page, '#agent=d3qn');
@@ -156,7 +156,7 @@ test('Q-values that are not finite do not spoil the chart for the next ones', as
   expect(await painted()).toBeGreaterThan(0.9 * before);
 });
 
-test('sliders extend to a plant beyond them, and so do links', async ({ stage: page }) => {
+test('sliders extend to a plant or link beyond their range', async ({ stage: page }) => {
   await open(page);
   const plant = { mass1: 5, length2: 2, gravity: 60, mass2: 0.01, torque_limit: 400 };
   await bring(page, ofPlant(plant));
@@ -182,24 +182,24 @@ test('sliders extend to a plant beyond them, and so do links', async ({ stage: p
   await expect(page.locator('#agent-on')).toBeEnabled();
   await shown();
   expect(await page.evaluate(() => upswing.world.plant)).toMatchObject(plant);
-  // Moved to the end that was extended: still a plant.
+  // At the extended end, the plant is still valid.
   await slide(page, 'mass2', 0);
   expect(await page.evaluate(() => upswing.world.plant.mass2)).toBe(0.01);
   await expect(page.locator('output[for=mass2]')).toHaveText('0.01 kg');
-  // Another agent's sliders are the usual ones again.
+  // Another agent's sliders have their usual range.
   await page.locator('#agent').selectOption('d3qn');
   await page.getByRole('button', { name: 'Reset sliders' }).click();
   await expect(page.locator('#mass1')).toHaveAttribute('max', '3');
 });
 
-test('what a policy file says is text, of bounded length', async ({ stage: page }) => {
+test('strings of a policy file are shown as text of bounded length', async ({ stage: page }) => {
   await open(page);
   const evil = `<img src=x onerror="globalThis.ran=1">${'W'.repeat(5000)}`;
   await bring(page, changed({ format_version: evil }), `${evil.slice(0, 200)}.safetensors`);
   const message = page.locator('#message-text');
   await expect(message).toContainText('<img src=x');
   expect((await message.textContent())!.length).toBeLessThan(300);
-  // The agent's name has a length that no file may exceed.
+  // A file has a limit for the length of the agent's name.
   const agent = evil.slice(0, 64);
   await bring(page, changed({ agent }), `${evil.slice(0, 200)}.safetensors`);
   await expect(page.locator('#agent')).toHaveValue('own');
@@ -209,7 +209,7 @@ test('what a policy file says is text, of bounded length', async ({ stage: page 
   expect(await page.locator('img:not(h1 > img)').count()).toBe(0);
 });
 
-test('what the list of agents says is text, of bounded length', async ({ page }) => {
+test('strings of the list of agents are shown as text of bounded length', async ({ page }) => {
   const evil = `<img src=x onerror="globalThis.ran=1">\u202e\n${'W'.repeat(100)}`;
   const entry = { id: 'd3qn', file: 'd3qn.safetensors', agent: evil };
   const agents = [
@@ -221,7 +221,7 @@ test('what the list of agents says is text, of bounded length', async ({ page })
   ];
   await page.route(/agents\.json$/, (route) => route.fulfill({ json: { agents } }));
   await open(page);
-  await expect(page.locator('#agent option')).toHaveCount(2 + 5); // and what is not learned
+  await expect(page.locator('#agent option')).toHaveCount(2 + 5); // and the controllers
   await expect(page.locator('#agent-command')).toHaveAttribute('hidden');
   const title = (await page.locator('#agent option:checked').textContent())!;
   expect(title.length).toBeLessThan(130);
@@ -233,7 +233,7 @@ test('what the list of agents says is text, of bounded length', async ({ page })
   expect(await page.locator('img:not(h1 > img)').count()).toBe(0);
 });
 
-test('a link that says too much is told in few words', async ({ stage: page }) => {
+test('a link with huge texts gets a short message', async ({ stage: page }) => {
   await open(page, `#${'k'.repeat(3000)}=1&agent=${'a'.repeat(3000)}&mass1=${'9'.repeat(3000)}`);
   const message = page.locator('#message-text');
   await expect(message).toContainText('Not all of the link could be used');

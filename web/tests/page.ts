@@ -3,24 +3,24 @@ import type { BrowserContext, Page } from '@playwright/test';
 import type { Clock } from '../src/page/clock';
 import type {} from '../src/page/global';
 
-/// What a page draws costs most without a graphics card: 10 frames a second are enough.
+/// Drawing costs most without a graphics card, so 10 frames a second are enough.
 function drawSeldom(): void {
   const { requestAnimationFrame: soon } = globalThis;
   const waiting: FrameRequestCallback[] = [];
   globalThis.requestAnimationFrame = (draw) => waiting.push(draw);
   setInterval(() => {
-    // Nothing is drawn while the stage waits for its next test.
+    // Draws nothing while the stage waits for its next test.
     if (document.body?.inert) return;
     for (const draw of waiting.splice(0)) soon(draw);
   }, 100);
 }
 
-/// Errors and warnings that pages of a context write to the console from now on.
+/// Collects errors and warnings that a context's pages write to the console.
 function complaintsOf(context: BrowserContext): string[] {
   const complaints: string[] = [];
   context.on('console', (message) => {
     const text = message.text();
-    // The page reads no canvas back; tests do.
+    // Only tests read canvases back.
     if (text.includes('willReadFrequently')) return;
     if (['error', 'warning'].includes(message.type())) complaints.push(text);
   });
@@ -35,9 +35,9 @@ interface Kept {
 
 /// A test fails if its page writes errors or warnings to the console, unless `complains` is set.
 ///
-/// `page` begins in a browser context of its own, and open() loads it. Tests that are not about loading
-/// take `stage`: one page for all tests of a Playwright worker. It is put back as it was at first, and
-/// open() loads nothing in it. Loading takes twenty times as long.
+/// `page` has its own browser context, and open() loads it. Tests that are not about loading take
+/// `stage`: one page for all tests of a Playwright worker, which open() only resets. Loading takes
+/// twenty times as long.
 export const test = base.extend<{ complains: boolean; stage: Page }, { kept: Kept }>({
   complains: [false, { option: true }],
   context: async ({ context, complains }, use) => {
@@ -64,7 +64,8 @@ export const test = base.extend<{ complains: boolean; stage: Page }, { kept: Kep
   },
 });
 
-/// As a new visitor finds it: nothing kept, chosen or learning, no mouse button held down, at the top.
+/// Resets the page for a new visitor: nothing kept, chosen or learning, no mouse button down,
+/// scrolled to the top.
 async function setBack(page: Page): Promise<void> {
   await page.unrouteAll();
   await page.context().clearPermissions();
@@ -78,7 +79,7 @@ async function setBack(page: Page): Promise<void> {
     for (const details of document.querySelectorAll('details')) {
       details.open = details.matches('#explain > :first-child');
     }
-    delete (upswing.clock as Partial<Clock>).advance; // where a test had stopped it
+    delete (upswing.clock as Partial<Clock>).advance; // a test may have stopped it
     upswing.learn.stop();
     upswing.laboratory = '';
     await upswing.agents.forgetOwn();
@@ -86,8 +87,8 @@ async function setBack(page: Page): Promise<void> {
   });
 }
 
-/// Opens the page, everything that it has, and waits until the pendulum hangs in it. Where the page is
-/// there already, it begins with this address as with any other that a visitor follows.
+/// Opens the page and waits until everything has loaded and the pendulum hangs. A loaded page
+/// follows the address as it follows a visitor's link.
 export async function open(page: Page, hash = '#everything'): Promise<void> {
   if (page.url() === 'about:blank') {
     await page.goto(`./${hash}`);
@@ -143,7 +144,7 @@ export function balanced(page: Page): Promise<number> {
   return page.evaluate(() => upswing.world.uprightFor ?? 0);
 }
 
-/// The largest difference in q1, q2, w1, w2 over two trajectories' common rows.
+/// Largest difference in q1, q2, w1, w2 over the common rows of two trajectories.
 export function largestDifference(rows: number[][], others: number[][]): number {
   expect(rows.length).toBeGreaterThan(0);
   expect(others.length).toBeGreaterThanOrEqual(rows.length);
@@ -153,16 +154,16 @@ export function largestDifference(rows: number[][], others: number[][]): number 
   return Math.max(...differences);
 }
 
-/// Sets a slider as a hand would.
+/// Sets a slider like a visitor's hand.
 export async function slide(page: Page, id: string, value: number): Promise<void> {
   await page.locator(`#${id}`).fill(String(value));
 }
 
-/// Where a point of the pendulum's plane (m) is on the screen.
+/// Place of a point of the pendulum's plane (m) on the screen.
 export function onScreen(page: Page, x: number, z: number): Promise<{ x: number; y: number }> {
   return page.evaluate(
     async (point) => {
-      // What was asked for before is laid out and drawn.
+      // Waits until earlier changes are laid out and drawn.
       for (let k = 0; k < 3; ++k) await new Promise(requestAnimationFrame);
       const { left, top } = document.getElementById('scene')!.getBoundingClientRect();
       const [px, py] = upswing.scene.at(point);

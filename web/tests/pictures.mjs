@@ -1,4 +1,4 @@
-// npm run pictures: the page as docs/ and the README show it.
+// npm run pictures: pictures of the page for docs/ and the README.
 import { execFileSync } from 'node:child_process';
 import { mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
@@ -9,13 +9,13 @@ import { ready, serve, visit } from './visit.mjs';
 const server = await serve();
 const docs = fileURLToPath(new URL('../../docs/figures/', import.meta.url));
 
-/// Time stands still, without the look of a page that is paused.
+/// Stops time without the look of a paused page.
 async function stop() {
   upswing.clock.speed = 0;
   await new Promise((resolve) => setTimeout(resolve, 500));
 }
 
-/// The first step of the tour: the agent swings up from hanging; stopped on the way.
+/// The tour's first step: the agent swings up from hanging, stopped on the way.
 async function swingUp(page) {
   await page.goto(`${server.address}#tour=1`);
   await ready(page);

@@ -2,8 +2,8 @@ import { execFileSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 
-/// What `upswing ARGUMENTS` prints: the C++ program is what the page is tested against. UPSWING names
-/// the built program.
+/// Output of `upswing ARGUMENTS`, the C++ program to compare the page with. UPSWING: path of the
+/// built program.
 export function runProgram(...args: string[]): string {
   const launcher = fileURLToPath(new URL('../../upswing', import.meta.url));
   const [program, first] = process.env.UPSWING
@@ -25,7 +25,7 @@ export function simulate(...args: string[]): number[][] {
   return rows.map((row) => row.split(',').slice(0, 6).map(Number));
 }
 
-/// Where an agent's policy that the page comes with lies.
+/// Path of a shipped agent's policy.
 export function policyPath(id: string): string {
   return fileURLToPath(new URL(`../public/agents/${id}.safetensors`, import.meta.url));
 }

@@ -80,7 +80,7 @@ test('encoders, their velocities and latency act as in `upswing simulate`', asyn
   expect(await page.evaluate(() => upswing.world.disturbance.encoder_counts)).toBe(0);
 });
 
-test('one slider goes back alone', async ({ stage: page }) => {
+test('one slider is reset, the others stay', async ({ stage: page }) => {
   await open(page);
   const back = page.getByRole('button', { name: 'Reset Gravity' });
   await expect(back).toBeDisabled();
@@ -90,7 +90,7 @@ test('one slider goes back alone', async ({ stage: page }) => {
   expect(await page.evaluate(() => upswing.world.plant)).toMatchObject({ gravity: 9.81, mass1: 2 });
 });
 
-test('the address holds what was set, and brings it back', async ({ stage: page }) => {
+test('the address holds all settings, and restores them', async ({ stage: page }) => {
   await open(page);
   await page.locator('#agent').selectOption('fast');
   await slide(page, 'mass2', 1.25);
@@ -112,7 +112,7 @@ test('the address holds what was set, and brings it back', async ({ stage: page 
   expect(set).toEqual({ mass2: 1.25, noise: 0.02, speed: 0.5 });
 });
 
-test('what was set is there again after a look at the tour', async ({ stage: page }) => {
+test('settings are restored after a look at the tour', async ({ stage: page }) => {
   await open(page, '#agent=fast&gravity=14');
   await page.getByRole('link', { name: 'Tour' }).click();
   await expect(page.locator('#step-watch h2')).toBeVisible();
@@ -145,9 +145,7 @@ test('a swipe over a slider scrolls and changes nothing', async ({ browser }) =>
   await context.close();
 });
 
-test('an address that is not understood is told, and the rest of it holds', async ({
-  stage: page,
-}) => {
+test('invalid parts of an address are reported, and the rest is used', async ({ stage: page }) => {
   await open(page, '#agent=none&mass1=-3&mass2=1.5&colour=red');
   const message = page.locator('#message');
   await expect(message).toContainText('unknown agent "none"');
@@ -156,7 +154,7 @@ test('an address that is not understood is told, and the rest of it holds', asyn
   expect(await page.evaluate(() => upswing.world.plant)).toMatchObject({ mass1: 1, mass2: 1.5 });
 });
 
-test('another address in the same tab begins anew with it', async ({ stage: page }) => {
+test('another address in the same tab starts the page again', async ({ stage: page }) => {
   await open(page, '#agent=d3qn&on=1');
   await page.waitForTimeout(500);
   await page.evaluate(() => (location.hash = '#agent=fast&mass1=1.4'));

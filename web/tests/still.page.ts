@@ -2,9 +2,9 @@ import { expect } from '@playwright/test';
 import type { Page } from '@playwright/test';
 import { open, test } from './page';
 
-/// A page that stands still draws nothing, and draws again after any change.
+/// A page at rest draws nothing, and draws again after any change.
 
-/// Counts the frames that the page asks for from now on.
+/// Counts the frames that the page requests from now on.
 async function countFrames(page: Page): Promise<() => Promise<number>> {
   await page.evaluate(() => {
     const { requestAnimationFrame: soon } = globalThis;
@@ -17,7 +17,7 @@ async function countFrames(page: Page): Promise<() => Promise<number>> {
   return () => page.evaluate(() => (globalThis as never as { framesAsked: number }).framesAsked);
 }
 
-/// Until no frame is asked for during a second.
+/// Waits until the page has requested no frame for a second.
 async function settle(frames: () => Promise<number>): Promise<number> {
   let before = -1;
   await expect(async () => {

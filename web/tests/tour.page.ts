@@ -3,12 +3,12 @@ import type { Page } from '@playwright/test';
 import { advance, balanced, open, run, test } from './page';
 import { readPolicy } from './program';
 
-/// The guided tour: how a visitor comes to it and leaves it, and that what it says is so.
+/// The guided tour: ways into it and out of it, and the truth of its sentences.
 
-// The numbers of steps.
+// The numbers of the steps.
 const [MOTOR, LEARN, AGENT, SHOVE, BET, VALUES, MAP] = [2, 3, 4, 5, 6, 7, 8];
 
-/// Opens the page as a new visitor does, or at a step of the tour.
+/// Opens the page for a new visitor, or at a step of the tour.
 async function visit(page: Page, hash = ''): Promise<void> {
   await open(page, hash);
 }
@@ -16,7 +16,7 @@ async function visit(page: Page, hash = ''): Promise<void> {
 const heading = (page: Page) => page.locator('.step:not([inert]) h2');
 const answer = (page: Page) => page.locator('.step:not([inert]) .answer');
 
-/// At a step, with time standing still, so that only run() advances it.
+/// Opens a step with time stopped, so that only run() advances it.
 async function stopAt(page: Page, step: number): Promise<void> {
   await visit(page, `#tour=${step}`);
   await page.evaluate(() => {
@@ -24,13 +24,14 @@ async function stopAt(page: Page, step: number): Promise<void> {
   });
 }
 
-/// From hanging or from where it is, so many seconds; how long it was upright at the end without a break.
+/// Runs for `seconds` from hanging or the present state. Returns the final time upright without a
+/// break.
 async function held(page: Page, seconds: number): Promise<number> {
   await advance(page, seconds);
   return balanced(page);
 }
 
-test('a new visitor gets the tour, which begins by itself with a swing-up', async ({ page }) => {
+test('a new visitor gets the tour, which begins with a swing-up', async ({ page }) => {
   await visit(page);
   await expect(heading(page)).toHaveText('Two links, one motor');
   await expect(page.locator('#charts')).toBeHidden();
@@ -38,7 +39,7 @@ test('a new visitor gets the tour, which begins by itself with a swing-up', asyn
   await expect(answer(page)).toContainText('Balanced');
 });
 
-test('nothing moves by itself where motion is not wanted', async ({ stage: page }) => {
+test('nothing moves by itself with reduced motion', async ({ stage: page }) => {
   await page.emulateMedia({ reducedMotion: 'reduce' });
   await visit(page);
   await run(page, 1);
@@ -55,7 +56,7 @@ test('from step to step, by buttons, numbers and address, and back', async ({ st
     await expect(heading(page)).toHaveText(title);
     await expect(heading(page)).toBeFocused();
   }
-  // On the keyboard's way the numbers come last.
+  // The tab key reaches the numbers last.
   await page.locator('#tour-back').focus();
   await page.keyboard.press('Tab');
   await expect(page.locator('#dots button').first()).toBeFocused();
@@ -75,7 +76,7 @@ test('from step to step, by buttons, numbers and address, and back', async ({ st
   }
 });
 
-test('a link with settings shows everything, and who chose a view finds it again', async ({
+test('a link with settings shows everything, and a chosen view is kept', async ({
   stage: page,
 }) => {
   await page.goto('./#agent=fast&mass2=1.2');
@@ -86,7 +87,7 @@ test('a link with settings shows everything, and who chose a view finds it again
     await page.goto('./');
     await expect(page.locator('fieldset:disabled')).toHaveCount(0);
   };
-  await comeBack(); // a link of somebody else's is no choice
+  await comeBack(); // a stranger's link is no choice
   await expect(page.locator('#tour')).toBeVisible();
   await page.getByRole('link', { name: 'Everything', exact: true }).click();
   await expect(page.locator('#charts')).toBeVisible();
@@ -120,7 +121,7 @@ test('only the keys that a step names act, and another step goes on', async ({ s
   expect(await page.evaluate(() => upswing.world.shoved)).not.toBeNull();
 });
 
-test('you are the motor: an arrow is its whole torque, and holding one lifts nothing', async ({
+test('you are the motor: an arrow gives the full torque, which cannot lift the links', async ({
   stage: page,
 }) => {
   await stopAt(page, MOTOR);
@@ -157,7 +158,7 @@ test('the game counts the seconds with both links up, and the best try comes bac
   const best = page.locator('#motor-best');
   const send = page.getByRole('button', { name: 'Copy my result' });
   await expect(send).toBeDisabled();
-  /// Falls from near upright; the longest time (s) with both links up, by the same clock.
+  /// Falls from near upright. Returns the longest time (s) with both links up, by the same clock.
   const fall = (q1: number) =>
     page.evaluate((q1) => {
       const { world } = upswing;
@@ -183,11 +184,11 @@ test('the game counts the seconds with both links up, and the best try comes bac
   await advance(page, 0.2);
   await expect.poll(ghosts).toHaveLength(2);
   const [q1] = await ghosts();
-  expect(Math.cos(q1!)).toBeLessThan(-0.9); // up, while this try hangs
+  expect(Math.cos(q1!)).toBeLessThan(-0.9); // up, while the present try hangs
   await fall(Math.PI - 0.3);
   await expect(answer(page)).toHaveText(`${short.toFixed(1)} s this time.`);
 
-  // A hand that holds it up counts nothing.
+  // Time in a hand does not count.
   await page.evaluate(() => {
     upswing.world.reset({ q1: Math.PI, q2: 0, w1: 0, w2: 0 });
     upswing.world.drag = { link: 2, along: 0.5, target: { x: 0, z: 1 } };
@@ -205,7 +206,7 @@ test('the game counts the seconds with both links up, and the best try comes bac
     new RegExp(`up for ${long.toFixed(1)} s by hand\\. Can you\\? http.*/#tour=2$`),
   );
 
-  // Half speed helps, and has a best of its own; both are there at the next visit.
+  // Half speed helps and has its own record. Both records survive until the next visit.
   const speed = () => page.evaluate(() => upswing.clock.speed);
   await page.getByLabel('half speed').check();
   expect(await speed()).toBe(0.5);
@@ -222,7 +223,7 @@ test('the agent has the same motor, and learned for 80 minutes', async ({ stage:
   await page.keyboard.down('ArrowRight');
   await run(page, 1.3);
   await page.keyboard.up('ArrowRight');
-  // It takes over in the middle of a swing.
+  // It takes over during a swing.
   await page.getByRole('button', { name: `Step ${AGENT}:` }).click();
   await expect(page.locator('#agent')).toHaveValue('d3qn');
   await page.getByRole('button', { name: 'Give it the motor' }).click();
@@ -254,15 +255,13 @@ test('it catches one shove, falls after seven, and gets up again', async ({ stag
   }
 });
 
-test('a bet: with the light link the agent of many pendulums holds, the one of one does not', async ({
-  stage: page,
-}) => {
+test('a bet: only the agent of many pendulums balances the light link', async ({ stage: page }) => {
   await stopAt(page, BET);
   await expect(page.locator('#twin-scene')).toBeVisible();
   await expect(page.locator('#first-name')).toHaveText('learned on one');
   await expect(page.locator('#twin-name')).toHaveText('learned on many');
   expect(await page.evaluate(() => upswing.world.twin!.plant.mass2)).toBe(0.75);
-  await advance(page, 2); // nobody moves before the bet
+  await advance(page, 2); // nothing moves before the bet
   expect(await page.evaluate(() => upswing.world.state.q1)).toBe(0);
   await expect(answer(page)).toHaveText('');
   for (const [name, result] of [
@@ -278,10 +277,10 @@ test('a bet: with the light link the agent of many pendulums holds, the one of o
     expect(await page.evaluate(() => upswing.world.twin!.uprightFor)).toBeGreaterThan(10);
     await expect(answer(page)).toContainText(`${result}: only the agent that learned on many`);
   }
-  // A verdict stays, even where both balance later.
+  // A result stays, even if both balance later.
   await page.evaluate(() => (upswing.world.plant = { ...upswing.world.plant, mass2: 1 }));
   expect(await held(page, 20)).toBeGreaterThan(5);
-  await page.waitForTimeout(1000); // the step looks ten times a second, at least once meanwhile
+  await page.waitForTimeout(1000); // the step checks ten times a second
   await expect(answer(page)).toContainText('You were right: only the agent');
   await page.getByRole('button', { name: 'Next' }).click();
   await expect(page.locator('#twin-scene')).toBeHidden();
@@ -304,10 +303,10 @@ test('a bet that both agents win or lose is a draw', async ({ stage: page }) => 
   }
 });
 
-test('the bars are what it expects, and the highest is taken', async ({ stage: page }) => {
+test('the bars show the expected reward, and the highest is taken', async ({ stage: page }) => {
   await stopAt(page, VALUES);
   await expect(page.locator('#q')).toBeVisible();
-  // Where there is room, its neurons are over the bars, and change with what it sees.
+  // If there is room, its neurons are above the bars and change with the observation.
   await expect(page.locator('#neurons')).toBeHidden();
   await page.setViewportSize({ width: 1280, height: 900 });
   const neurons = page.locator('#neurons');
@@ -342,10 +341,10 @@ test('the bars are what it expects, and the highest is taken', async ({ stage: p
     best.push(Math.max(...q));
   }
   expect(await balanced(page)).toBeGreaterThan(2);
-  expect(best.at(-1)!).toBeGreaterThan(1.5 * best[0]!); // at the top it expects most
+  expect(best.at(-1)!).toBeGreaterThan(1.5 * best[0]!); // the largest values are at the top
   expect(best.at(-1)!).toBeGreaterThan(0.95 * Math.max(...best));
 
-  // The bars hang from the best torque, each as long as what it costs; in words, in points of reward.
+  // Each bar hangs from the best torque, as long as its cost in points of reward.
   const [cost, all] = await page.evaluate(() => {
     const { decision, policy } = upswing.world;
     if (decision?.kind !== 'q') throw new Error('no Q-values');
@@ -357,7 +356,7 @@ test('the bars are what it expects, and the highest is taken', async ({ stage: p
   );
   await expect(page.locator('#q-value')).toBeVisible();
 
-  // A shove by keyboard throws it down.
+  // Shoves by keyboard throw it down.
   for (let k = 0; k < 7; ++k) {
     await page.keyboard.press('ArrowLeft');
     await run(page, 0.2);
@@ -404,11 +403,11 @@ test('every pose at once: the brightest is upright, and a click starts there', a
 }) => {
   await visit(page, `#tour=${MAP}`);
   await expect(page.locator('#map-value')).toHaveText(/^\d+ to \d+$/);
-  // What the colours stand for: the ends of its scale are those of the map.
+  // The legend of the colours matches the map.
   const ends = (await page.locator('#map-value').textContent())!.split(' to ');
   await expect(page.locator('#step-map .scale')).toHaveText(`expected reward${ends.join('')}`);
   await stopAt(page, MAP);
-  /// Of a grid of poses at rest, the one of which the agent expects most, and least.
+  /// The poses at rest with the largest and the smallest value on a grid.
   const [most, least] = await page.evaluate(() => {
     const poses: [number, number, number][] = [];
     for (let i = -12; i <= 12; ++i) {
@@ -438,7 +437,7 @@ test('every pose at once: the brightest is upright, and a click starts there', a
   expect(q2).toBeCloseTo(-Math.PI / 2, 1);
   expect(await held(page, 20)).toBeGreaterThan(5);
 
-  // The same by keyboard: from the middle, upright, six times 15° to either side.
+  // By keyboard: from the middle, upright, six times 15° to either side.
   await page.locator('#map').focus();
   for (const key of ['ArrowLeft', 'ArrowDown']) {
     for (let k = 0; k < 6; ++k) await page.keyboard.press(key);
@@ -483,14 +482,14 @@ test('a text to copy by hand covers no button, and stays until it is closed', as
     page.locator('#tour').boundingBox(),
   ]);
   expect(text!.y + text!.height).toBeLessThanOrEqual(tour!.y);
-  await page.waitForTimeout(7000); // a note is gone by then
+  await page.waitForTimeout(7000); // longer than a note stays
   await expect(message).toBeVisible();
   await page.locator('#message-close').click();
   await expect(message).toBeHidden();
   await page.evaluate(() => delete (navigator.clipboard as Partial<Clipboard>).writeText);
 });
 
-test('where motion is not wanted, every step waits for a button', async ({ stage: page }) => {
+test('with reduced motion, every step waits for a button', async ({ stage: page }) => {
   await page.emulateMedia({ reducedMotion: 'reduce' });
   const count = await page.locator('.step').count();
   await visit(page, '#tour=1');
@@ -498,7 +497,7 @@ test('where motion is not wanted, every step waits for a button', async ({ stage
     if (step > 1) await page.getByRole('button', { name: 'Next' }).click();
     const state = () => page.evaluate(() => upswing.world.state);
     const hanging = { q1: 0, q2: 0, w1: 0, w2: 0 };
-    await expect.poll(state, `step ${step}`).toEqual(hanging); // when its agents are here
+    await expect.poll(state, `step ${step}`).toEqual(hanging); // once its agents have loaded
     await run(page, 1);
     expect(await state(), `step ${step}`).toEqual(hanging);
     const start = page.locator('#tour-start');
@@ -519,7 +518,7 @@ const SIZES = [
   [2560, 1300],
 ] as const;
 
-test('at any size pendulum, words, control and buttons are on one screen', async ({
+test('at any size, pendulum, words, control and buttons are on one screen', async ({
   stage: page,
 }) => {
   await visit(page);

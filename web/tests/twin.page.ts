@@ -2,9 +2,9 @@ import { expect } from '@playwright/test';
 import type { Page } from '@playwright/test';
 import { open, slide, startFrom, test } from './page';
 
-/// Two pendulums side by side: the same happens to both.
+/// Two pendulums side by side, with the same start and disturbances.
 
-/// Advances both, and returns where they are.
+/// Advances both, and returns their states.
 const run = (page: Page, seconds: number) =>
   page.evaluate((duration) => {
     const { world } = upswing;
@@ -17,12 +17,10 @@ const run = (page: Page, seconds: number) =>
     return { first: of(world), twin: of(world.twin!) };
   }, seconds);
 
-test('with the same agent they stay together to the bit, whatever happens to them', async ({
-  stage: page,
-}) => {
+test('with the same agent they stay together to the bit', async ({ stage: page }) => {
   await open(page, '#agent=fast&on=1');
   await startFrom(page, 0);
-  await run(page, 1).catch(() => {}); // the first one alone
+  await run(page, 1).catch(() => {}); // only the first one
   await page.getByLabel('Second agent').selectOption('fast');
   await expect(page.locator('#twin-scene')).toBeVisible();
   const together = async (seconds: number) => {
@@ -51,9 +49,7 @@ test('with the same agent they stay together to the bit, whatever happens to the
   expect(await page.evaluate(() => upswing.world.twin)).toBeNull();
 });
 
-test('a link brings both agents, and the adaptive one holds what the other cannot', async ({
-  stage: page,
-}) => {
+test('a link sets both agents, and only the adaptive one balances', async ({ stage: page }) => {
   await open(page, '#everything');
   await page.getByRole('link', { name: 'Light link' }).click();
   await expect(page.locator('#twin-name')).toHaveText('Adaptive Dueling Double DQN');
@@ -67,7 +63,7 @@ test('a link brings both agents, and the adaptive one holds what the other canno
   await expect(page.locator('#twin-badge')).toHaveText(/balanced for/);
 });
 
-test('a second agent that is not there is told', async ({ page }) => {
+test('a missing second agent is reported', async ({ page }) => {
   await open(page, '#agent=fast&twin=none');
   await expect(page.locator('#message')).toContainText('unknown agent "none"');
   await page.route(/ppo\.safetensors$/, (route) => route.fulfill({ status: 200, body: 'broken' }));
@@ -77,7 +73,7 @@ test('a second agent that is not there is told', async ({ page }) => {
   await expect(page.getByLabel('Second agent')).toHaveValue('');
 });
 
-test('at any size both are seen whole', async ({ stage: page }) => {
+test('at any size both are fully visible', async ({ stage: page }) => {
   await open(page, '#agent=fast&twin=sac');
   for (const [width, height] of [
     [320, 640],
@@ -85,7 +81,7 @@ test('at any size both are seen whole', async ({ stage: page }) => {
     [1440, 900],
   ] as const) {
     await page.setViewportSize({ width, height });
-    // What follows the size is laid out a frame later.
+    // Layout adapts to the size a frame later.
     await page.evaluate(async () => {
       for (let k = 0; k < 3; ++k) await new Promise(requestAnimationFrame);
     });

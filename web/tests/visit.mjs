@@ -17,7 +17,7 @@ const TYPES = {
   wasm: 'application/wasm',
 };
 
-/// Compresses what it serves, as servers on the web do.
+/// Compresses responses, as web servers do.
 function compress({ url }, response, next) {
   const path = new URL(url, 'http://localhost').pathname.replace(/\/$/, '/index.html');
   const file = join(outDir, path);
@@ -36,7 +36,7 @@ export async function serve() {
   return { address: server.resolvedUrls.local[0], close: () => server.close() };
 }
 
-/// Calls use(page) in a browser that has nothing cached, and returns what it returns.
+/// Calls use(page) in a browser with an empty cache, and returns its result.
 export async function visit(options, use) {
   const browser = await chromium.launch(launchOptions);
   const page = await browser.newPage(options);
@@ -45,7 +45,7 @@ export async function visit(options, use) {
   return result;
 }
 
-/// When the page has its agent and MuJoCo, too.
+/// Waits until the page has its agent and MuJoCo.
 export async function ready(page) {
   await page.waitForFunction(
     () => globalThis.upswing?.isComplete && !document.querySelector('fieldset:disabled'),

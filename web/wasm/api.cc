@@ -1,5 +1,5 @@
-// What the page calls: policies, formulas, learners. Objects are pointers, which the page deletes;
-// texts are UTF-8, most of them JSON. A call that fails returns 0 and leaves a line of text.
+// The page's interface to the core: policies, formulas, learners. Objects are pointers, which the
+// page deletes. Texts are UTF-8, most of them JSON. A failed call returns 0 and leaves a message.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -25,28 +25,28 @@ namespace {
 
 std::string text;               // result of the last call that returns a text
 std::vector<std::byte> bytes;   // result of the last call that returns a file
-std::array<double, 32> number;  // into and out of the formulas
+std::array<double, 32> number;  // input and output of the formulas
 
-/// Runs `work` and returns what it does; 0 if it throws, with the reason as the text.
+/// Returns the result of `work`; 0 if it throws, with the reason as the text.
 template <typename Work>
 auto Guarded(const Work& work) -> decltype(work()) {
   try {
     return work();
   } catch (const std::bad_alloc&) {
-    text = "it does not fit into the memory that a page has";
+    text = "it does not fit into a page's memory";
   } catch (const std::exception& error) {
     text = error.what();
   }
   return {};
 }
 
-/// A text for JavaScript; bytes of a file that are not UTF-8 are replaced.
+/// A text for JavaScript, with replacements for bytes that are not UTF-8.
 int SetText(const json& value) {
   text = value.dump(-1, ' ', false, json::error_handler_t::replace);
   return 1;
 }
 
-/// A policy and what deciding needs.
+/// A policy and its memory.
 struct Controller {
   explicit Controller(LoadedPolicy policy)
       : loaded(std::move(policy)),
@@ -54,14 +54,14 @@ struct Controller {
         memory(loaded.policy->Start(1)) {}
 
   bool gaussian() const { return learned != nullptr && !learned->parts().chooses_torque(); }
-  /// The torques (A, N·m) of which it takes one; none if it may take any.
+  /// The discrete torques (A, N·m); empty if torques are continuous.
   std::span<const double> torques() const {
     if (learned != nullptr) return learned->parts().torques;
     return {};
   }
-  /// How many numbers a decision has; see PolicyDecide.
+  /// Length of a decision; see PolicyDecide.
   size_t columns() const { return 2 + (gaussian() ? 4 : torques().size()); }
-  /// Whether it is made from the equations of motion, and may have plans.
+  /// Whether it is computed from the equations of motion, and may plan.
   bool computed() const { return learned == nullptr; }
   double self_check_error() const { return computed() ? 0 : learned->self_check().error; }
   double limit() const {
@@ -70,8 +70,8 @@ struct Controller {
   }
 
   LoadedPolicy loaded;
-  const NetworkPolicy* learned;            // null: it is computed
-  std::unique_ptr<Policy::Memory> memory;  // of what has no plans
+  const NetworkPolicy* learned;            // null: computed controller
+  std::unique_ptr<Policy::Memory> memory;  // of policies without plans
 };
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
@@ -104,19 +104,19 @@ Plant PlantAt(const double* values) {
   return plant;
 }
 
-/// The torque of a Q-network, V and Q.
+/// Torque, V and Q of a Q-network.
 void DecideByQ(const Controller& c, Matrix<const float> obs, Policy::Memory& memory,
                std::span<double> row) {
   std::vector<float> q(c.torques().size());
   c.learned->Act(obs, {row.data(), 1, 1}, memory);
   c.learned->Values(obs, {q.data(), 1, static_cast<int>(q.size())}, memory);
-  // Q = V + A - mean(A), so that V is their mean; a plain network has none.
+  // Q = V + A - mean(A), so V is the mean of Q. A plain network has no V.
   const double sum = std::accumulate(q.begin(), q.end(), 0.0);
   row[1] = c.learned->parts().shape.dueling() ? sum / static_cast<double>(q.size()) : kNone;
   std::ranges::copy(q, row.data() + 2);
 }
 
-/// The torque of an actor, V of its critic, and what it would draw while it learns.
+/// Torque and distribution of an actor, V of its critic.
 void DecideByActor(const Controller& c, Matrix<const float> obs, Policy::Memory& memory,
                    std::span<double> row) {
   std::vector<float> outputs(static_cast<size_t>(c.learned->num_outputs()));
@@ -147,7 +147,7 @@ UPSWING_EXPORT(bytes_size) size_t BytesSize() { return bytes.size(); }
 // ----------------------------------------------------------------------------------------------
 // Policies.
 
-/// Reads and checks a policy file. Leaves what it is as JSON.
+/// Reads and checks a policy file. Leaves its description as JSON.
 UPSWING_EXPORT(policy_open) Controller* PolicyOpen(const std::byte* file, size_t size) {
   return Guarded([&]() -> Controller* {
     const Tensors tensors = ReadSafetensors({file, file + size}, "the file");
@@ -180,8 +180,8 @@ UPSWING_EXPORT(policy_open) Controller* PolicyOpen(const std::byte* file, size_t
   });
 }
 
-/// The controller of this name (agents/controllers.h), made for the nominal plant. Leaves what it
-/// is.
+/// Designs a controller for the nominal plant by its name (agents/controllers.h). Leaves its
+/// description as JSON.
 UPSWING_EXPORT(policy_make) Controller* PolicyMake(const char* name, size_t size) {
   return Guarded([&] {
     const std::string called(name, size);
@@ -194,8 +194,8 @@ UPSWING_EXPORT(policy_make) Controller* PolicyMake(const char* name, size_t size
 
 UPSWING_EXPORT(policy_close) void PolicyClose(Controller* controller) { delete controller; }
 
-/// Begins an episode: what the policy remembers of it. 0 for one that was learned, which remembers
-/// nothing.
+/// Begins an episode and returns the policy's memory of it. 0 for learned policies, which have
+/// none.
 UPSWING_EXPORT(memory_open) Policy::Memory* MemoryOpen(const Controller* controller) {
   return Guarded([&]() -> Policy::Memory* {
     return controller->computed() ? controller->loaded.policy->Start(1).release() : nullptr;
@@ -204,9 +204,10 @@ UPSWING_EXPORT(memory_open) Policy::Memory* MemoryOpen(const Controller* control
 
 UPSWING_EXPORT(memory_close) void MemoryClose(Policy::Memory* memory) { delete memory; }
 
-/// What the policy makes of an observation (D): its torque; V, NaN where it estimates none; and
-/// then Q of each torque, or of an actor the probability of each torque, or the ends of the central
-/// 68% of a Gaussian (N·m), μ and ln σ. Without a memory, as at the beginning of an episode.
+/// The policy's decision about an observation (D): torque, V (NaN: not estimated), then the numbers
+/// of its kind. Q-network: Q of each torque. Categorical actor: each torque's probability. Gaussian
+/// actor: the ends of the central 68% (N·m), μ and ln σ. Without a memory, decides as at the
+/// beginning of an episode.
 UPSWING_EXPORT(policy_decide)
 int PolicyDecide(Controller* controller, Policy::Memory* episode, const float* obs, double* to) {
   return Guarded([&] {
@@ -224,12 +225,12 @@ int PolicyDecide(Controller* controller, Policy::Memory* episode, const float* o
     } else {
       DecideByQ(c, observation, memory, row);
     }
-    if (!std::isfinite(row[0])) row[0] = 0;  // numbers that overflowed on the way move nothing
+    if (!std::isfinite(row[0])) row[0] = 0;  // an overflow gives no torque
     return 1;
   });
 }
 
-/// How likely a Gaussian's actions are; see nn/gaussian.h.
+/// Probabilities of a Gaussian's actions; see nn/gaussian.h.
 UPSWING_EXPORT(gaussian_probabilities)
 void GaussianProbabilities(double mean, double log_std, int squashed, double* to, size_t count) {
   ActionProbabilities(Gaussian<double>::From(mean, log_std), squashed != 0, {to, count});
@@ -243,12 +244,12 @@ void ObservationRemember(const float* before, double torque, int steps, float* o
 }
 
 // ----------------------------------------------------------------------------------------------
-// The pendulum's formulas, from and to these numbers.
+// The pendulum's formulas. `number` is their input and output.
 
 UPSWING_EXPORT(numbers) double* Numbers() { return number.data(); }
 
-/// Of a plant (8), a state (4) and a torque: the observation (8), the energy, that upright, the
-/// normalised one, the tip's height, whether both links are inverted, the reward's terms (5).
+/// Input: plant (8), state (4), torque. Output: observation (8), energy, energy upright, normalised
+/// energy, tip height, whether both links are inverted, the reward's terms (5).
 UPSWING_EXPORT(pendulum_at) void PendulumAt() {
   const Plant plant = PlantAt(number.data());
   const PendulumState s{number[8], number[9], number[10], number[11]};
@@ -262,8 +263,8 @@ UPSWING_EXPORT(pendulum_at) void PendulumAt() {
   for (const double x : RewardTerms(plant, s, torque)) *to++ = x;
 }
 
-/// One physics step of a plant (8) in a state (4) under a torque and a push: link (0: none),
-/// distance from its hinge, and force along x and z. Leaves the state after it (4).
+/// One physics step. Input: plant (8), state (4), torque, and a push: link (0: none), distance from
+/// its hinge, force along x and z. Output: the state after it (4).
 UPSWING_EXPORT(pendulum_step) void PendulumStep() {
   const PendulumState before{number[8], number[9], number[10], number[11]};
   const Push push{static_cast<int>(number[13]), number[14], number[15], number[16]};
@@ -283,13 +284,13 @@ UPSWING_EXPORT(identifier_begin) void IdentifierBegin(Identifier* identifier) {
   identifier->Begin(0, {number[0], number[1], number[2], number[3]});
 }
 
-/// Learns from a measured state (4), the torque that acted in the control period before it, and the
-/// noise of Identifier::Update.
+/// Takes a measured state (4), the torque of the control period before it, and the noise of
+/// Identifier::Update.
 UPSWING_EXPORT(identifier_update) void IdentifierUpdate(Identifier* identifier) {
   identifier->Update(0, number[4], {number[0], number[1], number[2], number[3]}, number[5]);
 }
 
-/// Of a state (4): what the estimate adds to its observation (kIdentifiedSize).
+/// Input: state (4). Output: the estimate's part of its observation (kIdentifiedSize).
 UPSWING_EXPORT(identifier_observe) void IdentifierObserve(const Identifier* identifier) {
   std::array<float, kIdentifiedSize> added;
   identifier->Observe(0, {number[0], number[1], number[2], number[3]}, added);
@@ -309,8 +310,8 @@ UPSWING_EXPORT(sensors_begin) void SensorsBegin(Sensors* sensors) {
   sensors->Begin(0, {number[0], number[1], number[2], number[3]});
 }
 
-/// Of the state (4) at a control step, the torque in the control period before it, and a
-/// SensorModel (4): the measured state (4), Sensors::Torque and SensorModel::velocity_noise.
+/// Input: state (4) at a control step, torque of the control period before it, SensorModel (4).
+/// Output: measured state (4), Sensors::Torque and SensorModel::velocity_noise.
 UPSWING_EXPORT(sensors_measure) void SensorsMeasure(Sensors* sensors) {
   const PendulumState now{number[0], number[1], number[2], number[3]};
   const SensorModel model{number[5], number[6], number[7], number[8]};
@@ -320,20 +321,20 @@ UPSWING_EXPORT(sensors_measure) void SensorsMeasure(Sensors* sensors) {
                     number.begin());
 }
 
-/// Of a capsule's mass, radius and length: its inertia across and along.
+/// Input: a capsule's mass, radius and length. Output: its inertia across and along.
 UPSWING_EXPORT(capsule_inertia) void CapsuleInertiaOf() {
   const CapsuleInertia inertia(number[0], number[1], number[2]);
   number[0] = inertia.across;
   number[1] = inertia.along;
 }
 
-/// The model of a plant (8) as MJCF.
+/// Input: plant (8). Leaves the model as MJCF.
 UPSWING_EXPORT(pendulum_mjcf) void PendulumMjcf() { text = Mjcf(PlantAt(number.data())); }
 
 // ----------------------------------------------------------------------------------------------
 // Learners.
 
-/// Opens a learner with the program's settings, given as lines NAME=VALUE.
+/// Opens a learner with settings of the program as lines NAME=VALUE.
 UPSWING_EXPORT(learner_open) Learner* LearnerOpen(const char* settings, size_t size) {
   return Guarded([&] {
     std::vector<FlagValue> flags;
@@ -355,7 +356,7 @@ UPSWING_EXPORT(learner_run) int LearnerRun(Learner* learner, int most) {
   return Guarded([&] { return learner->Run(most) ? 1 : 2; });
 }
 
-/// Leaves the state of the training and its events since the last report as JSON.
+/// Leaves the training's progress and its events since the last report as JSON.
 UPSWING_EXPORT(learner_report) int LearnerReport(Learner* learner) {
   return Guarded([&] { return SetText(learner->Report()); });
 }
@@ -368,7 +369,7 @@ UPSWING_EXPORT(learner_policy) int LearnerPolicy(Learner* learner, int best) {
   });
 }
 
-/// Leaves q1 and q2 (rad) of each pendulum of the training as 32-bit floats.
+/// Leaves q1 and q2 (rad) of each training pendulum as 32-bit floats.
 UPSWING_EXPORT(learner_poses) int LearnerPoses(Learner* learner) {
   return Guarded([&] {
     bytes = learner->Poses();
@@ -376,8 +377,8 @@ UPSWING_EXPORT(learner_poses) int LearnerPoses(Learner* learner) {
   });
 }
 
-/// Leaves the settings of a named agent as JSON: name, value, range, whether it is a whole number,
-/// unit and help of each.
+/// Leaves the settings of a named agent as JSON: name, value, range, whether an integer, unit and
+/// help.
 UPSWING_EXPORT(agent_settings) int AgentSettings(const char* agent, size_t size) {
   return Guarded([&] {
     const Config config = ConfigOf({{"agent", {agent, size}, "agent"}});

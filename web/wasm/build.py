@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 """Compiles base, nn, pendulum, rl, control and agents to WebAssembly, for the page.
 
-    build.py [MODULE]     writes MODULE, by default core.wasm beside this file, and a record of what it
-                          was made of, by default core.txt
-    build.py --versions   of what its bytes depend on, besides our sources
-    build.py --check      says whether core.wasm is that of the sources, by the hashes of its record
+    build.py [MODULE]     writes MODULE, by default core.wasm next to this file, and a record of its
+                          sources and versions, by default core.txt
+    build.py --versions   prints the versions of compiler and libraries
+    build.py --check      compares core.wasm and the sources with the hashes of the record
 
-The compiler is Zig's clang, the C++ library that which comes with it as source, compiled here with
-exceptions, as files from strangers are refused by one. ./upswing test installs what it needs in
-build/deps. The same versions give the same bytes on any machine.
+The compiler is Zig's clang. Its C++ library is compiled here with exceptions, which refuse invalid
+files. ./upswing test installs both in build/deps. The same versions give the same bytes on any
+machine.
 """
 
 import hashlib
@@ -35,18 +35,19 @@ def pinned(name):
 ZIG = DEPS / f"zig-{pinned('zig')}"
 HIGHWAY = DEPS / f"highway-{pinned('highway')}"  # the version of NumPy that it comes with
 
-# Vectors of 128 bits, exceptions, and what every browser with those has.
+# Vectors of 128 bits, exceptions, and features of all browsers with those.
 TARGET = ["-target", "wasm32-wasi", "-mcpu=generic+simd128+exception_handling+bulk_memory"
           "+nontrapping_fptoint+sign_ext", "-fwasm-exceptions", "-fvisibility=hidden", "-DNDEBUG"]
 MEMORY = 512 << 20  # bytes at most; see learner.cc
 STACK = 1 << 20
 
 LAYERS = ["base", "nn", "pendulum", "rl", "control", "agents"]
-# Where the time of a training goes is made fast, everything else small.
+# Sources compiled for speed, because trainings spend their time there. All others are compiled for
+# size.
 FAST = ["nn/linear", "nn/product", "pendulum/closed_form", "control/trajectory", "control/pendulum_model", "rl/replay", "rl/sum_tree", "rl/n_step",
         "rl/sac_update"]
 
-# Of LLVM's libraries, what the module asks for.
+# The needed sources of LLVM's libraries.
 CXXABI = ["abort_message", "cxa_aux_runtime", "cxa_default_handlers", "cxa_exception",
           "cxa_exception_storage", "cxa_guard", "cxa_handlers", "cxa_personality", "cxa_virtual",
           "fallback_malloc", "private_typeinfo", "stdlib_exception", "stdlib_new_delete",
@@ -56,7 +57,7 @@ CXX = ["algorithm", "call_once", "charconv", "chrono", "error_category", "except
        "stdexcept", "string", "system_error", "variant", "vector", "verbose_abort",
        "ryu/d2s", "ryu/f2s", "filesystem/path"]
 
-# The tag by which throw and catch find each other, which clang expects of its run-time library.
+# The tag by which throw and catch find each other. Clang expects it in the run-time library.
 EXCEPTION_TAG = ".globl __cpp_exception\n.tagtype __cpp_exception i32\n__cpp_exception:\n"
 
 
@@ -71,7 +72,7 @@ def own_sources():
 
 
 def named_agents():
-    """What CMake makes of configs/*.toml."""
+    """The C++ source that CMake generates from configs/*.toml."""
     entries = "".join(f'    {{"{path.stem}", R"toml({path.read_text(encoding="utf-8")})toml"}},\n'
                       for path in sorted((ROOT / "configs").glob("*.toml")))
     template = (ROOT / "src/agents/named_agents.cc.in").read_text(encoding="utf-8")
@@ -84,7 +85,7 @@ def project_version():
 
 
 def versions():
-    """Name and version of what is compiled with our sources."""
+    """Names and versions of compiler and libraries."""
     def of(header, *names):
         path = Path("/usr/include") / header
         text = path.read_text(encoding="utf-8") if path.exists() else ""
@@ -101,7 +102,7 @@ def versions():
 
 
 def included(sources):
-    """The sources and our headers that they include, directly or not."""
+    """The sources and all headers of ours that they include."""
     found, left = set(), list(sources)
     while left:
         path = left.pop()
@@ -114,8 +115,7 @@ def included(sources):
 
 
 def sources_hash():
-    """SHA-256 of all that the module is made of: sources, headers, the named agents, the pinned versions
-    and this file, which holds the flags."""
+    """SHA-256 of the sources, headers, named agents, pinned versions, and this file with its flags."""
     text = hashlib.sha256()
     for path in [*included([*own_sources(), ROOT / "src/agents/named_agents.cc.in"]),
                  *sorted((ROOT / "configs").glob("*.toml")), Path(__file__).resolve()]:
@@ -132,7 +132,7 @@ def record(module):
 
 
 def recorded(module):
-    """The lines that stand beside a module."""
+    """The lines of the record next to a module."""
     return module.with_suffix(".txt").read_text(encoding="utf-8").splitlines()
 
 
@@ -142,7 +142,7 @@ def is_recorded(module):
 
 
 def run(program, *arguments):
-    """Zig, whose cache makes repeated compilations short."""
+    """Runs Zig with a cache, so that repeated compilations are short."""
     environment = os.environ | {"ZIG_LOCAL_CACHE_DIR": str(WORK / "cache"),
                                 "ZIG_GLOBAL_CACHE_DIR": str(WORK / "cache")}
     done = subprocess.run([ZIG / "zig", program, *map(str, arguments)], check=False, cwd=ROOT,
@@ -153,7 +153,7 @@ def run(program, *arguments):
 
 
 def compile_one(source, flags):
-    """Compiles to an object file, whose path is returned."""
+    """Compiles to an object file and returns its path."""
     relative = source.relative_to(ROOT) if source.is_relative_to(ROOT) else source
     name = str(relative).replace("/", "_")
     target = WORK / f"{name}.o"
@@ -161,7 +161,7 @@ def compile_one(source, flags):
     if source.suffix == ".s":
         run(program, *TARGET[:3], "-c", relative, "-o", target)
         return target
-    # Paths within the module, such as those of failed assertions, are the same anywhere.
+    # The same paths in the module on any machine, such as in failed assertions.
     maps = [f"-ffile-prefix-map={folder}={name}" for folder, name in
             ((ROOT, "."), (DEPS.resolve(), "deps"))]
     run(program, *TARGET, *maps, *flags, "-c", relative, "-o", target)
@@ -180,8 +180,8 @@ def jobs():
     agents.write_text(named_agents(), encoding="utf-8")
     tag = WORK / "exception_tag.s"
     tag.write_text(EXCEPTION_TAG, encoding="utf-8")
-    # Zig leaves files out of the C++ library's headers; what mentions them compiles with them, and
-    # is not linked.
+    # Zig leaves some headers out of the C++ library. Sources that mention them still compile, but
+    # are not linked.
     own = ["-std=c++20", "-Wall", "-Wextra", "-Wpedantic", "-ffp-contract=off",
            "-DTOML_FLOAT_CHARCONV=1", f'-DUPSWING_VERSION="{project_version()}"',
            "-U_LIBCPP_HAS_FILESYSTEM", "-D_LIBCPP_HAS_FILESYSTEM=1", *include(SOURCE, ROOT),
@@ -203,7 +203,7 @@ def jobs():
 
 
 def make(module):
-    """Writes the module, and beside it what it was made with."""
+    """Writes the module and its record."""
     for folder in (ZIG, HIGHWAY):
         if not folder.exists():
             sys.exit(f"build.py: {folder} is missing: ./upswing test installs it")

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""The page's module, web/wasm/core.wasm, is that of the sources.
+"""The page's module, web/wasm/core.wasm, is up to date.
 
-Its record, core.txt, holds a hash of the sources and one of the module. Where both are those of the
-files, nothing is compiled. Otherwise, and with UPSWING_COMPILE_WASM=1, the sources are compiled again
-and have to give the same bytes.
+Its record, core.txt, holds hashes of the sources and of the module. If both match, nothing is
+compiled. Otherwise, and with UPSWING_COMPILE_WASM=1, the sources are compiled again and must give
+the same bytes.
 
-A compilation is skipped where the compiler is missing (./upswing test installs it), and where another
-version of a library is installed than those in core.txt, which makes other bytes.
+The compilation is skipped if the compiler is missing (./upswing test installs it), or if the
+versions differ from core.txt.
 """
 
 import os
@@ -28,7 +28,7 @@ class Module(unittest.TestCase):
             again = Path(folder) / "core.wasm"
             build.make(again)
             self.assertTrue(again.read_bytes() == MODULE.read_bytes(),
-                            "web/wasm/core.wasm is not that of the sources: run web/wasm/build.py, "
+                            "web/wasm/core.wasm is out of date: run web/wasm/build.py, "
                             "and put the new module under version control")
             self.assertEqual(build.recorded(again), build.recorded(MODULE),
                              "web/wasm/core.txt is out of date: run web/wasm/build.py")
@@ -49,6 +49,6 @@ if __name__ == "__main__":
     if COMPILES and not (build.ZIG.exists() and build.HIGHWAY.exists()):
         sys.exit("skipped: the compiler is missing; ./upswing test installs it")
     if COMPILES and build.versions() != build.recorded(MODULE)[0]:
-        print(f"skipped: core.wasm is of {build.recorded(MODULE)[0]}, here are {build.versions()}")
+        print(f"skipped: core.wasm needs {build.recorded(MODULE)[0]}, found {build.versions()}")
         sys.exit()
     unittest.main()

@@ -1,6 +1,6 @@
-// Doubles with a given number of digits, and those of 2^53 and more in full: libc++ has tables of
-// 104 kB for them (ryu/d2fixed.cpp), a quarter of the module. This does the same by printf, so that
-// they are not linked.
+// Doubles with a given number of digits, and doubles from 2^53 on in full. libc++ has tables of 104
+// kB for them (ryu/d2fixed.cpp), a quarter of the module. This uses printf instead, so that the
+// tables are not linked.
 #include <algorithm>
 #include <array>
 #include <charconv>

@@ -9,11 +9,11 @@ namespace {
 
 using nlohmann::json;
 
-constexpr size_t kPage = 65536;              // bytes of WebAssembly's unit of memory
+constexpr size_t kPage = 65536;              // bytes of a page of WebAssembly's memory
 constexpr size_t kMemoryLimit = 512u << 20;  // bytes, the same as in build.py
 
 Config InClosedForm(std::vector<FlagValue> flags) {
-  // MuJoCo is not here to learn in, nor to judge.
+  // A page has no MuJoCo for training and evaluation.
   flags.push_back({"physics", kClosedForm.name});
   flags.push_back({"eval_physics", kClosedForm.name});
   return ConfigOf(flags);

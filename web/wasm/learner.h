@@ -8,29 +8,28 @@
 
 namespace upswing {
 
-/// The settings of a training that flags give. Throws BadInput as the program does, and for a
-/// model, as a page has no files.
+/// The settings of a training from flags. Throws BadInput as the program does, and for a model,
+/// because a page has no files.
 Config ConfigOf(const std::vector<FlagValue>& flags);
 
-/// A training that a page drives step by step and looks at in between.
+/// A training that a page runs in slices.
 class Learner : private TrainObserver {
  public:
-  /// With these settings, which begin with a named agent ("agent", "fast"). Physics are the closed
-  /// form, in training and evaluation. Throws BadInput as the program does.
+  /// `flags` begin with a named agent ("agent", "fast"). Training and evaluation use the closed
+  /// form. Throws BadInput as the program does.
   explicit Learner(const std::vector<FlagValue>& flags);
 
-  /// At most this many steps of all environments. False once the training is finished.
+  /// Makes at most `most` steps of all environments. False once the training is finished.
   bool Run(int most);
 
-  /// Where the training stands, and what has happened since the last call.
+  /// Progress, and events since the last call.
   nlohmann::json Report();
 
-  /// The policy as it stands; the best at an evaluation, empty until there is one. As files.
+  /// The current policy and the best evaluated one (empty: none yet), as files.
   std::vector<std::byte> policy() const;
   const std::vector<std::byte>& best() const { return best_; }
 
-  /// The pendulums of the training as they are now: q1 and q2 [rad] of each environment, as bytes
-  /// of 32-bit floats.
+  /// The training pendulums: q1 and q2 [rad] of each environment, as bytes of 32-bit floats.
   std::vector<std::byte> Poses() const;
 
  private:

@@ -1,4 +1,4 @@
-// Symbols as in pendulum/manipulator.h; Q1 and Q2 are the torques of a push at both joints (N·m).
+// Symbols as in pendulum/manipulator.h; Q1 and Q2 are a push's torques at both joints (N·m).
 #include "web/wasm/step.h"
 
 #include <algorithm>
@@ -9,11 +9,11 @@
 namespace upswing {
 namespace {
 
-/// From a link's hinge to a point along it, m. Positive angles turn it to -x.
+/// From a link's hinge to a point along it, m. A positive angle turns it to -x.
 struct Arm {
   Arm(double angle, double along) : x(-along * std::sin(angle)), z(-along * std::cos(angle)) {}
 
-  /// The torque (N·m) of a force at its end, positive as the joints' angles are.
+  /// The torque (N·m) of a force at its end; positive like the joints' angles.
   double Torque(const Push& push) const { return z * push.x - x * push.z; }
 
   double x, z;
@@ -21,7 +21,7 @@ struct Arm {
 
 double AngleOf(const PendulumState& s, int link) { return link == 1 ? s.q1 : s.q1 + s.q2; }
 
-/// What the pendulum is under during one step.
+/// The forces on the pendulum during one step.
 struct Forces {
   const Plant& plant;
   double tau;
@@ -37,7 +37,7 @@ struct Forces {
   }
 };
 
-/// The state after h seconds of these velocities and accelerations.
+/// The state after h seconds with these velocities and accelerations.
 PendulumState Plus(const PendulumState& s, double h, const std::array<double, 2>& w,
                    const std::array<double, 2>& a) {
   return {s.q1 + h * w[0], s.q2 + h * w[1], s.w1 + h * a[0], s.w2 + h * a[1]};

@@ -5,8 +5,8 @@ const LEFT = 42; // px
 const RIGHT = 42;
 const BOTTOM = 16;
 
-/// Return of the trials and success at evaluations over the steps of trainings, the chosen one in
-/// front, and where along it the stage is.
+/// Chart of trainings over their steps: returns of trials and success at evaluations. The chosen
+/// training is in front, with a mark at the policy on the stage.
 export class LearnChart {
   readonly canvas = new Canvas('learn-curve');
 
@@ -54,13 +54,14 @@ export class LearnChart {
   }
 }
 
-/// How many steps the chart shows. A recorded training was tested after its best policy, too.
+/// Length of the chart in steps. Includes the tests of a recorded training after its best policy.
 export function stepsOf(courses: readonly Course[]): number {
   const ends = courses.map(({ steps, evaluations }) => [steps, evaluations.at(-1)?.step ?? 0]);
   return Math.max(20_000, ...ends.flat());
 }
 
-/// The mean return of the trials that ended at each step: environments that begin together end so.
+/// Mean return of the trials that ended at the same step. Environments that begin together end
+/// together.
 function meansOf({ episodes }: Course): { step: number; value: number }[] {
   const ended = new Map<number, number[]>();
   for (const { step, return: value } of episodes)

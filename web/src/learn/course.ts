@@ -1,27 +1,27 @@
 import type { Curve } from '../view/charts';
 
-/// A policy along a training's way.
+/// A policy from some step of a training.
 export interface Checkpoint {
   step: number;
-  file: ArrayBuffer | (() => Promise<ArrayBuffer>); // which may have to be fetched
-  /// What had happened by then, if that is known.
+  file: ArrayBuffer | (() => Promise<ArrayBuffer>); // function: fetches the file
+  /// Counts up to this step, if known.
   after?: { trials: number; updates: number; seconds: number };
 }
 
-/// A training as it is drawn, and as one goes back and forth in it.
+/// A training as the chart draws it and the scrubber moves through it.
 export interface Course {
-  readonly name: string; // among those that are shown together
+  readonly name: string; // for the list of trainings
   readonly steps: number; // so far
   readonly running: boolean;
-  /// Of training, which the page calls trials; an attempt is one on the stage.
+  /// Episodes of the training, called trials on the page. (Attempts are those on the stage.)
   readonly episodes: readonly { step: number; return: number }[];
   readonly evaluations: readonly { step: number; success: number }[];
   readonly checkpoints: readonly Checkpoint[]; // the untrained policy first
   readonly newest: Checkpoint | null;
 }
 
-/// The training of an agent that comes with the page: what its evaluations said, and policies along the
-/// way, which are fetched when they are asked for, once.
+/// The recorded training of a shipped agent: its evaluations, and checkpoints, each fetched once
+/// when needed.
 export class Recording implements Course {
   readonly name: string;
   readonly running = false;
@@ -29,7 +29,7 @@ export class Recording implements Course {
   readonly evaluations: readonly { step: number; success: number }[];
   readonly checkpoints: readonly Checkpoint[];
 
-  /// `fetch` gets a file of that name.
+  /// `fetch` gets the file with a name.
   constructor(
     name: string,
     { step: steps, success_rate, mean_return }: Curve,
@@ -51,7 +51,7 @@ export class Recording implements Course {
   }
 }
 
-/// What `get` gets, got once unless it fails.
+/// Calls `get` once and keeps its result, unless it fails.
 function once<T>(get: () => Promise<T>): () => Promise<T> {
   let got: Promise<T> | null = null;
   return () => {

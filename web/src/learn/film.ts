@@ -6,15 +6,15 @@ const SIDE = 720; // px
 const TITLE = 80; // px, of the title below
 const TYPES = ['video/webm;codecs=vp9', 'video/webm', 'video/mp4'];
 
-/// The kind of film that this browser makes; undefined if it makes none.
+/// The format of films in this browser; undefined if it records none.
 export const filmType =
   typeof MediaRecorder === 'undefined'
     ? undefined
     : TYPES.find((type) => MediaRecorder.isTypeSupported(type));
 
-/// Films what a canvas shows about its `middle` for five seconds, and saves the film under this name, which
-/// gets an extension. Throws what the recorder throws.
-/// `middle` gives place and half the side of a square (px of the style sheet), `title` two lines below it.
+/// Films a square of a canvas for five seconds and saves the film as `name` with an extension.
+/// Throws the recorder's errors. `middle` gives the square's centre and half its side (px of the
+/// style sheet), `title` two lines below it.
 export async function film(
   canvas: Canvas,
   middle: () => { x: number; y: number; half: number },

@@ -11,8 +11,8 @@ const TRIES = 6;
 const SECONDS = 7; // of a try
 const STILL = { torque: 0, push: null, drag: null, shoved: null };
 
-/// Six tries of an agent on its way, each as one long exposure: from the untrained policy to the last, or to
-/// the best if the task is solved.
+/// Six tries of an agent during its training, each drawn like a long exposure: from the untrained
+/// policy to the last, or to the best one if the task is solved.
 export class Filmstrip {
   private readonly place = element('learn-strip');
   private readonly stage: World;
@@ -22,10 +22,10 @@ export class Filmstrip {
   private shown: Session | null = null;
   private pictures: (() => void)[] = [];
 
-  /// The strip takes another simulator of the stage's engine.
+  /// Moves to a new simulator of the stage's engine.
   constructor(stage: World) {
     this.stage = stage;
-    // A canvas is empty after its size has changed.
+    // Resizing clears a canvas.
     new ResizeObserver(() => requestAnimationFrame(() => this.repaint())).observe(this.place);
     onThemeChange(() => {
       for (const { canvas } of this.scenes) canvas.forgetColors();
@@ -46,7 +46,7 @@ export class Filmstrip {
     if (session) this.next(session, triesOf(session), 0);
   }
 
-  /// Draws one try, and the next when the page has had time for other things.
+  /// Draws one try, and the next one when the page is idle.
   private next(session: Session, tries: readonly Checkpoint[], i: number): void {
     const checkpoint = tries[i];
     if (!checkpoint || session !== this.shown) return;
@@ -97,7 +97,7 @@ export class Filmstrip {
   }
 }
 
-/// The untrained policy, four evenly on the way, and the one that it ended with.
+/// The untrained policy, four at even intervals, and the last one.
 function triesOf({ checkpoints, newest }: Session): Checkpoint[] {
   const last = checkpoints.length - 1;
   const some = Array.from(

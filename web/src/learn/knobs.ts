@@ -4,8 +4,7 @@ import { agentSettings } from './learner';
 import type { LearnSettings, Setting } from './learner';
 import { isSwitch } from './recipe';
 
-/// What can be changed of a training: some of the program's own settings, by their names there, with its
-/// ranges and its words.
+/// Inputs for settings of a training, with the program's names, ranges and help.
 
 const REWARD = [
   'energy_weight',
@@ -37,13 +36,13 @@ export class Knobs {
     this.place = place;
   }
 
-  /// What can be changed of one of the `LEARNERS`.
+  /// The settings that a visitor can change for one of the `LEARNERS`.
   settingsOf(agent: string): readonly Setting[] {
     const settings = agentSettings(core(), agent);
     return KNOBS[agent]!.map((name) => settings.get(name)!);
   }
 
-  /// Sets some of those that are shown, the others to the agent's own values.
+  /// Sets some of the shown settings; the others get the agent's own values.
   set(settings: LearnSettings): void {
     this.reset();
     for (const { input, setting } of this.inputs) {
@@ -54,7 +53,7 @@ export class Knobs {
     }
   }
 
-  /// Shows those of a named agent, at its own values.
+  /// Shows the settings of a named agent at its own values.
   show(agent: string): void {
     this.inputs = this.settingsOf(agent).map((setting) => ({ setting, input: inputOf(setting) }));
     this.place.replaceChildren(
@@ -75,7 +74,7 @@ export class Knobs {
     }
   }
 
-  /// Whether all values can be used; shows the first one that cannot, with the reason.
+  /// Whether all values are valid. Shows the reason for the first invalid one.
   check(): boolean {
     const wrong = this.inputs.find(({ input }) => !input.checkValidity())?.input;
     if (!wrong) return true;
@@ -85,7 +84,7 @@ export class Knobs {
     return false;
   }
 
-  /// Those that differ from the agent's own.
+  /// The settings that differ from the agent's own values.
   get changed(): LearnSettings {
     const values = this.inputs.map(({ input, setting }) => {
       const value = input.type === 'checkbox' ? String(input.checked) : input.value;

@@ -7,14 +7,14 @@ import { BadInput } from '../bad_input';
 import { agentSettings, Learner } from './learner';
 
 const newCore = async () => Core.start(await coreModule());
-/// Of the tensors of a policy's file: its header, of a length that its first bytes tell, lists the
-/// settings as well, which grow.
+/// The tensors of a policy file. The header before them also lists settings, whose number grows;
+/// the first bytes give its length.
 function hash(file: ArrayBuffer): string {
   const tensors = 8 + Number(new DataView(file).getBigUint64(0, true));
   return createHash('sha256').update(new Uint8Array(file, tensors)).digest('hex').slice(0, 16);
 }
 
-/// The policy after so many steps of 32 environments, made `slice` at a time.
+/// The policy after `steps` steps of 32 environments, `slice` at a time.
 function learned(host: Core, seed: number, steps: number, slice: number): ArrayBuffer {
   const learner = new Learner(host, 'fast', seed);
   for (let done = 0; done < steps; done += slice) expect(learner.run(slice)).toBe(true);
@@ -24,10 +24,10 @@ function learned(host: Core, seed: number, steps: number, slice: number): ArrayB
   return file;
 }
 
-// A whole training, in Node and in a browser, is in tests/learn.page.ts.
+// tests/learn.page.ts tests a whole training, in Node and in a browser.
 
-// That of this module, in any browser and in Node. A change of how agents learn, or of the compiler,
-// changes it, as it changes the fingerprints of the program.
+// Hash of a policy trained by this module, in any browser and in Node. It changes with the
+// algorithms and the compiler, like the fingerprints of the program.
 const FINGERPRINT = '40a898a704b8dcfe';
 
 test('the same seed gives the same bits: in another core, in other slices', async () => {
@@ -78,7 +78,7 @@ test('a training that diverges ends with a reason, and its core goes on', async 
   expect(new Learner(host, 'fast', 1).run(1)).toBe(true);
 });
 
-test('the settings of an agent, with what the program says of them', () => {
+test("the settings of an agent, with the program's descriptions", () => {
   const settings = agentSettings(core(), 'fast');
   expect(settings.get('learning_rate')).toMatchObject({ value: '0.002', low: 0, high: 10 });
   expect(settings.get('hidden')).toMatchObject({ value: '48,32' });

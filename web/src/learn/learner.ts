@@ -1,6 +1,6 @@
 import type { Core } from '../core';
 
-/// What the core says of a training, since the last report (web/wasm/learner.cc).
+/// Progress of a training since the last report (web/wasm/learner.cc).
 export interface Report {
   steps: number; // control steps, over all environments
   updates: number; // gradient steps
@@ -22,7 +22,7 @@ export class Learner {
   private readonly core: Core;
   private readonly learner: number;
 
-  /// `agent` names the settings that the others change. Throws BadInput.
+  /// `agent`: named agent with the defaults of the other settings. Throws BadInput.
   constructor(core: Core, agent: string, seed: number, settings: LearnSettings = {}) {
     this.core = core;
     const all = { agent, seed: String(seed), ...settings };
@@ -32,8 +32,8 @@ export class Learner {
     );
   }
 
-  /// At most so many steps of all environments; false once it is finished. Throws BadInput if
-  /// numbers are no longer finite.
+  /// Makes at most `steps` steps of all environments. False once the training is finished. Throws
+  /// BadInput if numbers are no longer finite.
   run(steps: number): boolean {
     return this.core.expect(this.core.exports.learner_run(this.learner, steps)) === 1;
   }
@@ -43,18 +43,18 @@ export class Learner {
     return JSON.parse(this.core.text) as Report;
   }
 
-  /// The policy as it stands, as a file.
+  /// The current policy, as a file.
   policy(): ArrayBuffer {
     return this.fileOf(0);
   }
 
-  /// The best policy at an evaluation; null until there is one.
+  /// The best evaluated policy; null before the first one.
   best(): ArrayBuffer | null {
     const file = this.fileOf(1);
     return file.byteLength > 0 ? file : null;
   }
 
-  /// Both angles (rad) of each pendulum that it trains with now: q1, q2, q1, q2 …
+  /// Both angles (rad) of each training pendulum: q1, q2, q1, q2 …
   poses(): Float32Array<ArrayBuffer> {
     this.core.expect(this.core.exports.learner_poses(this.learner));
     return new Float32Array(this.core.file);
@@ -74,9 +74,9 @@ export class Learner {
 export interface Setting {
   name: string;
   value: string;
-  low: number | null; // null: any number, or none
+  low: number | null; // null: unbounded, or not a number
   high: number | null;
-  whole: boolean; // numbers without a fraction only
+  whole: boolean; // integers only
   unit: string;
   help: string;
 }

@@ -18,12 +18,12 @@ import { Scrubber } from './scrubber';
 import type { LearnStage } from './scrubber';
 import { Session } from './session';
 
-/// An agent learns in this page, and the stage shows its attempts; or one goes through the training of the
-/// default agent, as it was recorded.
+/// The panel of a training. Its agent learns in this page while the stage shows its attempts. The
+/// recorded training of the default agent can be shown instead.
 
 const SEEDS_AT_ONCE = 4;
-/// What a trial of 4 s proves by bringing more than so much: a step brings 1.5 for energy and 1 for height
-/// at most, and 5 more only while both links are up.
+/// Smallest returns of a trial of 4 s that prove balancing. A step earns at most 1.5 for energy and
+/// 1 for height, and 5 more only while both links are up.
 const DOWN = (2.5 * 4) / CONTROL_PERIOD;
 const UP = 5 / CONTROL_PERIOD; // for a second
 const PROOFS = [
@@ -32,13 +32,13 @@ const PROOFS = [
   [DOWN, 'for a moment'],
 ] as const;
 
-/// How a training goes, in words.
+/// A training's progress in words.
 export interface Story {
-  readonly count: string; // with each news
+  readonly count: string; // changes with each report
   readonly milestone: string;
 }
 
-/// What the panel does with the page.
+/// The parts of the page that the panel uses.
 export interface LearnPage extends LearnStage {
   readonly agents: {
     readonly ownName: string | null;
@@ -46,11 +46,10 @@ export interface LearnPage extends LearnStage {
     recording(id: string): Recording | null;
   };
   readonly scene: Scene;
-  readonly agentTitle: string; // of the agent that was last chosen from the list
-  /// Hears when a training has begun.
+  readonly agentTitle: string; // of the agent last chosen from the list
+  /// Called when a training has begun.
   learned(): void;
-  /// Keeps a policy that was learned here as the visitor's own.
-  /// True if it is on the stage now.
+  /// Keeps a policy of a training as the visitor's own. True if it is on the stage now.
   keepLearned(file: File, shown: boolean): Promise<boolean>;
 }
 
@@ -65,13 +64,13 @@ export class LearnPanel {
   private readonly scrubber: Scrubber;
   private readonly strip: Filmstrip;
   private sessions: Session[] = [];
-  private recording: Recording | null = null; // if it was asked for
-  private readonly taken = new WeakSet<Session>(); // whose best policy has taken over
+  private recording: Recording | null = null; // null: not requested
+  private readonly taken = new WeakSet<Session>(); // policy taken over already
   private said = '';
-  private drawnOnStage = false; // whether the last drawing said that its agent is on the stage
+  private drawnOnStage = false; // whether the last drawing had its agent on the stage
   private scheduled = false;
 
-  /// `recorded` is the agent whose training can be gone through.
+  /// `recorded`: agent whose recorded training can be shown.
   constructor(page: LearnPage, recorded: string) {
     this.page = page;
     this.strip = new Filmstrip(page.world);
@@ -112,8 +111,8 @@ export class LearnPanel {
     new ResizeObserver(() => this.draw()).observe(this.chart.canvas.element);
   }
 
-  /// Starts a training with the chosen seed and settings; if one of these is wrong, says which, and what
-  /// learns goes on.
+  /// Starts a training with the chosen seed and settings. If a value is invalid, shows the reason
+  /// and lets the current training go on.
   start(): void {
     if (!this.knobs.check()) return;
     for (const session of this.sessions) session.stop();
@@ -128,8 +127,8 @@ export class LearnPanel {
     this.choose(this.sessions[0]!);
   }
 
-  /// Trains what an address asks for, if it asks for something else than what is there. Returns what it
-  /// does not understand.
+  /// Starts the training of an address, unless it is shown already. Returns the problems of the
+  /// address.
   open(hash: string): readonly string[] {
     const { recipe, problems } = decodeRecipe(hash, LEARNERS, (agent) =>
       this.knobs.settingsOf(agent),
@@ -146,7 +145,7 @@ export class LearnPanel {
     return problems;
   }
 
-  /// The shown training as the part of an address after #; without one, the view alone.
+  /// The shown training as the part of an address after #; without a training, only the view.
   get address(): string {
     return this.session ? encodeRecipe(this.session) : 'learn';
   }
@@ -157,7 +156,7 @@ export class LearnPanel {
     this.draw();
   }
 
-  /// How it goes: a count that runs, and the last milestone.
+  /// A running count, and the last milestone.
   get story(): Story {
     const { session } = this;
     if (!session || session.state === 'stopped') return { count: '', milestone: '' };
@@ -175,7 +174,7 @@ export class LearnPanel {
     return active.length > 0 && active.every(({ state }) => state === 'paused');
   }
 
-  /// Learns, pauses, resumes.
+  /// Starts, pauses or resumes.
   toggle(): void {
     const { active, paused } = this;
     if (active.length === 0) return this.start();
@@ -186,13 +185,13 @@ export class LearnPanel {
     this.draw();
   }
 
-  /// Whether what was learned since the page was opened is the visitor's own policy now.
+  /// Whether the visitor's own policy comes from the shown training.
   get keeps(): boolean {
     const { session, page } = this;
     return session !== null && this.taken.has(session) && page.agents.ownIsLearned;
   }
 
-  /// Puts what was learned, or is learning, on the stage again.
+  /// Puts the shown training's policy on the stage again.
   show(): void {
     const { course, onStage } = this.scrubber;
     if (course && !onStage) this.scrubber.take(course, !prefersStill());
@@ -209,7 +208,7 @@ export class LearnPanel {
     this.scrubber.leave();
   }
 
-  /// The pendulums that the shown training swings now: q1, q2 [rad] of each.
+  /// The pendulums of the shown training: q1, q2 [rad] of each.
   get ghosts(): ArrayLike<number> {
     const { session, scrubber } = this;
     return session?.running && scrubber.follows ? session.poses : [];
@@ -221,12 +220,12 @@ export class LearnPanel {
     if (this.scrubber.onStage !== this.drawnOnStage) this.draw();
   }
 
-  /// What can be shown.
+  /// The trainings in the list.
   private get courses(): readonly Course[] {
     return this.recording ? [...this.sessions, this.recording] : this.sessions;
   }
 
-  /// The training that is shown, if it is one of this page.
+  /// The shown training; null if it is the recording.
   private get session(): Session | null {
     const { course } = this.scrubber;
     return course instanceof Session ? course : null;
@@ -249,7 +248,7 @@ export class LearnPanel {
     this.page.learned();
   }
 
-  /// A training had news: drawn once a frame, however many there are.
+  /// Draws after reports, at most once a frame.
   private news(): void {
     if (this.scheduled) return;
     this.scheduled = true;
@@ -261,8 +260,8 @@ export class LearnPanel {
     });
   }
 
-  /// The best policy of a training that has solved the task stays on the stage and in this browser,
-  /// unless that would replace a file that the visitor brought.
+  /// Once a training has solved the task, keeps its best policy as the visitor's own, unless that
+  /// would replace a file that the visitor brought.
   private async takeOver(): Promise<void> {
     const { session, scrubber } = this;
     if (!session?.last?.solved || session.state !== 'finished' || this.taken.has(session)) return;
@@ -276,8 +275,8 @@ export class LearnPanel {
     if (shown) scrubber.again();
   }
 
-  /// Keeps the policy on the stage as the visitor's own; one that was brought is replaced only if the
-  /// visitor says so.
+  /// Keeps the policy on the stage as the visitor's own. Asks before it replaces a file that the
+  /// visitor brought.
   private async keep(): Promise<void> {
     const file = this.file();
     const { ownName, ownIsLearned } = this.page.agents;
@@ -287,7 +286,7 @@ export class LearnPanel {
     note('It stays in this browser. The lists of agents mark it with "(yours)".');
   }
 
-  /// The agent on the stage and how well it does, as a film's title.
+  /// A film's title: the agent on the stage and its success.
   private get title(): readonly [string, string] {
     const { session, scrubber, page } = this;
     const { course } = scrubber;
@@ -323,15 +322,15 @@ export class LearnPanel {
     if (file) saveFile(file, 'policy.safetensors');
   }
 
-  /// The policy on the stage; if that is not of this training, its newest.
+  /// The policy on the stage, or the training's newest one if another agent is there.
   private file(): File | null {
     const { session, scrubber } = this;
     const shown = this.isAtNewest ? session?.newest : scrubber.checkpoint;
     return session && shown ? fileOf(session, shown) : null;
   }
 
-  /// Whether numbers and file are those of the newest policy: it is followed, or the stage shows an agent
-  /// that is not of this training.
+  /// Whether numbers and file belong to the newest policy: it is followed, or another agent is on
+  /// the stage.
   private get isAtNewest(): boolean {
     return this.scrubber.follows || !this.scrubber.onStage;
   }
@@ -378,7 +377,7 @@ export class LearnPanel {
     this.sessions.forEach((other, i) => {
       if (outputs[i]) outputs[i].textContent = brief(other);
     });
-    // Not under the finger that moves it.
+    // A finger that drags the slider keeps it.
     if (!this.scrub.matches(':active')) {
       this.scrub.max = String(stepsOf(session ? this.sessions : [course]));
       this.scrub.value = String(this.isAtNewest ? course.steps : scrubber.step);
@@ -388,7 +387,7 @@ export class LearnPanel {
     this.say(session ? sentence(session) : OF_RECORDING);
   }
 
-  /// Of a training in this page as it is, or as it was at the step that is on the stage.
+  /// The numbers of a training: the latest ones, or at the step of the policy on the stage.
   private drawNumbers(course: Course): void {
     const write = (id: string, text: string) => (element(`learn-${id}`).textContent = text);
     const { session, scrubber } = this;
@@ -428,7 +427,7 @@ function fileOf({ agent, seed, newest, state }: Session, { file, step }: Checkpo
 const OF_RECORDING =
   'The default agent learned like this. Drag the line under the chart to see earlier versions.';
 
-/// The share of successes in the last test up to a step.
+/// The success rate of the last test up to a step.
 function successAt({ evaluations }: Course, at: number): number | undefined {
   return evaluations.findLast(({ step }) => step <= at)?.success;
 }
@@ -439,13 +438,13 @@ function brief({ state, last, seconds }: Session): string {
   return state === 'finished' ? 'not solved' : '';
 }
 
-/// How long a pendulum would have swung for so many steps of control.
+/// The simulated time of `steps` control steps.
 function swinging(steps: number): string {
   const minutes = (steps * CONTROL_PERIOD) / 60;
   return minutes < 1 ? 'less than a minute of swinging' : `${minutes.toFixed(0)} min of swinging`;
 }
 
-/// The last thing that happened for the first time.
+/// The most recent first success.
 function milestone(session: Session): string {
   const { state, episodes, evaluations, settings } = session;
   if (state !== 'starting' && state !== 'learning') return sentence(session);
@@ -454,7 +453,7 @@ function milestone(session: Session): string {
   if (most) return `It passes most of its tests: ${Math.round(100 * most.success)} of 100.`;
   const first = evaluations.find(({ success }) => success > 0);
   if (first) return `It passes its first tests: ${Math.round(100 * first.success)} of 100.`;
-  // With other weights of the reward a return says nothing of it.
+  // With other reward weights, returns prove nothing.
   if (Object.keys(settings).some((name) => name.endsWith('_weight'))) return 'Learning …';
   for (const [proof, long] of PROOFS) {
     const trial = episodes.findIndex((episode) => episode.return > proof);

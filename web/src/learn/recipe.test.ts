@@ -20,7 +20,7 @@ test('a recipe survives its address', () => {
   expect(decode(`#${encodeRecipe(recipe)}`)).toEqual({ recipe, problems: [] });
 });
 
-test('the view alone is no recipe', () => {
+test('an address with only the view is no recipe', () => {
   expect(decode('#learn')).toEqual({ recipe: null, problems: [] });
 });
 

@@ -1,11 +1,11 @@
 import { quoted } from '../text';
 import type { LearnSettings, Setting } from './learner';
 
-/// What makes a training: the same recipe grows the same agent, bit for bit, in any browser.
+/// A recipe gives the same agent, bit for bit, in any browser.
 export interface Recipe {
   agent: string;
   seed: number;
-  settings: LearnSettings; // those that differ from the agent's own
+  settings: LearnSettings; // only changes of the agent's own settings
 }
 
 export const LARGEST_SEED = 1e9;
@@ -15,9 +15,9 @@ export function encodeRecipe({ agent, seed, settings }: Recipe): string {
   return new URLSearchParams({ learn: agent, seed: String(seed), ...settings }).toString();
 }
 
-/// Reads such an address; null if it names none of the `agents` that can learn here. `settingsOf` gives the
-/// settings of an agent that a recipe may change. What is not understood is left out and reported in
-/// `problems`.
+/// Reads such an address. Null if it names none of the `agents` that can learn here. `settingsOf`
+/// returns the settings of an agent that a recipe may change. Reports invalid parts in `problems`
+/// and leaves them out.
 export function decodeRecipe(
   hash: string,
   agents: readonly string[],
@@ -47,7 +47,7 @@ export function decodeRecipe(
 
 const SEED = { name: 'seed', value: '1', low: 0, high: LARGEST_SEED, whole: true };
 
-/// Why a value does not fit a setting; empty if it does.
+/// Why a setting refuses a value; empty if it accepts it.
 function problemOf(
   setting: Pick<Setting, 'name' | 'value' | 'low' | 'high' | 'whole'>,
   text: string,
@@ -63,7 +63,7 @@ function problemOf(
   return `${name}: expected a ${whole ? 'whole ' : ''}number${range}, got ${quoted(text)}`;
 }
 
-/// Whether a setting's value is true or false, not a number.
+/// Whether a setting is true or false instead of a number.
 export function isSwitch(value: string): boolean {
   return value === 'true' || value === 'false';
 }

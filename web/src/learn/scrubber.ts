@@ -5,48 +5,48 @@ import { Policy } from '../policy';
 import type { World } from '../world';
 import type { Checkpoint, Course } from './course';
 
-const ATTEMPT = 8; // s, after which the next begins
-const HELD = 4; // s balanced, after which it does
+const ATTEMPT = 8; // s, longest attempt
+const HELD = 4; // s balanced, after which an attempt ends
 
-/// What learning does with the page.
+/// The parts of the page that the scrubber uses.
 export interface LearnStage {
   readonly world: World;
   setAgentOn(on: boolean): void;
-  /// From hanging.
+  /// Hangs the pendulum.
   reset(): void;
   readonly twin: { show(policy: Policy | null, name: string): void };
 }
 
-/// Which policy of a training is on the stage, where it makes one attempt after another: the newest, or an
-/// earlier one. Next to it stands the untrained one, if the visitor asks for it.
+/// Puts policies of a training on the stage, where each makes one attempt after another: the newest
+/// one, or an earlier one. The untrained policy can swing next to it.
 export class Scrubber {
   course: Course | null = null;
-  follows = true; // the newest
+  follows = true; // shows the newest policy, now and later
   step = 0; // of the policy on the stage
-  checkpoint: Checkpoint | null = null; // that policy, and what is known of it
+  checkpoint: Checkpoint | null = null; // the policy on the stage
   private readonly stage: LearnStage;
   private readonly onShown: () => void;
   private shown: Policy | null = null;
-  private given: Checkpoint | null = null; // what was last to be shown
-  private replaceable: Policy | null = null; // if that is on the stage, a newer one takes its place
+  private given: Checkpoint | null = null; // the last policy asked for
+  private replaceable: Policy | null = null; // while it is on the stage, a newer policy replaces it
   private untrained: Policy | null = null;
   private withUntrained = false;
   private attemptBegan = 0; // s, in the world's time
-  private requests = 0; // for policies; the last one counts
-  private untrainedRequests = 0; // likewise
+  private requests = 0; // to drop late answers
+  private untrainedRequests = 0; // to drop late answers
 
-  /// `onShown` hears when another policy is on the stage.
+  /// `onShown`: called when another policy is on the stage.
   constructor(stage: LearnStage, onShown: () => void) {
     this.stage = stage;
     this.onShown = onShown;
   }
 
-  /// Whether the agent on the stage is one of this training.
+  /// Whether a policy of this training is on the stage.
   get onStage(): boolean {
     return this.shown !== null && this.stage.world.policy === this.shown;
   }
 
-  /// Takes another training, and follows it from now on; its policy acts at once if it `moves`.
+  /// Shows another training and follows it. `moves`: its policy acts at once.
   take(course: Course, moves = true): void {
     this.course = course;
     this.given = null;
@@ -55,19 +55,19 @@ export class Scrubber {
     void this.showUntrained(this.withUntrained);
   }
 
-  /// Puts its policy back on the stage, where a copy has become the visitor's own agent.
+  /// Puts its policy back on the stage after a copy became the visitor's own agent.
   again(): void {
     const policy = this.follows ? this.course?.newest : this.checkpoint;
     if (policy) void this.show(policy);
   }
 
-  /// Leaves the stage to others until a policy is shown again.
+  /// Leaves the stage to others until the next policy is shown.
   leave(): void {
-    ++this.requests; // what is on its way does not arrive
+    ++this.requests; // drops the policy that is loading
     this.replaceable = null;
   }
 
-  /// Shows the policy that is newest, now and later.
+  /// Shows the newest policy, now and later.
   follow(moves = true): void {
     this.follows = true;
     const newest = this.course?.newest;
@@ -75,7 +75,7 @@ export class Scrubber {
     if (moves) this.restart();
   }
 
-  /// After news. If the visitor has chosen another agent meanwhile, that stays.
+  /// Call after reports. If the visitor has chosen another agent, that one stays.
   update(): void {
     const newest = this.course?.newest;
     if (this.untrained === null && this.withUntrained) void this.showUntrained(true);
@@ -83,7 +83,7 @@ export class Scrubber {
     if (this.stage.world.policy === this.replaceable) void this.show(newest);
   }
 
-  /// Puts the checkpoint that is nearest to a step on the stage; the last one is followed.
+  /// Shows the checkpoint nearest to a step. From the last one on, follows the training.
   to(step: number): void {
     const checkpoints = this.course?.checkpoints ?? [];
     const last = checkpoints.at(-1);
@@ -106,7 +106,7 @@ export class Scrubber {
     if (next) this.to(next.step);
   }
 
-  /// At each frame: the next attempt begins when one has ended.
+  /// Call at each frame. Begins the next attempt when one has ended.
   attempt(): void {
     const { world } = this.stage;
     if (!this.course || !this.onStage) return;
@@ -118,7 +118,7 @@ export class Scrubber {
     this.stage.reset();
   }
 
-  /// Whether the untrained policy is shown next to the other.
+  /// Shows or hides the untrained policy next to the other.
   async showUntrained(wanted: boolean): Promise<void> {
     this.withUntrained = wanted;
     const request = ++this.untrainedRequests;
@@ -139,7 +139,7 @@ export class Scrubber {
     if (file instanceof ArrayBuffer) return this.put(new Policy(file), checkpoint);
     const { policy: before } = world;
     const policy = await policyOf({ step, file });
-    // Unless another one was asked for meanwhile.
+    // Dropped if another policy was requested while this one loaded.
     if (policy && request === this.requests && world.policy === before)
       this.put(policy, checkpoint);
     else policy?.controller.close();
@@ -163,7 +163,7 @@ export class Scrubber {
   }
 }
 
-/// Null, and a message, if it is not there or is none.
+/// Null, with a message, if it is missing or invalid.
 async function policyOf({ step, file }: Checkpoint): Promise<Policy | null> {
   try {
     return new Policy(file instanceof ArrayBuffer ? file : await file());

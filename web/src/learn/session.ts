@@ -4,9 +4,9 @@ import type { Checkpoint, Course } from './course';
 import type { News, Order } from './worker';
 
 const APART = 1500; // steps between checkpoints, at first
-const MOST = 64; // checkpoints; beyond that every other one goes
+const MOST = 64; // checkpoints; when reached, every other one is removed
 
-/// A training in a worker of its own, and what has become known of it.
+/// A training in its own worker, with its results.
 export class Session implements Course {
   readonly name: string;
   readonly agent: string;
@@ -18,16 +18,16 @@ export class Session implements Course {
   readonly episodes: { step: number; return: number }[] = [];
   readonly evaluations: { step: number; success: number; return: number }[] = [];
   checkpoints: Checkpoint[] = [];
-  policy: ArrayBuffer | null = null; // as it stands
-  best: ArrayBuffer | null = null; // at an evaluation
-  poses: Float32Array = new Float32Array(); // q1, q2 (rad) of each pendulum that it trains with
+  policy: ArrayBuffer | null = null; // latest one
+  best: ArrayBuffer | null = null; // best evaluated one
+  poses: Float32Array = new Float32Array(); // q1, q2 (rad) of each training pendulum
   updatesPerSecond = 0; // lately, evaluations included
-  seconds = 0; // of the worker, since it began, without pauses
+  seconds = 0; // of the worker, without pauses
   private apart = APART;
   private readonly worker: Worker;
   private readonly onNews: () => void;
 
-  /// `onNews` is called whenever something has changed.
+  /// `onNews`: called after each change.
   constructor(agent: string, seed: number, settings: LearnSettings, onNews: () => void) {
     this.name = `seed ${seed}`;
     this.agent = agent;
@@ -47,7 +47,7 @@ export class Session implements Course {
     return this.state === 'starting' || this.state === 'learning';
   }
 
-  /// Whether it learns, or will when it is resumed.
+  /// Whether it learns or is paused.
   get active(): boolean {
     return this.running || this.state === 'paused';
   }
@@ -56,7 +56,7 @@ export class Session implements Course {
     return this.last?.steps ?? 0;
   }
 
-  /// The policy as it stands; once the task is solved, the best.
+  /// The latest policy; once the task is solved, the best one.
   get newest(): Checkpoint | null {
     if (this.best && this.last?.solved) return { step: this.last.bestStep, file: this.best };
     return this.policy && { step: this.steps, file: this.policy };
@@ -74,7 +74,7 @@ export class Session implements Course {
     this.tell({ kind: 'resume' });
   }
 
-  /// Ends it; what is known stays.
+  /// Ends the training; its results stay.
   stop(): void {
     if (this.active) this.state = 'stopped';
     this.worker.terminate();

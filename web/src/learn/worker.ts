@@ -2,10 +2,10 @@ import { Core } from '../core';
 import { Learner } from './learner';
 import type { LearnSettings, Report } from './learner';
 
-/// Learns in a thread of its own, in slices, and tells of each.
+/// Learns in its own thread, in slices, and reports its progress.
 
-const SLICE = 30; // ms, after which messages are heard
-const TELL = 200; // ms between snapshots of the policy
+const SLICE = 30; // ms between checks for messages
+const REPORT_INTERVAL = 200; // ms between snapshots of the policy
 
 export type Order =
   | {
@@ -23,27 +23,27 @@ export type News =
       report: Report;
       policy: ArrayBuffer;
       best: ArrayBuffer | null;
-      seconds: number; // since it began, evaluations included, pauses not
+      seconds: number; // including evaluations, without pauses
     }
-  | { kind: 'poses'; poses: Float32Array<ArrayBuffer> } // of the pendulums: q1, q2 of each (rad)
+  | { kind: 'poses'; poses: Float32Array<ArrayBuffer> } // q1, q2 of each pendulum (rad)
   | { kind: 'failed'; reason: string };
 
 let learner: Learner | null = null;
 let paused = false;
 let scheduled = false;
-let told = 0; // ms, when it last told
-let ran = 0; // ms, before it was last paused
-let resumed = 0; // ms, when it last began or was resumed
+let reportedAt = 0; // ms, time of the last report
+let ranBefore = 0; // ms, before the last pause
+let resumedAt = 0; // ms, time of the start or the last resumption
 let bestStep = 0;
 
-function tell(): void {
+function sendReport(): void {
   const report = learner!.report();
   const policy = learner!.policy();
-  // The best one only when there is a new one.
+  // The best policy, only when it is a new one.
   const best = report.bestStep > bestStep ? learner!.best() : null;
   bestStep = report.bestStep;
-  told = performance.now();
-  const seconds = (ran + told - resumed) / 1000;
+  reportedAt = performance.now();
+  const seconds = (ranBefore + reportedAt - resumedAt) / 1000;
   send({ kind: 'report', report, policy, best, seconds }, best ? [policy, best] : [policy]);
 }
 
@@ -56,7 +56,7 @@ function send(news: News, transfer: Transferable[] = []): void {
   postMessage(news, { transfer });
 }
 
-/// A slice, and then the next, until the training ends or is paused.
+/// Trains for a slice and schedules the next, until the training ends or is paused.
 function work(): void {
   scheduled = false;
   if (!learner || paused) return;
@@ -64,7 +64,7 @@ function work(): void {
     const begin = performance.now();
     let more = true;
     while (more && performance.now() - begin < SLICE) more = learner.run(4);
-    if (!more || performance.now() - told >= TELL) tell();
+    if (!more || performance.now() - reportedAt >= REPORT_INTERVAL) sendReport();
     if (more) show();
     if (more) schedule();
     else end();
@@ -95,15 +95,15 @@ function schedule(): void {
 onmessage = async ({ data }: MessageEvent<Order>): Promise<void> => {
   if (data.kind !== 'start') {
     paused = data.kind === 'pause';
-    if (paused) ran += performance.now() - resumed;
-    else resumed = performance.now();
+    if (paused) ranBefore += performance.now() - resumedAt;
+    else resumedAt = performance.now();
     return schedule();
   }
   const { module, agent, seed, settings } = data;
   try {
     learner = new Learner(await Core.start(module), agent, seed, settings);
-    resumed = performance.now();
-    tell();
+    resumedAt = performance.now();
+    sendReport();
   } catch (error) {
     return fail(error);
   }

@@ -2,28 +2,29 @@ import { copy } from './clipboard';
 
 const DELAY = 300; // ms: browsers refuse an address that changes with each pixel of a slider
 
-/// The page's address with this behind the #.
+/// The page's address with `hash` after the #.
 export function addressOf(hash: string): string {
   return new URL(`#${hash}`, location.href).href;
 }
 
-/// Keeps the address what the page shows, so that it can be shared at any time.
+/// Updates the address as the page changes, so that it can be shared at any time.
 export class Address {
   private readonly hash: () => string;
   private timer = 0;
 
-  /// `hash` tells what belongs behind the #.
+  /// `hash` returns the part after the #.
   constructor(hash: () => string) {
     this.hash = hash;
   }
 
-  /// After something changed that it tells.
+  /// Call after a change of that part.
   changed(): void {
     clearTimeout(this.timer);
     this.timer = window.setTimeout(() => this.write(), DELAY);
   }
 
-  /// A link with this behind the #, to the clipboard or on the screen; `without` says what it leaves out.
+  /// Copies a link with `hash` after the #, or shows it. `without`: what the link leaves out, in
+  /// words.
   share(hash: string, without: string): Promise<void> {
     return copy(addressOf(hash), `The link${without}`);
   }

@@ -6,26 +6,26 @@ import { element } from './dom';
 import { hideMessage, warn } from './message';
 import { onThemeChange } from './theme';
 
-const NAME = 40; // characters, of a file that is refused
+const NAME = 40; // characters of a refused file's name
 
-/// Who hears what happens in the panel.
+/// Callbacks of the panel.
 export interface AgentListener {
   /// Another agent has been loaded.
   took(agent: Agent): void;
-  /// The list of agents may be another one.
+  /// The list of agents may have changed.
   listed(): void;
   /// The visitor has brought a file.
   brought(file: File): void;
 }
 
-/// The agent on the stage: its choice, what is said of it, and a visitor's own file.
+/// The choice of the agent on the stage, its description, and the visitor's own file.
 export class AgentPanel {
   agent: Agent | null = null;
   private readonly agents: Agents;
   private readonly listener: AgentListener;
   private readonly curve = new LearningCurve();
-  private requests = 0; // the last one counts
-  /// Whether an agent is on its way.
+  private requests = 0; // to drop late answers
+  /// Whether an agent is loading.
   busy = false;
 
   constructor(agents: Agents, listener: AgentListener) {
@@ -33,7 +33,7 @@ export class AgentPanel {
     this.listener = listener;
   }
 
-  /// Hears the visitor.
+  /// Listens to the panel's controls and to dropped files.
   listen(): void {
     const select = element<HTMLSelectElement>('agent');
     select.addEventListener('change', () => void this.choose(select.value));
@@ -56,25 +56,26 @@ export class AgentPanel {
     new ResizeObserver(() => this.drawCurve()).observe(this.curve.canvas.element);
   }
 
-  /// Changes to another agent; if it cannot be loaded, says why, keeps the old one and returns false.
+  /// Changes to another agent. If it cannot be loaded, shows the reason, keeps the old one and
+  /// returns false.
   choose(id: string): Promise<boolean> {
     return this.load(() => this.agents.get(id), `Agent ${quoted(id)} cannot be used`);
   }
 
-  /// The same with a visitor's own file, or one that the page has `learned`.
+  /// The same with a visitor's own file, or a policy `learned` in the page.
   open(file: File, learned: boolean): Promise<boolean> {
     const refusal = `"${printable(file.name, NAME)}" cannot be used as a policy`;
     return this.load(() => this.agents.open(file, learned), refusal);
   }
 
-  /// `refusal` is what to say before the reason.
+  /// `refusal`: begins the message of a failure.
   private async load(get: () => Promise<Agent>, refusal: string): Promise<boolean> {
     const request = ++this.requests;
     element('agent-what').textContent = 'Loading …';
     this.busy = true;
     try {
       const agent = await get();
-      if (request !== this.requests) return false; // another was asked for meanwhile
+      if (request !== this.requests) return false; // a later request replaced it
       this.agent = agent;
       this.busy = false;
       hideMessage();
@@ -91,7 +92,7 @@ export class AgentPanel {
     return true;
   }
 
-  /// Shows the list of agents, and what there is to say of the one on the stage.
+  /// Shows the list of agents, and the description of the one on the stage.
   show(): void {
     const { agent, agents } = this;
     const select = element<HTMLSelectElement>('agent');

@@ -22,14 +22,14 @@ test('an entry needs ID, file and agent', () => {
   }
 });
 
-test('a command is shown only where a shell takes it for one', () => {
+test('only a single shell command is shown', () => {
   const commandOf = (command: unknown) => parseEntry({ ...ENTRY, command })!.command;
   expect(commandOf('./upswing train --seed 1')).toBe('./upswing train --seed 1');
   expect(commandOf('./upswing train; id')).toBeNull();
   expect(commandOf(7)).toBeNull();
 });
 
-test('policies along the way are there only if they can be', () => {
+test('invalid checkpoints are left out', () => {
   const way = [
     { step: 0, file: 'a-at-0.safetensors' },
     { step: 20, file: 'a.safetensors' },
@@ -50,7 +50,7 @@ test('policies along the way are there only if they can be', () => {
   }
 });
 
-test('a learning curve is drawn only if it is one', () => {
+test('an invalid learning curve is left out', () => {
   expect(parseCurve(CURVE)).toEqual(CURVE);
   for (const curve of [
     undefined,

@@ -11,7 +11,7 @@ import { OWN } from './share';
 import { forgetFile, recallFile, rememberFile } from './storage';
 import type { KeptFile } from './storage';
 
-/// The agents that the page comes with, and the one that a visitor brings.
+/// The agents of the page and the visitor's own one.
 
 const LIST = 'agents/agents.json';
 const MAX_NAME = 200; // characters, of an ID, a file, an agent
@@ -25,7 +25,7 @@ interface Entry {
   agent: string;
   command: string | null;
   curve: Curve | null;
-  checkpoints: CheckpointFile[]; // policies on the way to it, and it
+  checkpoints: CheckpointFile[]; // policies during its training, ending with its own
 }
 
 interface CheckpointFile {
@@ -36,8 +36,8 @@ interface CheckpointFile {
 export interface Agent {
   id: string;
   title: string;
-  what: string; // it is and can, in plain words
-  text: string; // of its network
+  what: string; // description in plain words
+  text: string; // description of its network
   command: string | null;
   curve: Curve | null;
   policy: Policy;
@@ -57,7 +57,7 @@ const TITLES = new Map([
   ['ppo-discrete', 'PPO: one of some torques'],
 ]);
 
-/// What those that come with the page are, in plain words.
+/// Descriptions of the page's agents, in plain words.
 const CAN = 'It swings up and balances the pendulum that it learned with.';
 const PLAIN: ReadonlyMap<string, string> = new Map([
   [
@@ -89,7 +89,7 @@ const PLAIN: ReadonlyMap<string, string> = new Map([
   ['ppo', `It learned by trial, from its latest trials only, and may use any torque. ${CAN}`],
 ]);
 
-/// Controllers that are made from the equations of motion (docs/controllers.md): title, and how they act.
+/// Controllers computed from the equations of motion (docs/controllers.md): title and description.
 const COMPUTED: ReadonlyMap<string, readonly [string, string]> = new Map([
   [
     'lqr',
@@ -121,13 +121,13 @@ const COMPUTED: ReadonlyMap<string, readonly [string, string]> = new Map([
 const NOT_LEARNED =
   'Not learned, but computed from the equations of motion of the unchanged pendulum.';
 
-/// A title for an entry: that of its agent, and its ID if that says more.
+/// An entry's title: its agent, and its ID if that differs.
 function titleOf({ id, agent }: Entry): string {
   const title = TITLES.get(agent) ?? printable(agent);
   return id === agent ? title : `${title}, ${printable(id)}`;
 }
 
-/// The same of any policy, of which it is not known what it can.
+/// A description of any policy, in plain words.
 function plainly({ controller }: Policy, agent: string): string {
   const { strongest } = controller;
   return (
@@ -155,7 +155,7 @@ function isNumbers(value: unknown): value is number[] {
   return Array.isArray(value) && value.length <= MAX_ROWS && value.every(Number.isFinite);
 }
 
-/// Evaluations of a training; null if they are not what they should be.
+/// A training's evaluations; null if they are invalid.
 export function parseCurve(value: unknown): Curve | null {
   const { step, success_rate, mean_return } = (value ?? {}) as Partial<Record<string, unknown>>;
   if (!isNumbers(step) || !isNumbers(success_rate) || !isNumbers(mean_return)) return null;
@@ -166,7 +166,7 @@ export function parseCurve(value: unknown): Curve | null {
   return rises && shares ? { step, success_rate, mean_return } : null;
 }
 
-/// Policies along a training's way; none if they are not what they should be.
+/// A training's checkpoints; none if they are invalid.
 function parseCheckpoints(value: unknown): CheckpointFile[] {
   if (!Array.isArray(value) || value.length > MAX_CHECKPOINTS) return [];
   const list = value.map((one) => (one ?? {}) as Partial<Record<keyof CheckpointFile, unknown>>);
@@ -183,12 +183,12 @@ function isName(text: unknown): text is string {
   return typeof text === 'string' && text !== '' && text.length <= MAX_NAME;
 }
 
-/// An entry of the list, of which nothing but ID, file and agent must be there; null if it is none.
+/// A list entry; null if ID, file or agent is missing. All others are optional.
 export function parseEntry(value: unknown): Entry | null {
   const given = (value ?? {}) as Partial<Record<keyof Entry, unknown>>;
   const { id, file, agent, command } = given;
   if (!isName(id) || !isName(file) || !isName(agent) || id === OWN) return null;
-  // A line that a shell would take for more than one command is not shown for pasting.
+  // Only a single command line is shown for pasting.
   const shown = typeof command === 'string' && isCommand(command) ? command : null;
   const curve = parseCurve(given.curve);
   return {
@@ -205,14 +205,14 @@ export class Agents {
   private readonly entries: Map<string, Entry>;
   private readonly loaded = new Map<string, Agent>();
   private readonly underWay = new Map<string, Promise<Agent>>();
-  private own: KeptFile | null; // what the visitor brought, now or at an earlier visit
+  private own: KeptFile | null; // the visitor's own policy, perhaps from an earlier visit
 
   private constructor(entries: Entry[], own: KeptFile | null) {
     this.entries = new Map(entries.map((entry) => [entry.id, entry]));
     this.own = own;
   }
 
-  /// Reads the list of agents, and what this browser keeps. Throws BadInput.
+  /// Reads the list of agents and the policy kept in this browser. Throws BadInput.
   static async fetch(): Promise<Agents> {
     const [bytes, own] = await Promise.all([fetchBytes(LIST, MAX_FILE_BYTES), recallFile(OWN)]);
     try {
@@ -235,12 +235,12 @@ export class Agents {
     return this.own ? [...list, { id: OWN, title: ownTitle(this.own) }] : list;
   }
 
-  /// Whether an agent is here already.
+  /// Whether an agent is loaded.
   isHere(id: string): boolean {
     return this.loaded.has(id);
   }
 
-  /// Whether there is an agent of this id.
+  /// Whether an agent has this ID.
   has(id: string): boolean {
     return this.entries.has(id) || COMPUTED.has(id) || (id === OWN && this.own !== null);
   }
@@ -250,14 +250,14 @@ export class Agents {
     return this.own && printable(this.own.name);
   }
 
-  /// Fetches and checks the policy when it is asked for the first time. Throws BadInput.
+  /// Fetches and checks a policy at its first use. Throws BadInput.
   async get(id: string): Promise<Agent> {
     const known = this.loaded.get(id);
     if (known) return known;
     if (id === OWN && this.own) return this.addOwn(this.own);
     const entry = this.entries.get(id);
     if (!entry) return this.make(id);
-    // Asked for twice, it is fetched once.
+    // Requests at the same time share one fetch.
     const fetched = this.underWay.get(id) ?? this.fetchAgent(entry);
     this.underWay.set(id, fetched);
     return fetched.finally(() => this.underWay.delete(id));
@@ -273,7 +273,7 @@ export class Agents {
     });
   }
 
-  /// One that is computed. Throws BadInput.
+  /// Designs a controller. Throws BadInput.
   private make(id: string): Agent {
     const computed = COMPUTED.get(id);
     if (!computed) throw new BadInput(`there is no agent ${quoted(id)}`);
@@ -284,20 +284,20 @@ export class Agents {
     return this.add({ id, title, what, text: describe(policy), command, curve: null, policy });
   }
 
-  /// How an agent that comes with the page became what it is; null where that is not known.
+  /// The recorded training of a shipped agent; null if it has none.
   recording(id: string): Recording | null {
     const entry = this.entries.get(id);
     if (!entry?.curve || entry.checkpoints.length === 0) return null;
     return new Recording(titleOf(entry), entry.curve, entry.checkpoints, fetchPolicy);
   }
 
-  /// Whether the page itself has learned it.
+  /// Whether the visitor's own policy was learned in the page.
   get ownIsLearned(): boolean {
     return this.own?.learned ?? false;
   }
 
-  /// Reads and checks a visitor's file, or one that the page has `learned`, and keeps it in this browser
-  /// for the next visit, if that is allowed. Throws BadInput.
+  /// Reads and checks a visitor's file, or a policy `learned` in the page. Keeps it in this browser
+  /// for the next visit, if allowed. Throws BadInput.
   async open(file: File, learned = false): Promise<Agent> {
     if (file.size > MAX_FILE_BYTES) throw new BadInput(`it is ${largerThan(MAX_FILE_BYTES)}`);
     const bytes = await file.arrayBuffer().catch(() => {
@@ -310,7 +310,7 @@ export class Agents {
     return agent;
   }
 
-  /// Removes the visitor's own policy, from this browser too.
+  /// Removes the visitor's own policy, also from this browser.
   async forgetOwn(): Promise<void> {
     this.own = null;
     this.loaded.delete(OWN);

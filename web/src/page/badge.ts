@@ -2,11 +2,11 @@ import type { World } from '../world';
 import { situation } from './dashboard';
 import { element, write } from './dom';
 
-/// What the pendulum does, in words: over it, and read out when it changes.
+/// The pendulum's state in words, over it and for screen readers.
 export class Badge {
   private announced = '';
 
-  /// True when it has become balanced.
+  /// Shows the state. True when the pendulum has just become balanced.
   draw(world: World, paused: boolean, scene: HTMLElement): boolean {
     const { state, text } = situation(world);
     const badge = element('badge');
@@ -14,7 +14,7 @@ export class Badge {
     write(badge, !paused ? text : moving ? 'paused' : `paused, ${text}`);
     badge.dataset.state = state;
     if (state === this.announced) return false;
-    // Not at each tenth of a second.
+    // Announced when the state changes, not at each tenth of a second.
     this.announced = state;
     const words = state === 'balanced' ? 'balanced' : text;
     element('live').textContent = words;

@@ -1,6 +1,6 @@
 import { note, showText } from './message';
 
-/// Copies a text and says what is `copied`; shows the text where the browser refuses.
+/// Copies a text and confirms it as `copied`. Shows the text where the browser refuses.
 export async function copy(text: string, copied: string): Promise<void> {
   try {
     await navigator.clipboard.writeText(text);

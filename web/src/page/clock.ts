@@ -4,11 +4,11 @@ import type { World } from '../world';
 
 const LONGEST_FRAME = 0.1; // s: a tab that comes back does not jump
 
-/// Advances the world with real time, or slower, or faster.
+/// Advances the world in real time, slower or faster.
 export class Clock {
   speed = 1;
   private readonly world: World;
-  private due = 0; // physics steps that should have been made, with a fraction
+  private due = 0; // physics steps not yet made, with a fraction
   private before: State;
   private twinBefore: State | null = null;
 
@@ -39,12 +39,12 @@ export class Clock {
     this.twinBefore = this.world.twin?.state ?? null;
   }
 
-  /// Where the pendulum is between two physics steps, so that slow motion is smooth.
+  /// The state between two physics steps, for smooth slow motion.
   get state(): State {
     return this.between(this.before, this.world.state);
   }
 
-  /// The same of its twin, if it has one.
+  /// The same for the twin; null without one.
   get twinState(): State | null {
     const { twin } = this.world;
     return twin && this.between(this.twinBefore ?? twin.state, twin.state);

@@ -19,7 +19,7 @@ const NAMES = {
 } as const;
 const TORQUE_MEAN = 15; // control steps: a balancing agent changes its torque at each of them
 
-/// The charts and the numbers beside them.
+/// The charts and their numbers.
 export class Dashboard {
   private readonly energy = new Strip('energy', 'energy', (m) => m.energy);
   private readonly height = new Strip('height', 'link2', (m) => m.height);
@@ -83,7 +83,7 @@ export class Dashboard {
     if (this.neurons.canvas.shown) this.neurons.draw(policy?.neurons ?? null, world.seen);
   }
 
-  /// The numbers change a few times a second, so that they can be read.
+  /// A few times a second, so that the numbers can be read.
   private showNumbers(world: World): void {
     const { plant, policy, decision, state } = world;
     const target = energyTarget(plant);
@@ -99,7 +99,7 @@ export class Dashboard {
   }
 }
 
-/// Writes a number beside its chart, and into the chart's name for screen readers.
+/// Writes a number next to its chart, and into the chart's name for screen readers.
 function tell(chart: string, text: string): void {
   write(element(`${chart}-value`), text);
   const label = `${element(chart).dataset.name}: ${text}`;
@@ -119,7 +119,7 @@ function rewardText(terms: number[]): string {
   return `${text.join(' ')} = ${fixed(sum)}`;
 }
 
-/// What it would do, and what it expects in units of the reward.
+/// The decision's torque, and its value in units of the reward.
 export function decisionText(decision: Decision, rewardScale: number): string {
   const reward = (x: number) => withMinus((x / rewardScale).toFixed(1));
   const value = Number.isNaN(decision.value) ? '' : reward(decision.value);
@@ -145,7 +145,7 @@ export function decisionText(decision: Decision, rewardScale: number): string {
 
 const BALANCED = 1; // s upright, after which it is more than a swing through the top
 
-/// What the pendulum is doing, in words.
+/// The pendulum's state in words.
 export function situation(world: World): { state: string; text: string } {
   const upright = world.uprightFor;
   if (upright !== null && upright >= BALANCED)

@@ -1,4 +1,4 @@
-/// The element with this id, which index.html has.
+/// The element of index.html with this id.
 export function element<T extends HTMLElement = HTMLElement>(id: string): T {
   return document.getElementById(id) as T;
 }
@@ -9,7 +9,7 @@ export function button(id: string, onClick: () => void): HTMLButtonElement {
   return found;
 }
 
-/// Writes only a text that has changed: each write makes the browser lay out again.
+/// Writes a text only if it has changed, because each write triggers a new layout.
 export function write(place: Element, text: string): void {
   if (place.textContent !== text) place.textContent = text;
 }

@@ -1,9 +1,9 @@
 import { BadInput, largerThan } from '../bad_input';
 
-const PATIENCE = 30; // s without a byte, after which a server counts as silent
+const PATIENCE = 30; // s without a byte, after which a fetch fails
 
-/// Fetches at most `limit` bytes; `onProgress` hears how many have arrived. Throws BadInput if the
-/// file is missing or too large, or the server cannot be reached or falls silent.
+/// Fetches at most `limit` bytes. `onProgress` gets the number of bytes so far. Throws BadInput if
+/// the file is missing or too large, or if the server cannot be reached or falls silent.
 export async function fetchBytes(
   address: string,
   limit: number,
@@ -44,6 +44,6 @@ export async function fetchBytes(
     return new Uint8Array(await new Blob(pieces).arrayBuffer());
   } finally {
     clearTimeout(timer!);
-    abort.abort(); // what is still under way
+    abort.abort(); // stops the rest of the download
   }
 }

@@ -1,8 +1,8 @@
-const SETTLING = 1500; // ms after a change, in which bars, maps and sparks come to rest
-const SETTLING_FRAMES = 60; // the same, where frames are rare
+const SETTLING = 1500; // ms after a change until bars, maps and sparks come to rest
+const SETTLING_FRAMES = 60; // the same in frames, where frames are rare
 
-/// Calls `frame` at each frame of the screen while something moves or has just changed, and not otherwise:
-/// a page that stands still takes no time of the processor.
+/// Calls `frame` at each frame of the screen, but only while something moves or has just changed. A
+/// page at rest takes no processor time.
 export class Frames {
   private readonly frame: (seconds: number) => void;
   private readonly moving: () => boolean;
@@ -12,7 +12,7 @@ export class Frames {
   private until = 0; // ms
   private left = 0; // frames
 
-  /// `frame` hears how long (s) after the frame before it is called.
+  /// `frame` gets the time since the frame before it, s.
   constructor(frame: (seconds: number) => void, moving: () => boolean) {
     this.frame = frame;
     this.moving = moving;
@@ -23,7 +23,7 @@ export class Frames {
     this.wake();
   }
 
-  /// After something changed.
+  /// Call after a change.
   wake(): void {
     this.until = performance.now() + SETTLING;
     this.left = SETTLING_FRAMES;
@@ -33,7 +33,7 @@ export class Frames {
     requestAnimationFrame(this.next);
   }
 
-  /// Wakes when any of these comes into sight or changes its size.
+  /// Wakes when any of these elements comes into sight or changes its size.
   watch(elements: readonly Element[]): void {
     const wake = () => this.wake();
     const [sizes, sights] = [new ResizeObserver(wake), new IntersectionObserver(wake)];

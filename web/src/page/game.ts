@@ -6,11 +6,12 @@ import { copy } from './clipboard';
 import { button, element, write } from './dom';
 import { recall, remember } from './storage';
 
-/// A visitor as the motor: how long both links stay up. The best try comes back as a ghost.
+/// The game with the visitor as the motor: how long do both links stay up? A ghost repeats the best
+/// try.
 
-const LONGEST = 30 / CONTROL_PERIOD; // states of a try that a ghost repeats
-const FALLEN = -0.5; // relative height of the tip, from which on the next try begins
-const HALF = 0.5; // speed, with help
+const LONGEST = 30 / CONTROL_PERIOD; // longest try of a ghost, in states
+const FALLEN = -0.5; // relative height of the tip below which a try ends
+const HALF = 0.5; // speed with help
 const BALANCED = 1; // s
 
 export class Game {
@@ -18,16 +19,16 @@ export class Game {
   private readonly setSpeed: (speed: number) => void;
   private readonly half = element<HTMLInputElement>('motor-half');
   private readonly send = button('motor-send', () => void this.copyResult());
-  private counts = false; // whether the visitor is the motor
-  private states: State[] = []; // of this try, one for each control step
-  private up = 0; // s, in this try, without a break
-  private longest = 0; // s, in this try
-  private held = 0; // s, world time at which a hand last held the pendulum
+  private counts = false; // whether the visitor is the motor now
+  private states: State[] = []; // of this try, one per control step
+  private up = 0; // s upright without a break, in this try
+  private longest = 0; // s, the most of this try
+  private held = 0; // s, world time of the hand's last grip
   private best = 0; // s, at this speed
-  private key = ''; // under which that is remembered
-  private said = ''; // of the last try
+  private key = ''; // storage key of `best`
+  private said = ''; // result of the last try
   private bestStates: readonly State[] = [];
-  private highest = -1; // relative height of the tip, in all tries
+  private highest = -1; // relative height of the tip, over all tries
 
   /// `again` hangs the pendulum.
   constructor(world: World, setSpeed: (speed: number) => void, again: () => void) {
@@ -40,7 +41,7 @@ export class Game {
     this.half.addEventListener('change', () => this.changeSpeed());
   }
 
-  /// When the step begins.
+  /// Call when the step begins.
   open(): void {
     this.counts = true;
     this.highest = -1;
@@ -50,18 +51,18 @@ export class Game {
     this.changeSpeed();
   }
 
-  /// Ends the game: from now on nothing counts.
+  /// Ends the game and its last try.
   close(): void {
     this.next();
     this.counts = false;
   }
 
-  /// The state of the best try at the same time since its start; null without one.
+  /// The best try's state at this time since its start; null without one.
   get ghost(): State | null {
     return this.bestStates[this.states.length] ?? null;
   }
 
-  /// What to say.
+  /// A hint or result for the visitor.
   get answer(): string {
     if (this.up > BALANCED) return 'You balanced it by hand! Few do.';
     if (this.said || this.states.length === 0) return this.said;
@@ -70,7 +71,7 @@ export class Game {
     return `${so}Push the way it swings, and change when it turns.`;
   }
 
-  /// At each control step.
+  /// Call at each control step.
   moment(state: State): void {
     if (!this.counts) return;
     const { world } = this;
@@ -88,14 +89,14 @@ export class Game {
     if (this.states.length >= LONGEST || (this.longest > 0 && fallen)) this.next();
   }
 
-  /// At each frame.
+  /// Call at each frame.
   draw(): void {
     write(element('motor-now'), seconds(this.up));
     write(element('motor-best'), seconds(this.best));
     this.send.disabled = this.best < 0.1;
   }
 
-  /// Ends a try and begins another one.
+  /// Ends a try and begins the next.
   next(): void {
     if (this.longest > 0) {
       const isBest = this.bestStates === this.states;
@@ -111,7 +112,7 @@ export class Game {
   private changeSpeed(): void {
     this.next();
     this.setSpeed(this.half.checked ? HALF : 1);
-    this.key = this.half.checked ? 'best-half' : 'best'; // what is easier has a best of its own
+    this.key = this.half.checked ? 'best-half' : 'best'; // half speed has its own record
     this.best = Math.max(Number(recall(this.key)) || 0, 0);
     this.bestStates = [];
     this.said = '';

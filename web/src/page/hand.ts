@@ -4,11 +4,11 @@ import type { Scene } from '../view/scene';
 import { pointOn } from '../world';
 import type { World } from '../world';
 
-const NEAR = 28; // pixels from a link within which it is grabbed: a fingertip
+const NEAR = 28; // pixels, grip of a fingertip around a link
 
 const MOVED = 4; // pixels, beyond which a touch is a drag
 
-/// What a mouse or finger holds.
+/// A mouse's or finger's grip.
 interface Held {
   link: 1 | 2;
   along: number; // m from the link's hinge
@@ -17,7 +17,8 @@ interface Held {
   moved: boolean;
 }
 
-/// Lets mouse and finger grab the pendulum: to drag it while it moves, to pose it while it is paused.
+/// Lets mouse and finger grab the pendulum, to drag it while it moves or to pose it while it is
+/// paused.
 export class Hand {
   private readonly world: World;
   private readonly scene: Scene;
@@ -31,7 +32,7 @@ export class Hand {
     this.paused = paused;
     this.onPose = onPose;
     const canvas = scene.canvas.element;
-    // A finger on the pendulum does not scroll the page; one beside it does.
+    // A finger on the pendulum does not scroll the page; a finger elsewhere does.
     const keep = (event: TouchEvent) => {
       const { left, top } = canvas.getBoundingClientRect();
       const { clientX, clientY } = event.changedTouches[0]!;
@@ -88,7 +89,8 @@ export class Hand {
     }
   }
 
-  /// At rest, with the held link pointing at the hand; the other one keeps its place beside it.
+  /// A pose at rest with the held link pointing at the hand; the other joint keeps its
+  /// angle.
   private posed(target: Vec): State {
     const { q1, q2 } = this.world.state;
     const rest = { w1: 0, w2: 0 };
@@ -99,7 +101,7 @@ export class Hand {
     return { q1, q2: Math.atan2(Math.sin(second), Math.cos(second)), ...rest };
   }
 
-  /// The nearest point of a link, if one is near enough.
+  /// The nearest point of a link, if it is within reach.
   private nearest(place: Vec): { link: 1 | 2; along: number } | null {
     const { plant, state } = this.world;
     const elbow = pointOn(plant, state, 1, plant.length1).position;

@@ -12,9 +12,9 @@ export interface Actions {
   shoveRight(): void;
 }
 
-/// The page by keyboard. Keys that mean something where the focus is are left alone, and all of them
-/// can be switched off, for those who speak to their computer or touch keys by accident. `named` has the
-/// only keys that act at the moment; null: all of them.
+/// The page's keys. A focused control keeps its own keys. Visitors can switch all keys off, because
+/// speech input and stray touches press them by accident. `named` returns the only active keys;
+/// null: all.
 export function listenToKeys(actions: Actions, named: () => readonly string[] | null): void {
   const on = element<HTMLInputElement>('keys');
   on.checked = recall(KEY) !== 'off';
@@ -36,7 +36,7 @@ export function listenToKeys(actions: Actions, named: () => readonly string[] | 
     const action = keys.get(key);
     if (!action || named()?.includes(key) === false) return;
     event.preventDefault();
-    // Of a key that is held down, only steps repeat.
+    // A held key repeats only steps.
     if (!event.repeat || event.key === '.') action();
   });
 }

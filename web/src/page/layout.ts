@@ -1,11 +1,11 @@
 import { element } from './dom';
 import { prefersStill } from './motion';
 
-/// Where there is room for three columns; the same width as in style/page.css.
+/// Room for three columns; the same width as in style/page.css.
 const wide = matchMedia('(min-width: 75em)');
 
-/// Keeps the Q-values on one screen with the pendulum: the first chart where these stand beside it,
-/// below the pendulum where they do not. Outside of Everything the map is the ground of the stage.
+/// Keeps the Q-values on one screen with the pendulum: as the first chart of a column next to it,
+/// or below it. Outside of Everything the map is the background of the stage.
 export function placeCharts(): void {
   const { view } = document.documentElement.dataset;
   const [charts, beside] = [element('charts'), element('beside')];
@@ -24,7 +24,7 @@ export function placeCharts(): void {
 }
 wide.addEventListener('change', placeCharts);
 
-/// A formula that is wider than its place can be scrolled by keyboard, and only then takes the focus.
+/// Lets the keyboard focus and scroll a formula that is wider than its place.
 export function focusWideFormulas(): void {
   const observer = new ResizeObserver((entries) => {
     for (const { target } of entries) {
@@ -35,7 +35,8 @@ export function focusWideFormulas(): void {
   for (const formula of document.querySelectorAll('math[display]')) observer.observe(formula);
 }
 
-/// A link to an example leads back to the pendulum; `again` hears of one that is open already.
+/// Links to examples lead back to the pendulum. `again`: called for the example that is open
+/// already.
 export function listenToExamples(again: () => void): void {
   element('try').addEventListener('click', (event) => {
     const link = (event.target as HTMLElement).closest<HTMLAnchorElement>('a[href^="#"]');

@@ -9,11 +9,11 @@ import { Scale } from '../view/scale';
 import type { World } from '../world';
 import { element } from './dom';
 
-const CELLS = 36; // of a side
-const MILLISECONDS = 2; // of a frame
-const FRAMES = 3; // it is drawn at each third, and computed at the others
-const WAY = 4; // s of the trajectory that are drawn
-const MARKS = 24; // places of the mark on a side
+const CELLS = 36; // along a side
+const MILLISECONDS = 2; // per frame
+const FRAMES = 3; // drawn at each third frame, computed at the others
+const WAY = 4; // s of the trajectory to draw
+const MARKS = 24; // steps of the mark along a side
 const ARROWS: Readonly<Record<string, readonly [number, number]>> = {
   ArrowLeft: [-1, 0],
   ArrowRight: [1, 0],
@@ -21,7 +21,7 @@ const ARROWS: Readonly<Record<string, readonly [number, number]>> = {
   ArrowDown: [0, -1],
 };
 
-/// The map of what the agent expects: what is chosen for it, and clicks on it.
+/// The panel of the map: its choices, and clicks on it.
 export class MapPanel {
   private readonly map = new ValueMap(CELLS);
   private readonly chart = new MapChart();
@@ -30,20 +30,20 @@ export class MapPanel {
     x: element<HTMLSelectElement>('map-x'),
     y: element<HTMLSelectElement>('map-y'),
   };
-  private policy: Policy | null = null; // that the map is of
-  private key = ''; // what the complete map was computed from
+  private policy: Policy | null = null; // of the map
+  private key = ''; // state and plant of the complete map
   private mixed = false; // whether the policy has changed since the map was begun
   private seen = false; // on the screen
-  /// Whether the map is not yet that of the present state.
+  /// Whether the map still has to be computed for the present state.
   busy = false;
   private range: [number, number] = [0, 1];
   private frame = 0;
-  private mark: [number, number] | null = null; // shares of both axes, by keyboard
+  private mark: [number, number] | null = null; // shares of both axes, moved by keys
   private readonly scales = [...document.querySelectorAll<HTMLElement>('.scale')].map(
     (place) => new Scale(place),
   );
 
-  /// `start` is told where a click wants the pendulum to be.
+  /// `start` gets the variables of a clicked place.
   constructor(start: (where: Partial<State>) => void) {
     const { element: canvas } = this.chart.canvas;
     for (const list of Object.values(this.select)) {
@@ -70,8 +70,8 @@ export class MapPanel {
     return { ...rest, [map.x.name]: valueAt(map.x, x), [map.y.name]: valueAt(map.y, y) };
   }
 
-  /// An arrow moves the mark by 15° or as much of a velocity, at first from the middle. False for other
-  /// keys.
+  /// Moves the mark by 15° or a share of a velocity, at first from the middle. False for keys other
+  /// than arrows.
   private moveMark(key: string): boolean {
     const [dx, dy] = ARROWS[key] ?? [0, 0];
     if (dx === 0 && dy === 0) return false;
@@ -88,8 +88,8 @@ export class MapPanel {
     return this.chart.canvas;
   }
 
-  /// As the ground of the stage: of poses at rest. With `learning` it shows only colours, which follow
-  /// the policies of a training.
+  /// Uses the map as the background of the stage, with poses at rest. With `learning` it shows only
+  /// colours, of the training's latest policy.
   ground(is: boolean, learning: boolean): void {
     if (is !== this.map.atRest) this.reset();
     if (is !== this.map.atRest || learning !== this.chart.bare) this.clear();
@@ -100,12 +100,13 @@ export class MapPanel {
     this.canvas.element.ariaHidden = String(learning);
   }
 
-  /// At each frame.
+  /// Call at each frame.
   draw(world: World, history: History): void {
     this.busy = false;
     if (!this.seen || !world.policy) return;
     if (this.policy !== world.policy) {
-      // A training brings policies faster than a map is complete: it goes on, and is made once more.
+      // A training brings policies faster than a map is complete, so the map mixes policies and is
+      // computed once more.
       if (this.chart.bare && this.policy) this.mixed = true;
       else this.clear();
     }
@@ -119,7 +120,7 @@ export class MapPanel {
     this.chart.draw(this.map, ...this.range, way, world.state, this.mark);
   }
 
-  /// Computes, unless the map is that of the present state already.
+  /// Computes, unless the map belongs to the present state already.
   private work(world: World): void {
     const { map } = this;
     const { plant } = world;
@@ -144,7 +145,7 @@ export class MapPanel {
       scale.show(map.quantity, known ? [low / unit, high / unit] : null);
   }
 
-  /// What the colours stand for.
+  /// The range of the colours, in words.
   private said({ plant, policy }: World): string {
     const { cells, quantity } = this.map;
     if (quantity === 'torque')
@@ -155,13 +156,13 @@ export class MapPanel {
       : `${low} to ${high}`;
   }
 
-  /// The ends of the colours.
+  /// The values at the ends of the colours.
   private rangeOf(cells: Float32Array, { plant, policy }: World): [number, number] {
     if (this.map.quantity === 'torque') return [-plant.torque_limit, plant.torque_limit];
     return rangeOfValues(cells, policy?.rewardScale ?? 1);
   }
 
-  /// Both axes show different variables: the other one gives way.
+  /// Both axes show different variables: choosing one twice swaps them.
   private choose(changed: HTMLSelectElement): void {
     const { x, y, quantity } = this.select;
     if (x.value === y.value)
@@ -188,7 +189,7 @@ export class MapPanel {
   }
 }
 
-/// A place of the mark, in words.
+/// A place on an axis, in words.
 function placeText({ name, turns }: Axis, value: number): string {
   const link = name === 'q1' || name === 'w1' ? 'upper' : 'lower';
   return turns

@@ -2,7 +2,7 @@ import { printable } from '../text';
 import { button, element } from './dom';
 
 const NOTE_SECONDS = 6;
-const LONGEST = 2000; // characters; a shared address is the longest
+const LONGEST = 2000; // characters; more than any shared address
 let timer = 0;
 
 function show(text: string, kind: 'warning' | 'note'): void {
@@ -12,18 +12,18 @@ function show(text: string, kind: 'warning' | 'note'): void {
   element('message').hidden = false;
 }
 
-/// Shows what went wrong; stays until it is closed.
+/// Shows a failure until the visitor closes it.
 export function warn(text: string): void {
   show(text, 'warning');
 }
 
-/// Shows what went well; disappears by itself.
+/// Shows a success for some seconds.
 export function note(text: string): void {
   show(text, 'note');
   timer = window.setTimeout(hideMessage, 1000 * NOTE_SECONDS);
 }
 
-/// Shows a text that the visitor copies by hand; stays until it is closed.
+/// Shows a text for copying by hand until the visitor closes it.
 export function showText(text: string): void {
   show(text, 'note');
 }

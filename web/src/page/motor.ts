@@ -1,14 +1,14 @@
 import type { World } from '../world';
 import { button, element } from './dom';
 
-/// A visitor as the motor: its full torque while an arrow is held, on the keyboard or on the page.
+/// The visitor as the motor: full torque while an arrow is held, on the keyboard or on the page.
 export class MotorKeys {
   private readonly world: World;
   private on = false;
 
   constructor(world: World) {
     this.world = world;
-    // To the right is where the hanging pendulum goes: a negative torque.
+    // A negative torque moves the hanging pendulum to the right.
     for (const [id, key, sign] of [
       ['motor-left', 'ArrowLeft', 1],
       ['motor-right', 'ArrowRight', -1],
@@ -29,7 +29,7 @@ export class MotorKeys {
       const isHeld = ({ key: pressed, target }: KeyboardEvent) =>
         (pressed === key && element<HTMLInputElement>('keys').checked) ||
         (target === held && (pressed === ' ' || pressed === 'Enter'));
-      // Before the page's own keys, which would shove.
+      // In the capture phase, before the page's own keys, which would shove.
       const listen = (type: 'keydown' | 'keyup', turn: number) =>
         addEventListener(
           type,
@@ -48,7 +48,7 @@ export class MotorKeys {
     addEventListener('blur', () => this.turn(0));
   }
 
-  /// Whether arrows turn the motor.
+  /// Whether the arrows turn the motor.
   set enabled(on: boolean) {
     this.on = on;
     this.world.byHand = 0;

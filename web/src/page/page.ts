@@ -32,9 +32,9 @@ import { Twin } from './twin';
 import { showView, viewOf } from './views';
 
 const REMEMBERED = 60; // s of history
-const LEARN_KEYS = ['g', 'r', 'ArrowLeft', 'ArrowRight']; // a pause there is one of the training
+const LEARN_KEYS = ['g', 'r', 'ArrowLeft', 'ArrowRight']; // pauses a training, not the pendulum
 
-/// The parts of the page and what its buttons do.
+/// The parts of the page and the actions of its buttons.
 export class Page {
   readonly world: World;
   readonly clock: Clock;
@@ -55,10 +55,10 @@ export class Page {
     (seconds) => this.frame(seconds),
     () => !this.paused,
   );
-  laboratory = ''; // the address of Everything when it was left
-  private takes = 0; // of agents and settings; the last one counts
+  laboratory = ''; // last address of Everything
+  private takes = 0; // to drop late answers
   private paused = false;
-  private learning = false; // whether view or step is that of a training
+  private learning = false; // whether view or step is a training
   private mujoco = false; // whether MuJoCo moves the pendulums
 
   constructor(world: World, agents: Agents) {
@@ -97,7 +97,7 @@ export class Page {
     world.onChange = () => this.frames.wake();
   }
 
-  /// Memory that the core has taken (bytes), which it never gives back.
+  /// The core's memory (bytes), which never shrinks.
   get coreBytes(): number {
     return core().exports.memory.buffer.byteLength;
   }
@@ -110,7 +110,7 @@ export class Page {
     return this.agentPanel.agent;
   }
 
-  /// Starts again with the view and the settings of the address.
+  /// Shows the view of an address, with its settings.
   async open(hash = location.hash): Promise<void> {
     const view = viewOf(hash);
     const { dataset } = document.documentElement;
@@ -128,7 +128,7 @@ export class Page {
     const { shared, problems }: { shared: Partial<Shared>; problems: string[] } = learns
       ? { shared: {}, problems: [] }
       : decode(returns ? this.laboratory : hash, RANGES, (id) => this.agents.has(id));
-    // What was learned stays on the stage.
+    // A policy learned in the page stays on the stage.
     const isAsked = shared.agent && !returns;
     if ((learns || this.tour.number > 0) && this.learn.keeps && !isAsked) {
       Object.assign(shared, { agent: OWN, on: !prefersStill() });
@@ -144,8 +144,8 @@ export class Page {
     if (problems.length > 0) warn(problemText(problems));
   }
 
-  /// Takes agent and settings, all others as at the beginning; the pendulum moves on. False if others
-  /// were asked for meanwhile.
+  /// Sets agent and settings; all others get their initial values. The pendulum moves on. False if
+  /// a later request replaced this one.
   async take(shared: Partial<Shared>): Promise<boolean> {
     const all = { ...BEGINNING, ...shared };
     const taking = ++this.takes;
@@ -158,26 +158,26 @@ export class Page {
     return true;
   }
 
-  /// The same, from hanging.
+  /// The same as take(), and hangs the pendulum.
   async begin(shared: Partial<Shared>): Promise<boolean> {
     const taken = await this.take(shared);
     if (taken) this.reset();
     return taken;
   }
 
-  /// Whether agent and physics are those that stay.
+  /// Whether the final agent and physics are loaded.
   get isComplete(): boolean {
     return this.mujoco && !this.agentPanel.busy;
   }
 
-  /// The pendulums go on in MuJoCo.
+  /// Moves both pendulums to MuJoCo.
   continueIn(simulator: Mujoco): void {
     this.mujoco = true;
     this.world.continueIn(simulator);
     this.twin.continueIn(simulator.another());
   }
 
-  /// Handles input, then advances and draws: at every frame, or while paused after a change.
+  /// Starts to handle input, and to advance and draw at each frame.
   run(): void {
     this.listen();
     this.frames.start();
@@ -192,13 +192,14 @@ export class Page {
     if (this.map.busy) this.frames.wake();
   }
 
-  /// Changes to another agent; if it cannot be loaded, says why, keeps the old one and returns false.
+  /// Changes to another agent. If it cannot be loaded, shows the reason, keeps the old one and
+  /// returns false.
   choose(id: string): Promise<boolean> {
     return this.agentPanel.choose(id);
   }
 
-  /// Changes to a visitor's own policy and to the plant that it was trained on.
-  /// False if it cannot be loaded, or another was asked for meanwhile.
+  /// Changes to a visitor's own policy and to its training plant. False if it cannot be loaded or a
+  /// later request replaced it.
   async openFile(file: File, learned = false): Promise<boolean> {
     if (!(await this.agentPanel.open(file, learned))) return false;
     this.settings.setPlant(this.agent!.policy.plant);
@@ -206,13 +207,13 @@ export class Page {
     return true;
   }
 
-  /// A training has begun: the address is its recipe.
+  /// Call when a training has begun: the address becomes its recipe.
   learned(): void {
     this.arranged();
     this.changed();
   }
 
-  /// After another view or step is shown, or a training has begun: what stands on the stage.
+  /// Sets up the stage for the view, step or training.
   private arranged(): void {
     const { view, step } = document.documentElement.dataset;
     this.learning = view === 'learn' || step === 'learn';
@@ -221,8 +222,8 @@ export class Page {
     if (!this.learning) this.learn.leave();
   }
 
-  /// Keeps a policy that was learned here as the visitor's own, on the stage if it is to be `shown`. True
-  /// if it is there now.
+  /// Keeps a policy learned in the page as the visitor's own, also on the stage if `shown`. True if
+  /// it is there now.
   async keepLearned(file: File, shown: boolean): Promise<boolean> {
     if (shown) return this.openFile(file, true);
     await this.agents.open(file, true);
@@ -265,7 +266,7 @@ export class Page {
     const speed = element<HTMLInputElement>('speed');
     speed.addEventListener('input', () => this.setSpeed(Number(speed.value)));
     this.agentPanel.listen();
-    // By its own address: meanwhile that of the settings before may have been written.
+    // The event's address: the page may have written another one since.
     addEventListener('hashchange', ({ newURL }) => void this.open(new URL(newURL).hash));
     listenToExamples(() => void this.open());
     onThemeChange(() => this.repaint());
@@ -306,7 +307,7 @@ export class Page {
     this.changed();
   }
 
-  /// One control step, after which the page is paused.
+  /// One control step, then a pause.
   private step(): void {
     this.setPaused(true);
     const valid = this.world.advanceToControl();
@@ -315,32 +316,32 @@ export class Page {
     this.clock.settle();
   }
 
-  /// From hanging.
+  /// Hangs the pendulum.
   reset(): void {
     this.world.reset();
     this.restarted();
   }
 
-  /// What the map shows at first.
+  /// Sets the map's first quantity.
   resetMap(): void {
     this.map.reset();
   }
 
-  /// From a state with these variables, the others as they are.
+  /// Starts from a state with these variables; the others keep their values.
   start(where: Partial<State>): void {
     this.world.reset({ ...this.world.state, ...where });
     this.restarted();
     this.tour.started();
   }
 
-  /// After a new start: what happened before is dropped.
+  /// Drops the history after a new start.
   private restarted(): void {
     this.clock.settle();
     this.history.clear();
     this.twin.restarted();
   }
 
-  /// Pendulum, sensors and motor with their initial settings.
+  /// Resets plant, sensors and motor to their initial settings.
   private resetSettings(): void {
     const { agentOn: on } = this.world;
     this.apply({ ...BEGINNING, on, speed: this.clock.speed });
@@ -353,14 +354,14 @@ export class Page {
     this.setAgentOn(shared.on);
   }
 
-  /// After a setting changed: updates the address, so that it can be shared at any time.
+  /// Call after a setting changed: updates the address.
   private changed(): void {
     if (this.paused) this.world.look();
     this.address.changed();
     this.frames.wake();
   }
 
-  /// What belongs into the address, or into a link for others, who have not the visitor's own policy.
+  /// The page's state for the address, or for a link to others, who lack the visitor's own policy.
   private hash(forOthers = false): string {
     if (this.tour.number > 0) return `tour=${this.tour.number}`;
     if (document.documentElement.dataset.view === 'learn') return this.learn.address;

@@ -27,7 +27,7 @@ const VELOCITY = { w1: velocity(10), w2: velocity(20) } as const;
 
 type Variable = keyof State;
 
-/// Sliders for the state of a pendulum that is paused, for those who cannot drag it or click on the map.
+/// Sliders for the state of a paused pendulum, for visitors who cannot drag it or click on the map.
 export class Pose {
   private readonly world: World;
   private readonly sliders: readonly (readonly [Variable, Slider])[];
@@ -52,14 +52,14 @@ export class Pose {
     ];
   }
 
-  /// Shows the sliders instead of the hint while the pendulum is paused.
+  /// Shows the sliders while the pendulum is paused, else the hint.
   set shown(shown: boolean) {
     element('pose').hidden = !shown;
     element('hint').hidden = shown;
     if (shown) this.follow(this.world.state);
   }
 
-  /// Shows a state. (180° and -180° are one place, at both ends of a slider.)
+  /// Shows a state. (180° and -180° are the same angle, at both ends of a slider.)
   follow(state: State): void {
     for (const [name, slider] of this.sliders) {
       if (name === 'q1' || name === 'q2') {

@@ -105,8 +105,7 @@ const DISTURBANCE: readonly (SliderSpec & { name: keyof Disturbance })[] = [
   },
 ];
 
-/// The largest and smallest that a link to this page may bring, also beyond the sliders, which then
-/// extend.
+/// Limits for links to this page. They may exceed a slider's range, which then grows.
 export const RANGES: ReadonlyMap<string, Range> = new Map<string, Range>([
   ...Object.entries(PLANT_LIMITS),
   ...Object.entries(DISTURBANCE_LIMITS),
@@ -150,14 +149,12 @@ export class Settings {
     for (const [name, slider] of this.disturbance) slider.value = disturbance[name];
   }
 
-  /// Marks on each slider what this policy was trained on.
+  /// Marks on each slider the policy's range in training.
   mark(policy: Policy): void {
     for (const [name, slider] of this.plant) slider.trained = policy.trainedRange(name);
     const { strongest } = policy.controller;
     this.plant.get('torque_limit')!.label = `Limit of the motor (agent: ±${strongest})`;
-    element('trained-on').textContent = policy.isLearned
-      ? 'what the agent was trained on'
-      : 'what the agent was made for';
+    element('trained-on').textContent = policy.isLearned ? 'range of the training' : 'design plant';
     for (const [name, slider] of this.disturbance) slider.trained = policy.trainedDisturbance(name);
   }
 }

@@ -16,12 +16,12 @@ const RANGES: ReadonlyMap<string, Range> = new Map<string, Range>([
 ]);
 const has = (agent: string) => agent !== 'unknown' && agent !== 'own';
 
-test('what is as at the beginning needs no link', () => {
+test('the initial state gives an empty link', () => {
   expect(encode(BEGINNING)).toBe('');
   expect(decode('', RANGES, has)).toEqual({ shared: BEGINNING, problems: [] });
 });
 
-test('a link brings back what it was made from', () => {
+test('a link restores its state', () => {
   const shared: Shared = {
     twin: 'sac',
     agent: 'a b&c',
@@ -48,11 +48,11 @@ test.each([
   [`mass1=${'1'.repeat(5000)}`, `mass1: expected 0.2 to 3, got "${'1'.repeat(59)}…"`],
   ['a%0Ab=1', 'unknown setting "a\ufffdb"'],
   ['__proto__=1', 'unknown setting "__proto__"'],
-])('%s is told and left out', (hash, problem) => {
+])('%s is reported and left out', (hash, problem) => {
   expect(decode(hash, RANGES, has)).toEqual({ shared: BEGINNING, problems: [problem] });
 });
 
-test("an agent that is not there is left out, and a visitor's own is told apart", () => {
+test("a missing agent is left out, and a visitor's own policy gets its own message", () => {
   const { shared, problems } = decode('agent=unknown&twin=own', RANGES, has);
   expect([shared.agent, shared.twin]).toEqual([null, null]);
   expect(problems).toEqual([

@@ -9,16 +9,16 @@ export const OWN = 'own';
 
 const NOT_IN_IT = 'it does not contain its sender’s own policy';
 
-/// What a link contains: the agent, whether it is on, and every setting that was changed.
+/// The content of a link: the agent, whether it is on, and all changed settings.
 export interface Shared extends Disturbance {
   agent: string | null;
-  twin: string | null; // the second agent
+  twin: string | null; // the second pendulum's agent
   on: boolean;
   speed: number;
   plant: Plant;
 }
 
-/// The state in which the page begins.
+/// The page's initial state.
 export const BEGINNING: Readonly<Shared> = {
   agent: null,
   twin: null,
@@ -28,19 +28,19 @@ export const BEGINNING: Readonly<Shared> = {
   ...PERFECT,
 };
 
-/// The errors of sensors and motor of a link.
+/// A link's errors of sensors and motor.
 export function disturbanceOf(shared: Shared): Disturbance {
   const { sensor_noise, delay, sensor_latency, encoder_counts } = shared;
   const { velocity_window, velocity_filter } = shared;
   return { sensor_noise, delay, sensor_latency, encoder_counts, velocity_window, velocity_filter };
 }
 
-/// The numbers of a link, by their names in it.
+/// A link's numbers, by their names in it.
 function numbersOf(shared: Shared): Record<string, number> {
   return { speed: shared.speed, ...shared.plant, ...disturbanceOf(shared) };
 }
 
-/// The part of an address after #; only what differs from the beginning.
+/// The part of an address after #, with differences from the initial state.
 export function encode(shared: Shared): string {
   const fields = new URLSearchParams();
   if (shared.agent) fields.set('agent', shared.agent);
@@ -53,8 +53,8 @@ export function encode(shared: Shared): string {
   return fields.toString();
 }
 
-/// Reads such an address; `has` says which agents there are. What is not understood is left out and
-/// reported in `problems`, one line each.
+/// Reads such an address. `has`: whether an agent exists. Leaves invalid parts out and reports each
+/// in a line of `problems`.
 export function decode(
   hash: string,
   ranges: ReadonlyMap<string, Range>,
@@ -71,7 +71,7 @@ export function decode(
     } else if (name === 'on') {
       shared.on = text === '1';
     } else if (name === 'everything' || name === 'learn') {
-      // the view; it has no value
+      // names the view, without a value
     } else if (!range) {
       problems.push(`unknown setting ${quoted(name)}`);
     } else if (text.trim() === '' || !(value >= range[0] && value <= range[1])) {
@@ -87,7 +87,7 @@ export function decode(
   return { shared, problems };
 }
 
-/// What to say of them.
+/// A message about problems.
 export function problemText(problems: readonly string[]): string {
   const more = problems.length > 3 ? `; and ${problems.length - 3} more` : '';
   return `Not all of the link could be used: ${problems.slice(0, 3).join('; ')}${more}.`;

@@ -1,7 +1,7 @@
 import type { Range } from '../pendulum';
 import { withMinus } from '../text';
 
-/// Sliders with a label, a value, a reset button, and a mark for what the agent was trained on.
+/// Sliders with a label, a value, a reset button, and a mark for the agent's range in training.
 
 export interface SliderSpec {
   name: string;
@@ -9,17 +9,17 @@ export interface SliderSpec {
   unit: string;
   min: number;
   max: number;
-  /// What a link or a policy may bring at most: the slider then reaches so far.
+  /// Limits for links and policies. A value beyond the slider's range extends it.
   limits: Range;
   step: number;
   initial: number;
-  /// How the value is shown; by default with its unit.
+  /// Text of a value; by default with its unit.
   format?: (value: number) => string;
 }
 
 const clamp = (value: number, [low, high]: Range) => Math.min(Math.max(value, low), high);
 
-/// Restores a slider when its touch turns into a scroll.
+/// Restores a slider when a touch on it becomes a scroll.
 export function restoreOnScroll(): void {
   let before = '';
   const ofSlider = (use: (input: HTMLInputElement) => void) => (event: PointerEvent) => {
@@ -48,7 +48,7 @@ export class Slider {
   private readonly back: HTMLButtonElement;
   private readonly mark: HTMLElement;
   private readonly spec: SliderSpec;
-  private marked: Range | null = null; // what the agent was trained on
+  private marked: Range | null = null; // the agent's range in training
 
   constructor(spec: SliderSpec, onInput: (value: number) => void) {
     this.spec = spec;
@@ -66,7 +66,7 @@ export class Slider {
     this.back.ariaLabel = `Reset ${spec.label}`;
     input.addEventListener('input', () => {
       input.step = String(spec.step); // a link may have brought a value between two steps
-      // A slider that was extended by whole steps may reach below what is allowed.
+      // A slider extended by whole steps may reach below its lower limit.
       if (clamp(this.value, spec.limits) !== this.value) {
         input.step = 'any';
         input.value = String(clamp(this.value, spec.limits));
@@ -86,7 +86,7 @@ export class Slider {
     return Number(this.input.value);
   }
 
-  /// Also one between two steps of the slider, or beyond its ends, as a link or a policy may bring it.
+  /// Sets a value, which may lie between two steps or beyond the ends, as links and policies allow.
   set value(value: number) {
     const { step, min } = this.spec;
     const onStep = Math.abs((value - min) / step - Math.round((value - min) / step)) < 1e-6;
@@ -100,14 +100,14 @@ export class Slider {
     this.element.querySelector('label')!.textContent = text;
   }
 
-  /// Marks what the agent was trained on.
+  /// Marks the agent's range in training.
   set trained(range: Range) {
     this.marked = range;
     this.mark.hidden = false;
     this.reach(this.value);
   }
 
-  /// Lets the slider reach from its own ends, by whole steps, to a value and to its mark.
+  /// Extends the slider by whole steps to its value and its mark.
   private reach(value: number): void {
     const { input, spec, marked } = this;
     const wanted = [value, ...(marked ?? [])];

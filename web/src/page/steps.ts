@@ -11,30 +11,29 @@ import { MotorKeys } from './motor';
 import { OWN } from './share';
 import type { Shared } from './share';
 
-/// The steps of the tour: what each does with the page, and what it says to what has happened. Their
-/// words and controls are in index.html.
+/// The steps of the tour: their actions on the page, and their answers to the visitor. Their words
+/// and controls are in index.html.
 
-/// What a step does with the page.
+/// The parts of the page that steps use.
 export interface Stage {
   readonly world: World;
-  /// Chooses agent and settings, all others as at the beginning; the pendulum moves on. False if others
-  /// were asked for meanwhile.
+  /// Sets agent and settings; all others get their initial values. The pendulum moves on. False if
+  /// a later request replaced this one.
   take(shared: Partial<Shared>): Promise<boolean>;
-  /// The same, from hanging.
+  /// The same as take(), and hangs the pendulum.
   begin(shared: Partial<Shared>): Promise<boolean>;
-  /// Changes to another agent; all else stays. False if it cannot be loaded, or another was asked for
-  /// meanwhile.
+  /// Changes only the agent. False if it cannot be loaded or a later request replaced it.
   choose(agent: string): Promise<boolean>;
   readonly agents: { has(id: string): boolean; isHere(id: string): boolean };
   setAgentOn(on: boolean): void;
   setSpeed(speed: number): void;
-  /// From hanging.
+  /// Hangs the pendulum.
   reset(): void;
-  /// What the map shows at first.
+  /// Sets the map's first quantity.
   resetMap(): void;
   readonly learn: {
     start(): void;
-    /// Learns, pauses, resumes.
+    /// Starts, pauses or resumes the training.
     toggle(): void;
     show(): void;
     readonly paused: boolean;
@@ -44,28 +43,28 @@ export interface Stage {
 }
 
 export interface Step {
-  readonly id: string; // "step-ID" is its element
-  readonly agents: readonly string[]; // without which it is left out
-  readonly keys?: readonly string[]; // of the page's, that it names; the others do nothing
+  readonly id: string; // its element is "step-ID"
+  readonly agents: readonly string[]; // needed for this step; without them it is left out
+  readonly keys?: readonly string[]; // the page's keys that it names; all others do nothing
   readonly labels?: (world: World) => Label[]; // on the stage
-  /// When it is shown.
+  /// Called when the step is shown.
   begin(): Promise<void>;
-  /// When another is shown.
+  /// Called when another step is shown.
   end?(): void;
-  /// Whether its pendulum moves by itself; where motion is not wanted, it waits for a button.
+  /// Whether its pendulum moves at once. With reduced motion it waits for a button.
   readonly moves?: boolean;
-  /// Drawn behind the pendulum, if there is one.
+  /// A pendulum to draw behind the first one.
   readonly ghost?: () => State | null;
-  /// At each control step.
+  /// Called at each control step.
   moment?(moment: Moment): void;
-  /// When a click on the map has started it somewhere.
+  /// Called after a click on the map started the pendulum somewhere.
   started?(): void;
-  /// Ten times a second. What to say to what the visitor did, empty for nothing.
+  /// The answer to the visitor's actions, asked for ten times a second; empty: none.
   answer?(world: World): string;
 }
 
 const NOMINAL_AGENT = 'd3qn';
-const SMALL_AGENT = 'fast'; // a twentieth of its size
+const SMALL_AGENT = 'fast'; // a twentieth of the default agent's size
 const ADAPTIVE_AGENT = 'd3qn-adaptive';
 const LIGHT = 0.75; // kg
 const HELD = 2; // s upright that count as balanced
@@ -92,7 +91,7 @@ function watch(stage: Stage): Step {
       const { agents } = stage;
       if (agents.isHere(NOMINAL_AGENT) || !agents.has(SMALL_AGENT))
         return void (await stage.begin({ agent: NOMINAL_AGENT, on }));
-      // The small one is here within a moment; the other takes over in the middle of the swing.
+      // The small agent loads within a moment; the large one replaces it during the swing.
       if (await stage.begin({ agent: SMALL_AGENT, on })) void stage.choose(NOMINAL_AGENT);
     },
     answer: (world) =>
@@ -188,7 +187,7 @@ function shove(stage: Stage): Step {
     answer(world) {
       if (world.push) {
         shoved = world.time;
-        if (heldFor(world) > HELD) fell = false; // the next fall is another one
+        if (heldFor(world) > HELD) fell = false; // so that the next fall counts as another one
       }
       if (shoved === 0)
         return heldFor(world) > HELD || !world.agentOn ? '' : 'Wait until it is up …';
@@ -201,9 +200,9 @@ function shove(stage: Stage): Step {
   };
 }
 
-/// A race of two agents with a pendulum that one of them does not know.
+/// A race of two agents with a pendulum that is new to one of them.
 function bet(stage: Stage): Step {
-  let onMany = false; // what the visitor bets on
+  let onMany = false; // the visitor's bet
   let decided = '';
   let begun = 0; // s, in the world's time
   const race = { agent: NOMINAL_AGENT, twin: ADAPTIVE_AGENT, plant: { ...NOMINAL, mass2: LIGHT } };
@@ -212,7 +211,7 @@ function bet(stage: Stage): Step {
     [button('bet-many', () => void run(true)), true],
   ] as const;
 
-  /// Both hang, and begin if there is a bet.
+  /// Hangs both pendulums, and starts them if there is a bet.
   const begin = async (on: boolean) => {
     if (!(await stage.begin({ ...race, on }))) return;
     decided = '';
@@ -242,8 +241,8 @@ function bet(stage: Stage): Step {
   };
 }
 
-/// How the race ends for a bet on the agent of many pendulums, or on the other; empty while it goes on. `one` and
-/// `many` are how long (s) each has balanced, `raced` is how long (s) they have tried.
+/// The result of the race for a bet on the agent of many pendulums, or on the other; empty while it
+/// goes on. `one` and `many`: how long (s) each has balanced; `raced`: duration (s).
 function verdictOf(onMany: boolean, one: number, many: number, raced: number): string {
   if (many > WON && one < HELD) return `${onMany ? RIGHT : LOST}: ${MANY_HOLDS}`;
   if (one > WON && many < HELD) return `${onMany ? LOST : RIGHT}: ${ONE_HOLDS}`;
@@ -306,7 +305,7 @@ function map(stage: Stage): Step {
   };
 }
 
-/// What was seen, and where to go from here.
+/// The last step: a summary and links.
 function end(stage: Stage): Step {
   button('tour-send', () => void copy(`${INVITATION} ${addressOf('tour')}`, 'An invitation'));
   return {
@@ -325,7 +324,7 @@ function end(stage: Stage): Step {
 
 const INVITATION = 'A double pendulum learns to stand up, in your browser. Can you do it by hand?';
 
-/// The pendulum moves on; where motion is not wanted, it hangs and waits.
+/// Swings at once; with reduced motion the pendulum hangs and waits.
 function enter(stage: Stage, shared: Partial<Shared>): Promise<boolean> {
   return prefersStill() ? stage.begin({ ...shared, on: false }) : stage.take(shared);
 }

@@ -1,12 +1,12 @@
 import { MAX_FILE_BYTES } from '../bad_input';
 
-/// What this browser keeps between visits. Browsers may forbid a page to keep anything (private
-/// windows, settings): then nothing is kept, and nothing fails.
+/// Data that this browser keeps between visits. If the browser forbids it (private windows,
+/// settings), nothing is kept and nothing fails.
 
 const PREFIX = 'upswing-';
 const DATABASE = 'upswing';
 const FILES = 'files';
-const PATIENCE = 3000; // ms, after which a database counts as absent
+const PATIENCE = 3000; // ms until a database counts as missing
 
 export function recall(key: string): string | null {
   try {
@@ -20,14 +20,14 @@ export function remember(key: string, value: string): void {
   try {
     localStorage.setItem(PREFIX + key, value);
   } catch {
-    // not kept
+    // the browser forbids it
   }
 }
 
 export interface KeptFile {
   name: string;
   bytes: ArrayBuffer;
-  learned: boolean; // by the page, so that it may be replaced by what the page learns next
+  learned: boolean; // in the page, so the page's next policy may replace it
 }
 
 function openDatabase(): Promise<IDBDatabase> {
@@ -39,7 +39,8 @@ function openDatabase(): Promise<IDBDatabase> {
   });
 }
 
-/// What `use` asks of the store of files, once it is on disk; rejects if the browser refuses.
+/// The result of a request to the store of files, once it is on disk. Rejects if the browser
+/// refuses.
 async function transact(
   mode: IDBTransactionMode,
   use: (store: IDBObjectStore) => IDBRequest,
@@ -57,13 +58,13 @@ async function transact(
   }
 }
 
-/// `work`, or null if it fails or takes too long.
+/// The result of `work`; null if it fails or takes too long.
 function tolerant<T>(work: () => Promise<T>): Promise<T | null> {
   const patience = new Promise<null>((resolve) => setTimeout(() => resolve(null), PATIENCE));
   return Promise.race([Promise.resolve().then(work), patience]).catch(() => null);
 }
 
-/// What was kept, perhaps by an earlier version of the page; null if that is no file of ours.
+/// A kept file, perhaps from an earlier version of the page; null if it is not one of ours.
 function asKeptFile(value: unknown): KeptFile | null {
   const { name, bytes, learned } = (value ?? {}) as Partial<Record<keyof KeptFile, unknown>>;
   if (typeof name !== 'string' || !(bytes instanceof ArrayBuffer)) return null;
@@ -74,7 +75,7 @@ export async function recallFile(key: string): Promise<KeptFile | null> {
   return asKeptFile(await tolerant(() => transact('readonly', (files) => files.get(key))));
 }
 
-/// Whether it is kept.
+/// Keeps a file. False if the browser refuses.
 export async function rememberFile(key: string, file: KeptFile): Promise<boolean> {
   const done = tolerant(() => transact('readwrite', (files) => files.put(file, key)));
   return (await done) !== null;

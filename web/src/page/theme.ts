@@ -1,7 +1,7 @@
 import { forcedColors, systemDark } from '../view/night';
 import { recall, remember } from './storage';
 
-/// Dark or light: the system's choice, until the visitor makes another, which is kept.
+/// Dark or light: the system's choice until the visitor makes a choice, which is kept.
 
 const KEY = 'theme';
 const { dataset } = document.documentElement;
@@ -18,7 +18,7 @@ export function changeTheme(): void {
   for (const listener of listeners) listener();
 }
 
-/// Calls `listener` when colours change: by the button, or by the system.
+/// Calls `listener` after the colours changed, by the button or by the system.
 export function onThemeChange(listener: () => void): void {
   listeners.push(listener);
   systemDark.addEventListener('change', listener);

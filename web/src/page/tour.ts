@@ -5,19 +5,19 @@ import { makeSteps } from './steps';
 import type { Stage, Step } from './steps';
 import type { Scene } from '../view/scene';
 
-const FRAMES = 6; // between two looks at what has happened
+const FRAMES = 6; // between two calls of a step's answer
 
-/// The guided tour: one step at a time, each with one sentence, one control, and one thing that is marked.
+/// The guided tour. Each step has one sentence, one control and one marked thing.
 export class Tour {
   private readonly steps: readonly Step[];
   private readonly dots: HTMLButtonElement[];
   private readonly onStep: () => void;
-  private readonly start: HTMLButtonElement; // where motion is not wanted
+  private readonly start: HTMLButtonElement; // shown for reduced motion
   private readonly twin: Scene;
   private now: Step | null = null;
   private frame = 0;
 
-  /// `has` says which agents there are; `onStep` hears when another step is shown.
+  /// `has`: whether an agent exists. `onStep`: called when another step is shown.
   constructor(
     stage: Stage & { readonly twin: { readonly scene: Scene } },
     has: (agent: string) => boolean,
@@ -43,18 +43,18 @@ export class Tour {
     });
   }
 
-  /// The step that is shown, from 1 on; 0 outside of the tour.
+  /// The shown step, from 1 on; 0 outside of the tour.
   get number(): number {
     return this.now ? this.steps.indexOf(this.now) + 1 : 0;
   }
 
-  /// The keys that the step names; null outside of the tour.
+  /// The keys that the shown step names; null outside of the tour.
   get keys(): readonly string[] | null {
     return this.now && (this.now.keys ?? []);
   }
 
-  /// Shows a step, the nearest that there is; where the visitor goes there, with the focus on it, and so
-  /// that the browser's Back returns.
+  /// Shows the nearest existing step. When the visitor goes there, moves the focus to it and adds
+  /// it to the browser's history.
   async go(number: number, focus = false): Promise<void> {
     this.leave();
     const i = Math.min(Math.max(Math.round(number) || 1, 1), this.steps.length) - 1;
@@ -67,7 +67,7 @@ export class Tour {
     this.start.hidden = !(now.moves && prefersStill());
     section(now).append(this.start);
     document.documentElement.dataset.step = now.id;
-    // One try after another is no news.
+    // A training's attempts are not announced.
     element('live').ariaLive = now.id === 'learn' ? 'off' : 'polite';
     this.say('');
     if (focus) {
@@ -78,12 +78,12 @@ export class Tour {
     await now.begin();
   }
 
-  /// A click on the map has started the pendulum somewhere.
+  /// Call after a click on the map started the pendulum somewhere.
   started(): void {
     this.now?.started?.();
   }
 
-  /// At each control step.
+  /// Call at each control step.
   moment(moment: Moment): void {
     this.now?.moment?.(moment);
   }
@@ -95,7 +95,7 @@ export class Tour {
     element('live').ariaLive = 'polite';
   }
 
-  /// At each frame.
+  /// Call at each frame.
   follow(world: World, scene: Scene): void {
     scene.labels = this.twin.labels = this.now?.labels?.(world) ?? [];
     const ghost = prefersStill() ? null : this.now?.ghost?.();

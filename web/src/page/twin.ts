@@ -11,18 +11,18 @@ import { situation } from './dashboard';
 import { element, write } from './dom';
 import { warn } from './message';
 
-/// A second pendulum next to the first. It has its own agent, and the same start, shoves and sliders.
+/// A second pendulum next to the first, with its own agent and the same start, shoves and sliders.
 export class Twin {
-  id: string | null = null; // of its agent; null while there is none
+  id: string | null = null; // of its agent; null: no second pendulum
   readonly scene = new Scene('twin-scene');
   private readonly first: World;
   private readonly agents: Agents;
   private readonly world: World;
   private readonly history = new History(TRAIL_SECONDS);
   private readonly select = element<HTMLSelectElement>('twin');
-  private requests = 0; // the last one counts
+  private requests = 0; // to drop late answers
 
-  /// `onChange` hears when a visitor has chosen its agent.
+  /// `onChange`: called when the visitor has chosen its agent.
   constructor(first: World, agents: Agents, onChange: () => void) {
     this.first = first;
     this.agents = agents;
@@ -34,14 +34,14 @@ export class Twin {
     this.list();
   }
 
-  /// The agents that can be chosen.
+  /// Lists the agents for the choice.
   list(): void {
     const options = this.agents.list.map(({ id, title }) => new Option(title, id));
     this.select.replaceChildren(new Option('none', ''), ...options);
     this.select.value = this.id ?? '';
   }
 
-  /// Takes an agent, or none; if it cannot be loaded, says why.
+  /// Takes an agent, or none. If it cannot be loaded, shows the reason.
   async choose(id: string | null): Promise<void> {
     const request = ++this.requests;
     try {
@@ -58,7 +58,7 @@ export class Twin {
     this.place(this.agents.list.find((one) => one.id === this.id)?.title ?? '');
   }
 
-  /// Takes a policy that is none of the agents, or none.
+  /// Takes a policy outside the list of agents, or none.
   show(policy: Policy | null, name: string): void {
     ++this.requests;
     this.id = null;
@@ -67,7 +67,7 @@ export class Twin {
     this.place(name);
   }
 
-  /// Begins where the first one is, if there is a policy.
+  /// Begins in the state of the first one, if there is a policy.
   private place(name: string): void {
     const absent = this.world.policy === null;
     this.first.twin = absent ? null : this.world;
@@ -83,7 +83,7 @@ export class Twin {
     this.world.continueIn(simulator);
   }
 
-  /// After a new start: what happened before is dropped.
+  /// Drops the history after a new start.
   restarted(): void {
     this.history.clear();
   }

@@ -6,12 +6,12 @@ const KEY = 'view';
 
 export interface View {
   name: 'tour' | 'learn' | 'everything';
-  step: number; // of the tour
-  chosen: boolean; // by its name, so that the next visit begins with it too
+  step: number; // step of the tour
+  chosen: boolean; // named by the address, so that the next visit begins there
 }
 
-/// Which view an address asks for. One with settings shows everything; one without leaves it to what the
-/// visitor chose last, and a new visitor gets the tour.
+/// The view of an address: everything if it has settings. Without settings it is the view chosen
+/// last, and for a new visitor the tour.
 export function viewOf(hash: string): View {
   const fields = new URLSearchParams(hash.replace(/^#/, ''));
   const step = fields.get('tour');

@@ -1,11 +1,11 @@
 const NEAR = '100px'; // from the edge of the screen
 
-/// A canvas that is as sharp as the screen, in CSS pixels, with colours from the style sheet. Where that
-/// sets --zoom, a pixel of the canvas is as many CSS pixels, so that letters and lines grow with it.
+/// A canvas as sharp as the screen, in CSS pixels, with colours from the style sheet. If that sets
+/// --zoom, letters and lines grow with it.
 export class Canvas {
   readonly element: HTMLCanvasElement;
   readonly context: CanvasRenderingContext2D;
-  zoom = 1; // CSS pixels of a pixel
+  zoom = 1; // CSS pixels per pixel
   width = 0; // pixels
   height = 0;
   letters = 0; // size of the text around it, in CSS pixels
@@ -22,7 +22,7 @@ export class Canvas {
     this.resize();
   }
 
-  /// Whether anybody would see what is drawn now.
+  /// Whether a drawing would be visible now.
   get shown(): boolean {
     return this.seen && this.width > 0;
   }
@@ -31,7 +31,8 @@ export class Canvas {
   color(name: string): string {
     let color = this.colors.get(name);
     if (color === undefined) {
-      // Through the canvas's own CSS colour, which is not used otherwise: this resolves light-dark().
+      // Set as the canvas's own CSS colour, which resolves light-dark(). The canvas has no other
+      // use for it.
       this.element.style.color = `var(--${name})`;
       color = getComputedStyle(this.element).color;
       this.colors.set(name, color);
@@ -45,7 +46,7 @@ export class Canvas {
     return `${size} ${this.family}`;
   }
 
-  /// To be called when the theme changed.
+  /// Call when the theme changed.
   forgetColors(): void {
     this.colors.clear();
   }
@@ -71,7 +72,7 @@ export class Canvas {
     context.stroke();
   }
 
-  /// What is between a line and the height `bottom`.
+  /// Fills the area between a line and the height `bottom`.
   area(points: readonly (readonly [number, number])[], bottom: number, color: string): void {
     const { context } = this;
     context.beginPath();
@@ -102,7 +103,7 @@ export class Canvas {
     this.width = this.element.clientWidth / this.zoom;
     this.height = this.element.clientHeight / this.zoom;
     const [width, height] = [this.width, this.height].map((side) => Math.round(side * ratio));
-    // Setting a size empties a canvas, even if the size is the same.
+    // Resizing clears a canvas, even to the same size.
     if (this.element.width !== width!) this.element.width = width!;
     if (this.element.height !== height!) this.element.height = height!;
     this.context.setTransform(ratio, 0, 0, ratio, 0, 0);

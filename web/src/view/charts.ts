@@ -10,7 +10,7 @@ interface StripScale {
   high: number;
   target?: number; // a line to reach
   unit?: string; // of its numbers
-  mean?: number; // moments, over which a mean is drawn in front of what changes faster
+  mean?: number; // moments; draws their mean in front of fast changes
   labels: readonly (readonly [number, string])[];
 }
 
@@ -76,7 +76,7 @@ export class Strip {
   }
 }
 
-/// Of each value and those before it, `count` in all.
+/// The mean of each value and the values before it, `count` in all.
 function runningMean(values: number[], count: number): number[] {
   let sum = 0;
   return values.map((value, i) => {
@@ -141,7 +141,7 @@ const LINKS: readonly [string, Of, Of][] = [
   ['link2', (s) => s.q1 + s.q2, (s) => s.w1 + s.w2],
 ];
 
-/// An absolute angle as that from upright, in ±π.
+/// An absolute angle relative to upright, in ±π.
 function fromUpright(angle: number): number {
   const turns = (angle + Math.PI) / (2 * Math.PI);
   return (turns - Math.round(turns)) * 2 * Math.PI;

@@ -11,19 +11,19 @@ import { signed } from './charts';
 const LABEL_WIDTH = 30; // pixels, of a torque under its bar
 const BOTTOM = 16; // pixels, for the torques below a chart
 const NAME = 13; // pixels, for the name of their axis
-const ROOMY = 90; // pixels of height, from which on it is named
+const ROOMY = 90; // pixels of height that leave room for that name
 const TOP = 4;
 const MARK = 8; // pixels, over a bar that hangs
-const SCALE = 38; // pixels, for the costs beside such bars
-const CUT_OFF = 0.005; // share of a distribution that is worth a number
-const EASE = 0.2; // of the way to a bar's new height and colour, at each drawing
+const SCALE = 38; // pixels, for the costs next to such bars
+const CUT_OFF = 0.005; // smallest share that gets a number
+const EASE = 0.2; // share of the way to a bar's new height and colour, at each drawing
 
-/// What the agent makes of what it sees: its Q-values, or how likely it finds each torque.
+/// Chart of a decision: Q-values, or the torque's distribution.
 export class DecisionChart {
   readonly canvas = new Canvas('q');
-  private below = 0; // pixels, that the name of the axis takes
+  private below = 0; // pixels for the name of the axis
   private room = 1; // points of reward, from the best Q-value to the bottom of the chart
-  private bars: { value: number; chosen: number }[] = []; // as they are drawn
+  private bars: { value: number; chosen: number }[] = []; // as drawn
 
   /// A Q-value is `rewardScale` times a reward.
   draw(decision: Decision | null, rewardScale: number): void {
@@ -32,7 +32,7 @@ export class DecisionChart {
     this.nameAxis();
     if (!isFinite(decision)) {
       this.canvas.text('not finite', this.canvas.width / 2, this.canvas.height / 2, 'center');
-      return; // and keep the scale
+      return; // keeps the scale
     }
     if (decision.kind === 'q') this.drawQ(decision, rewardScale);
     else if (decision.kind === 'gaussian') this.drawGaussian(decision);
@@ -40,7 +40,7 @@ export class DecisionChart {
     else this.drawComputed(decision);
   }
 
-  /// Names the axis of torques where there is room; what is above it has the rest of the canvas.
+  /// Names the axis of torques if there is room, and leaves the rest of the canvas to the chart.
   private nameAxis(): void {
     const { canvas } = this;
     this.below = canvas.height < ROOMY ? 0 : NAME;
@@ -51,8 +51,8 @@ export class DecisionChart {
     return this.canvas.height - BOTTOM - this.below;
   }
 
-  /// Q-values differ by little beside what they all have in common: a bar hangs from the best one down, as
-  /// far as its torque costs reward. Above it is a mark in the colour of what was chosen lately.
+  /// Q-values differ little compared with their size. So each bar hangs from the best one, as long
+  /// as its torque costs reward, with a mark above it in the colour of recent choices.
   private drawQ({ q, action, torques }: QDecision, rewardScale: number): void {
     const { canvas, bottom } = this;
     const cost = (i: number) => (q[action]! - q[i]!) / rewardScale;
@@ -88,7 +88,7 @@ export class DecisionChart {
     this.drawBars(torques, action, 0, (i) => probabilities[i]!, box);
   }
 
-  /// Bars from `left` on, each with its torque; `box` is the top and the height (pixels) of a value.
+  /// Bars from `left` on, each with its torque. `box`: top and height (pixels) of a value.
   private drawBars(
     torques: Float64Array,
     action: number,
@@ -98,12 +98,13 @@ export class DecisionChart {
   ): void {
     const { canvas, bottom } = this;
     const width = (canvas.width - left) / torques.length;
-    const labelled = Math.ceil(LABEL_WIDTH / width); // each, or each second, …
+    const labelled = Math.ceil(LABEL_WIDTH / width); // labels every N-th bar
     if (this.bars.length !== torques.length) {
       this.bars = Array.from(torques, (_, i) => ({ value: value(i), chosen: 0 }));
     }
     torques.forEach((torque, i) => {
-      // Eased: the agent chooses 50 times a second, and the colour is how often it chose this one lately.
+      // Eased, because the agent chooses 50 times a second. The colour shows how often it chose
+      // this torque lately.
       const bar = this.bars[i]!;
       bar.value += EASE * (value(i) - bar.value);
       bar.chosen += EASE * (Number(i === action) - bar.chosen);
@@ -150,7 +151,7 @@ export class DecisionChart {
     this.drawLine(x(torque));
   }
 
-  /// The torques from -limit to limit, and where on the canvas each is.
+  /// The torques from -limit to limit, and their places on the canvas.
   private axis(limit: number) {
     const { canvas, bottom } = this;
     const [left, right] = [10, canvas.width - 10];
@@ -181,7 +182,7 @@ export class DecisionChart {
     );
   }
 
-  /// How likely it is that more than the limit is asked for, at either end.
+  /// The probabilities of more than the limit, at both ends.
   private writeCutOff(low: number, high: number, left: number, right: number): void {
     const percent = (share: number) => `${Math.round(100 * share)}%`;
     if (low >= CUT_OFF) this.canvas.text(percent(low), left - 8, 10, 'left');
@@ -196,7 +197,7 @@ function isFinite(decision: Decision): boolean {
   return Number.isFinite(decision.low + decision.high);
 }
 
-/// The largest of 1, 2, 5, 10, 20, … (and 0.5, 0.2, …) that is not larger.
+/// `value` rounded down to 1, 2 or 5 times a power of ten.
 function roundBelow(value: number): number {
   const power = 10 ** Math.floor(Math.log10(value));
   return power * (value >= 5 * power ? 5 : value >= 2 * power ? 2 : 1);

@@ -1,12 +1,12 @@
 import type { Canvas } from './canvas';
 
-/// A word beside something on the stage.
+/// A word next to a thing on the stage.
 export interface Label {
   at: 'motor' | 'goal' | 'link2';
   text: string;
 }
 
-/// Where a label stands: `gap` pixels from (x, y) in the direction (nx, ny).
+/// A label's place: `gap` pixels from (x, y) in the direction (nx, ny).
 export interface Anchor {
   x: number;
   y: number;
@@ -15,8 +15,8 @@ export interface Anchor {
   gap: number;
 }
 
-/// Writes a label on a ground of its own, so that a link behind it does not cross its letters. It stays
-/// in the box; where it does not fit there, it goes to the other side of its anchor.
+/// Writes a label on its own background, so that a link behind it does not cross its letters. A
+/// label that would leave the box goes to the other side of its anchor.
 export function drawLabel(
   canvas: Canvas,
   text: string,

@@ -15,18 +15,17 @@ const BEAM = [
   [UPRIGHT - SOFT, 1],
   [UPRIGHT + SOFT, 0],
 ] as const;
-const FAR = 1.15; // times the pendulum's length, where the light ends
+const FAR = 1.15; // end of the light, in lengths of the pendulum
 const SHADES = 16; // steps of the trace from new to old
-const FRESH = 1.6; // s, within which the trace loses most of its light
+const FRESH = 1.6; // s, time in which the trace loses most of its light
 
-/// The same colour, translucent. `color` is rgb(…), as a style sheet's computed colours are.
+/// A colour made translucent. `color` is rgb(…), as computed colours of a style sheet are.
 function faded(color: string, alpha: number): string {
   const [r, g, b] = color.match(/[\d.]+/g)!;
   return `rgb(${r} ${g} ${b} / ${alpha})`;
 }
 
-/// The light that shines from the motor to where both links have to be, and the circle that the tip can
-/// reach. `strength` is between 0 and 1.
+/// The light from the motor to the goal, and the circle within the tip's reach. `strength`: 0 to 1.
 export function drawLight(canvas: Canvas, [x, y]: Place, reach: number, strength: number): void {
   const { context } = canvas;
   context.beginPath();
@@ -55,17 +54,17 @@ export function drawLight(canvas: Canvas, [x, y]: Place, reach: number, strength
   context.globalAlpha = 1;
 }
 
-/// The light that each canvas drew last: stages of different sizes do not make it again in turn.
+/// The last light of each canvas, so that stages of different sizes do not redraw it in turn.
 const beams = new WeakMap<Canvas, { color: string; radius: number; beam: HTMLCanvasElement }>();
 
-/// The light alone, in the middle of a canvas of this radius; the last one is kept.
+/// The light on its own canvas of this radius; the last one is kept.
 function beamOf(owner: Canvas, color: string, radius: number): HTMLCanvasElement {
   const kept = beams.get(owner);
   if (kept?.color === color && kept.radius === radius) return kept.beam;
   const beam = document.createElement('canvas');
   beam.width = beam.height = 2 * radius;
   const context = beam.getContext('2d')!;
-  // From below, once round: dark, light about the top, dark.
+  // Angles from below, once round: dark, light about the top, dark.
   const light = context.createConicGradient(Math.PI / 2, radius, radius);
   const at = (angle: number) => 0.5 + angle / (2 * Math.PI);
   light.addColorStop(0, faded(color, 0));
@@ -73,7 +72,7 @@ function beamOf(owner: Canvas, color: string, radius: number): HTMLCanvasElement
   light.addColorStop(1, faded(color, 0));
   context.fillStyle = light;
   context.fillRect(0, 0, 2 * radius, 2 * radius);
-  // The farther, the fainter.
+  // Fainter with the distance.
   const lamp = context.createRadialGradient(radius, radius, 0, radius, radius, radius);
   for (const [share, alpha] of [
     [0, 0.85],
@@ -90,8 +89,8 @@ function beamOf(owner: Canvas, color: string, radius: number): HTMLCanvasElement
   return beam;
 }
 
-/// The path of the tip like a long exposure: `ages` (s) belong to `points`, oldest first;
-/// `reach` is the radius of the circle (px).
+/// The path of the tip like a long exposure. `points`: oldest first, with their `ages` (s).
+/// `reach`: radius of the circle (px).
 export function drawTrace(
   canvas: Canvas,
   points: readonly Place[],
@@ -100,14 +99,14 @@ export function drawTrace(
   reach: number,
 ): void {
   const { context } = canvas;
-  const fine = Math.min(1, reach / 200); // of a small picture
+  const fine = Math.min(1, reach / 200); // smaller lines in a small picture
   const shadeOf = (age: number) => {
     const light = 0.3 * Math.max(0, 1 - age / seconds) + 0.7 * Math.max(0, 1 - age / FRESH);
     return Math.ceil(SHADES * light);
   };
   context.save();
   context.lineJoin = 'round';
-  context.globalCompositeOperation = isNight() ? 'lighter' : 'source-over'; // by night light adds
+  context.globalCompositeOperation = isNight() ? 'lighter' : 'source-over'; // by night light adds up
   for (let begin = 0; begin < points.length - 1;) {
     const shade = shadeOf(ages[begin]!);
     let end = begin + 1;
@@ -130,8 +129,8 @@ export function drawTrace(
   context.restore();
 }
 
-/// A path from middle to middle between points, rounded at the points; with its `first` and its `last`
-/// point, if these are the ends of the whole trace.
+/// A path from middle to middle between points, rounded at the points. `first` and `last`: whether
+/// it includes these ends of the trace.
 function smooth(
   context: CanvasRenderingContext2D,
   points: readonly Place[],
@@ -174,10 +173,10 @@ export function drawRod(
     const below: Place = [0.18 * thickness, 0.3 * thickness];
     for (const more of [0.4, 0.2, 0]) stroke('rgb(0 0 0 / 0.09)', thickness * (1 + more), below);
   }
-  if (forcedColors.matches) stroke(canvas.color('stage'), thickness + 6); // an edge, over the map
+  if (forcedColors.matches) stroke(canvas.color('stage'), thickness + 6); // an edge against the map
   stroke(base, thickness);
   if (!forcedColors.matches) {
-    // Lit from above: the side that looks up is bright, whichever way the link turns.
+    // Lit from above: the upper side is bright, whichever way the link turns.
     const length = Math.hypot(to[0] - from[0], to[1] - from[1]) || 1;
     let [nx, ny] = [(from[1] - to[1]) / length, (to[0] - from[0]) / length];
     if (ny > 0 || (ny === 0 && nx > 0)) [nx, ny] = [-nx, -ny];
@@ -239,7 +238,7 @@ export function drawHousing(canvas: Canvas, place: Place, radius: number, glows:
   }
 }
 
-/// The motor's shaft, which turns with the upper link by `q1` (rad): its flat side shows how far.
+/// The motor's shaft, which turns with the upper link by `q1` (rad). Its flat side shows the angle.
 export function drawHub(canvas: Canvas, place: Place, radius: number, q1: number): void {
   const { context } = canvas;
   metal(canvas, place, radius, '#4a5468', '#f3f6fb');

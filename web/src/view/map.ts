@@ -8,7 +8,7 @@ type Color = readonly [number, number, number];
 type Names = [string, string, string]; // at the ends of an axis, and in its middle
 type Widths = [number, number, number]; // pixels
 
-// Of V, from the least to the most, ever lighter; and of torques, from left over none to right.
+// Colours of V, lightest at the largest value; colours of torques, from left over none to right.
 export const COLORS: Readonly<Record<Quantity, readonly Color[]>> = {
   value: [
     [20, 14, 54],
@@ -25,24 +25,25 @@ export const COLORS: Readonly<Record<Quantity, readonly Color[]>> = {
     [4, 110, 100],
   ],
 };
-const EASE = 0.25; // of the way to a new map, at each drawing
-const APART = 8; // pixels, between two names at least
+const EASE = 0.25; // share of the way to a new map, at each drawing
+const APART = 8; // pixels, smallest gap of two names
 const [LEFT, BOTTOM] = [16, 18]; // pixels, for the names of the axes
 
-/// A map of V or torque as colours, with the way of the pendulum through it.
+/// A map of V or torque as colours, with the pendulum's trajectory.
 export class MapChart {
   readonly canvas = new Canvas('map');
   private readonly image: HTMLCanvasElement = document.createElement('canvas');
-  private pixels: ImageData | null = null; // of it
-  private shown: Float32Array | null = null; // 0 to 1, on its way to the map
-  bare = false; // colours alone, without the names of the axes and the way
+  private pixels: ImageData | null = null; // of the image
+  private shown: Float32Array | null = null; // 0 to 1, eased towards the map
+  bare = false; // only colours, without names and trajectory
 
-  /// Forgets the map: the next one is shown at once, and not on the way from this one.
+  /// Drops the map, so that the next one appears at once.
   clear(): void {
     this.shown = null;
   }
 
-  /// A place on the canvas (CSS pixels) as shares of both axes, in [0, 1]²; null on the names of the axes.
+  /// A place on the canvas (CSS pixels) as shares of both axes, in [0, 1]²; null outside of the
+  /// map.
   toShares(px: number, py: number): [number, number] | null {
     const { width, height, zoom } = this.canvas;
     const [x, y] = [px / zoom, py / zoom];
@@ -50,8 +51,8 @@ export class MapChart {
     return [Math.min((x - LEFT) / (width - LEFT), 1), Math.min(1 - y / (height - BOTTOM), 1)];
   }
 
-  /// `low` and `high` are the ends of the colours; `way` is where the pendulum was, oldest first; `mark` is
-  /// a place as shares of both axes.
+  /// `low`, `high`: values at the ends of the colours. `way`: past states, oldest first. `mark`:
+  /// shares of both axes.
   draw(
     map: ValueMap,
     low: number,
@@ -67,7 +68,7 @@ export class MapChart {
     else if (!map.cells || Number.isNaN(low)) return;
     if (!map.cells) return canvas.text('computing …', width / 2, height / 2, 'center');
     if (Number.isNaN(low)) return canvas.text('not estimated', width / 2, height / 2, 'center');
-    // All the same are in the middle.
+    // An even map gets the middle colour.
     const shareOf = (cell: number) => (high > low ? (cell - low) / (high - low) : 0.5);
     this.shown ??= map.cells.map(shareOf);
     const { shown } = this;
@@ -116,7 +117,7 @@ export class MapChart {
     brush.putImageData(this.pixels, 0, 0);
   }
 
-  /// White with a dark rim, so that it is seen on every colour.
+  /// White with a dark rim, visible on every colour.
   private drawWay(map: ValueMap, way: readonly State[], now: State): void {
     const { canvas } = this;
     const place = (state: State): [number, number] => [
@@ -127,7 +128,7 @@ export class MapChart {
     for (const state of [...way, now]) {
       const point = place(state);
       const before = pieces.at(-1)!.at(-1);
-      // Over an edge: continue at the other side.
+      // Over an edge: continues at the other side.
       const jumps =
         before &&
         (Math.abs(point[0] - before[0]) > canvas.width / 2 ||
@@ -166,10 +167,10 @@ export class MapChart {
     canvas.context.restore();
   }
 
-  /// The names of an axis of this length: all, or that of the middle alone, which is shorter then.
+  /// The names that fit an axis of this length: all, or only a shorter middle one.
   private fitting(names: Names, length: number): Names {
     const { context } = this.canvas;
-    context.font = this.canvas.font('12px'); // as Canvas.text() has it
+    context.font = this.canvas.font('12px'); // font of Canvas.text()
     const [from, middle, to] = names.map((name) => context.measureText(name).width) as Widths;
     const half = length / 2 - middle / 2 - APART;
     return from < half && to < half ? names : ['', briefly(names[1]), ''];
@@ -185,12 +186,12 @@ function between(colors: readonly Color[], share: number): Color {
   return [mix(0), mix(1), mix(2)];
 }
 
-/// A name for an axis that is too short for all of it.
+/// A short name for a short axis.
 function briefly(name: string): string {
   return name.replace(' link', '');
 }
 
-/// What stands at the ends and in the middle of an axis.
+/// The names of an axis.
 function ends({ name, reach }: Axis): Names {
   if (name === 'q1') return ['hanging', 'upper link upright', 'hanging'];
   if (name === 'q2') return ['folded', 'lower link straight', 'folded'];

@@ -3,20 +3,20 @@ import { Canvas } from './canvas';
 
 const LEFT = 84; // px, for the names of the rows
 const GAP = 4; // px, between rows
-const EASE = 0.3; // of the way to a new brightness, at each drawing
-const FADE = 0.98; // by which the brightest of a row fades, so that it follows what happens
+const EASE = 0.3; // share of the way to a new brightness, at each drawing
+const FADE = 0.98; // factor of a row's reference brightness per drawing
 
 /// The neurons of a layer, or the inputs.
 interface Row {
-  shown: Float32Array; // brightness, eased; below 0 for an input below 0
-  most: number; // largest size lately, which is drawn brightest
+  shown: Float32Array; // brightness, eased; negative for a negative input
+  most: number; // largest recent size, drawn brightest
 }
 
-/// The numbers that an agent sees, and under them its neurons layer by layer. Each is as bright as it is
-/// active. An input below 0 has another colour.
+/// An agent's inputs, and below them its neurons layer by layer, each as bright as it is active.
+/// Negative inputs have another colour.
 export class NeuronChart {
   readonly canvas = new Canvas('neurons');
-  private neurons: Neurons | null = null; // that the rows are of
+  private neurons: Neurons | null = null; // of the rows
   private rows: Row[] = [];
 
   draw(neurons: Neurons | null, observation: Float32Array): void {

@@ -4,7 +4,7 @@ import { COLORS } from './map';
 
 const NAMES = { value: 'expected reward', torque: 'torque, N·m' } as const;
 
-/// What the colours of the map stand for: a bar of them, between the numbers at its ends.
+/// The legend of the map: a bar of its colours between two numbers.
 export class Scale {
   private readonly place: HTMLElement;
   private readonly parts = ['span', 'span', 'i', 'span'].map((tag) => document.createElement(tag));
@@ -15,7 +15,7 @@ export class Scale {
     this.show('value', null);
   }
 
-  /// `ends` are the least and the largest; null where nothing is known, and the scale is hidden.
+  /// `ends`: smallest and largest value; null: unknown, and the legend is hidden.
   show(quantity: Quantity, ends: readonly [number, number] | null): void {
     const [name, low, bar, high] = this.parts as [
       HTMLElement,

@@ -8,13 +8,13 @@ import type { Anchor, Label } from './labels';
 import { drawHousing, drawHub, drawJoint, drawLight, drawRod, drawTrace } from './machine';
 import { Sparks } from './sparks';
 
-export const TRAIL_SECONDS = 20; // of the pendulum's time: a whole swing-up
-const FADING = 0.8; // s, in which the arrow of a shove fades: it acts for 0.1 s
+export const TRAIL_SECONDS = 20; // of the world's time: a whole swing-up
+const FADING = 0.8; // s until the arrow of a shove, which acts for 0.1 s, has faded
 const PIVOT: Vec = { x: 0, z: 0 };
-const CIRCLE = 0.86; // of the box's shorter side: the circle that the tip can reach
-const LARGEST_ARC = (150 / 180) * Math.PI; // at the motor's limit
+const CIRCLE = 0.86; // radius of the tip's reach, in shorter sides of the box
+const LARGEST_ARC = (150 / 180) * Math.PI; // at the torque limit
 
-/// What a scene shows of a world.
+/// The parts of a world that a scene draws.
 export type Shown = Pick<
   World,
   'plant' | 'time' | 'torque' | 'uprightFor' | 'push' | 'drag' | 'shoved'
@@ -27,34 +27,34 @@ export class Scene {
   labels: readonly Label[] = [];
   /// Other pendulums, drawn faintly: q1, q2 [rad] of each.
   ghosts: ArrayLike<number> = [];
-  /// What glows, as a word about it was touched: link1, link2, motor or goal.
+  /// Thing that glows because its word was touched: link1, link2, motor or goal.
   lit: string | null = null;
 
   /// Pixels per metre, and the place of the pivot on the canvas [px].
   private scale = 1;
   private pivot = { x: 0, y: 0 };
-  private box = { left: 0, right: 0, top: 0 }; // that the pendulum stands in, on the canvas [px]
+  private box = { left: 0, right: 0, top: 0 }; // box around the pendulum on the canvas [px]
 
   constructor(id: string) {
     this.canvas = new Canvas(id);
   }
 
-  /// A place on the canvas as a point of the pendulum's plane (m).
+  /// A place on the canvas in the pendulum's plane (m).
   toPlane(px: number, py: number): Vec {
     return { x: (px - this.pivot.x) / this.scale, z: (this.pivot.y - py) / this.scale };
   }
 
-  /// The inverse: a point of the plane (m) as a place on the canvas.
+  /// The inverse of toPlane().
   at({ x, z }: Vec): [number, number] {
     return [this.pivot.x + this.scale * x, this.pivot.y - this.scale * z];
   }
 
-  /// Pixels of this many metres.
+  /// A length (m) in pixels.
   toPixels(metres: number): number {
     return metres * this.scale;
   }
 
-  /// Puts the pendulum in the middle of the canvas's box: the canvas itself may fill the whole window.
+  /// Centres the pendulum in the box: the canvas itself may fill the window.
   private fit(reach: number): void {
     const canvas = this.canvas.element.getBoundingClientRect();
     const box = this.canvas.element.parentElement!.getBoundingClientRect();
@@ -70,7 +70,7 @@ export class Scene {
     };
   }
 
-  /// Draws the pendulum in this state, and the path of its tip over `trail`, oldest first.
+  /// Draws a state of the pendulum, and the path of its tip over `trail`, oldest first.
   draw(world: Shown, state: State, trail: readonly Moment[]): void {
     const { canvas } = this;
     const { plant } = world;
@@ -103,17 +103,17 @@ export class Scene {
     }
   }
 
-  /// Pixels of this many metres, but not less than `least`, where the pendulum is not tiny.
+  /// A width (m) in pixels; at least `least` unless the pendulum is tiny.
   private thick(least: number, metres: number): number {
     return Math.max(Math.min(least, 2 * metres * this.scale), metres * this.scale);
   }
 
-  /// The square that shows the whole pendulum: its middle and half its side (px of the canvas).
+  /// The square around the whole pendulum: its middle and half its side (px of the canvas).
   get square(): { x: number; y: number; half: number } {
     return { ...this.pivot, half: 1.2 * this.scale };
   }
 
-  /// How brightly something shines, from 0 to 1.
+  /// A thing's brightness, from 0 to 1.
   private glow(thing: 'goal', { uprightFor }: Shown): number {
     return this.lit === thing ? 1 : uprightFor !== null ? 0.8 : 0.4;
   }
@@ -134,7 +134,7 @@ export class Scene {
     context.globalAlpha = 1;
   }
 
-  /// Where the label of something is written.
+  /// The place of a label.
   private place(what: Label['at'], elbow: Vec, tip: Vec): Anchor {
     if (what === 'motor') {
       const [x, y] = this.at(PIVOT);
@@ -144,21 +144,22 @@ export class Scene {
       const [x, y] = this.at({ x: 0.6, z: 1 });
       return { x, y, nx: 0, ny: -1, gap: 2 };
     }
-    // At a side of the link that turns with it.
+    // At a side of the link, turning with it.
     const [x, y] = this.at({ x: (elbow.x + tip.x) / 2, z: (elbow.z + tip.z) / 2 });
     const length = Math.hypot(tip.x - elbow.x, tip.z - elbow.z);
     const [nx, ny] = [(elbow.z - tip.z) / length, (elbow.x - tip.x) / length];
     return { x, y, nx, ny, gap: this.thick(10, 0.06) };
   }
 
-  /// A link of 1 kg is as thick as its capsule, or more so that a finger finds it; a heavier one thicker.
+  /// A link of 1 kg is as thick as its capsule, or thicker for fingers. Thickness grows with the
+  /// mass.
   private drawLink(from: Vec, to: Vec, name: 'link1' | 'link2', mass: number): void {
     const thickness = this.thick(10, 0.06) * Math.min(Math.max(mass, 0.25), 3) ** 0.5;
     drawRod(this.canvas, this.at(from), this.at(to), name, thickness, this.lit === name);
   }
 
-  /// An arc about the pivot, from above, clockwise for a positive torque; its length is the share of
-  /// the motor's limit.
+  /// An arc about the pivot from above, clockwise for a positive torque. Its length is the share of
+  /// the torque limit.
   private drawTorque(share: number): void {
     if (Math.abs(share) < 1e-9) return;
     const { context } = this.canvas;
@@ -208,7 +209,7 @@ export class Scene {
     this.arrowHead(x + length * dx, y + length * dy, Math.atan2(dy, dx), 'push');
   }
 
-  /// Pixels from a place to the edge of the canvas in some direction, less the head of an arrow.
+  /// Pixels from a place to the canvas's edge in a direction, less an arrow's head.
   private room(x: number, y: number, dx: number, dy: number): number {
     const { width, height } = this.canvas;
     const along = (at: number, step: number, end: number) =>

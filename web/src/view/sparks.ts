@@ -3,7 +3,7 @@ import type { Canvas } from './canvas';
 const SECONDS = 1.4;
 const COUNT = 36;
 
-/// A burst of sparks where the pendulum was caught.
+/// Sparks where the pendulum was caught.
 export class Sparks {
   private begun = -Infinity; // ms
 
@@ -11,12 +11,12 @@ export class Sparks {
     this.begun = performance.now();
   }
 
-  /// Around (x, y), thrown as far as `reach` pixels.
+  /// Around (x, y), thrown up to `reach` pixels.
   draw(canvas: Canvas, x: number, y: number, reach: number): void {
     const t = (performance.now() - this.begun) / 1000 / SECONDS;
     if (t >= 1) return;
     const { context } = canvas;
-    const out = 1 - (1 - t) ** 3; // fast, then slower
+    const out = 1 - (1 - t) ** 3; // first fast, then slow
     for (let i = 0; i < COUNT; ++i) {
       // The golden angle spreads directions evenly.
       const angle = i * 2.39996;
