@@ -197,7 +197,7 @@ size_t Channel::Receive(std::span<std::byte> buffer) {
   } else {
     got = read(fd_.get(), buffer.data(), buffer.size());
   }
-  // Errors such as a refused packet tell nothing that the age of the last reading does not.
+  // Errors such as a refused packet are ignored, because the age of the last reading shows them.
   return got > 0 ? static_cast<size_t>(got) : 0;
 }
 

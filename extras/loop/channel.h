@@ -24,7 +24,8 @@ struct LinkAddress {
 inline constexpr int kUsualBaud = 921600;
 
 /// Parses an address. `listens`: for `fake`, whose UDP address may lack the host (then 127.0.0.1),
-/// and that has `pty` in place of a twin and a device. Throws BadInput, which begins with `--link`.
+/// and which accepts `pty` instead of a twin or device. Throws BadInput, which begins with
+/// `--link`.
 LinkAddress ParseLink(const std::string& text, bool listens);
 
 /// An open UDP socket or terminal. No call waits except Wait.
@@ -40,9 +41,9 @@ class Channel {
   bool Send(std::span<const std::byte> bytes);
   /// Receives bytes into `buffer`; returns their number, 0: none.
   size_t Receive(std::span<std::byte> buffer);
-  /// Waits until there is something to receive, at most `seconds`. Returns early at a signal.
+  /// Waits up to `seconds` until there is something to receive. Returns early at a signal.
   void Wait(double seconds) const;
-  /// Sends from now on to the sender of the last received bytes.
+  /// Sends to the sender of the last received bytes from now on.
   void AnswerSender();
 
   /// Whether Receive returns whole datagrams.

@@ -173,7 +173,8 @@ TEST(ControlLoop, ATwinGivesEqualBitsForEqualSeeds) {
   ASSERT_EQ(pieces.size(), 1U);
   EXPECT_GT(pieces[0].rows(), 900);
   EXPECT_EQ(pieces[0].measured.size(), pieces[0].time.size());
-  // The log tells when torques were sent: the twin, driven by its commands, repeats the motion.
+  // The log has the times at which torques were sent: the twin, driven by its commands, repeats the
+  // motion.
   const Twin twin = TestTwin();
   Motion motion;
   const MachineLog& log = pieces[0];

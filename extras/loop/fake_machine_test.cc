@@ -32,7 +32,7 @@ TEST(FakeMachine, AnswersAndAppliesOnlyUnlockedCommands) {
   EXPECT_EQ(machine.torque()[0], 5);  // the motor's limit
 }
 
-TEST(FakeMachine, RefusesWhatIsNotNew) {
+TEST(FakeMachine, RefusesOldFrames) {
   FakeMachine machine(TestTwin(), {}, {});
   machine.Answer(CommandOf(1, false), 0.001);
   machine.Answer(CommandOf(2, true), 0.002);

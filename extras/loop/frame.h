@@ -64,7 +64,7 @@ class FrameReader {
   int64_t skipped_ = 0;
 };
 
-/// Recognises frames that are not newer than the one before, by their sequence numbers.
+/// Recognises frames that are not newer than the frame before, by their sequence numbers.
 class SequenceFilter {
  public:
   enum class Verdict { kNew, kDuplicate, kOld };

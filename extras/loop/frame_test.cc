@@ -34,7 +34,7 @@ void ExpectSame(const Frame& a, const Frame& b) {
   EXPECT_EQ(a.angle, b.angle);
 }
 
-TEST(Frame, HasTheChecksumOfEverybodyElse) {
+TEST(Frame, HasTheStandardChecksum) {
   // The check value of CRC-32/ISO-HDLC.
   EXPECT_EQ(Crc32(BytesOf("123456789")), 0xcbf43926U);
 }
@@ -133,7 +133,7 @@ TEST(FrameReader, ADatagramIsOneFrame) {
   EXPECT_FALSE(reader.Next());
 }
 
-TEST(SequenceFilter, TellsNewFramesFromOthers) {
+TEST(SequenceFilter, DistinguishesNewFrames) {
   using Verdict = SequenceFilter::Verdict;
   SequenceFilter filter;
   EXPECT_EQ(filter.Judge(0xfffffffe), Verdict::kNew);

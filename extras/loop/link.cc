@@ -87,7 +87,7 @@ LinkReading LinkProtocol::ReadingOf(const Frame& frame, double now) {
   const uint32_t ago = sequence_ - frame.answers;
   const bool known = ago < sent_at_.size() && ago < sequence_;
   double time = known ? sent_at_[frame.answers % sent_at_.size()] : now;
-  // A machine whose `answers` stand still or go back does not tell when it measured.
+  // If `answers` stand still or go back, the time of the measurement is unknown.
   if (time <= last_time_) time = now;
   last_time_ = time;
   return {{{frame.angle, frame.torque}, time}, now, (frame.flags & Frame::kLocked) != 0};

@@ -32,7 +32,7 @@ struct LinkReading : TimedReading {
   bool locked = false;  // whether the machine's watchdog has locked its motors
 };
 
-/// Number of commands at the end that say that the motors are off.
+/// Number of final commands with motors off.
 inline constexpr int kFarewells = 3;
 
 class MachineLink {
@@ -75,7 +75,7 @@ class TwinLink : public MachineLink {
 /// The loop's side of the exchange of frames, without a line and a clock.
 class LinkProtocol {
  public:
-  /// `datagrams`: whether bytes come in datagrams, of which each has to be one frame.
+  /// `datagrams`: whether bytes come in datagrams, each one frame.
   explicit LinkProtocol(bool datagrams) : reader_(datagrams) {}
 
   /// The next command, to be sent at a time (s).
@@ -125,8 +125,8 @@ class ChannelLink : public MachineLink {
 /// Nanoseconds of a clock that never goes back, and that goes on while the computer sleeps.
 int64_t MonotonicNanoseconds();
 
-/// Locks the program's memory and gives this thread a real-time priority. Returns what is not
-/// permitted, in one line; empty: all is.
+/// Locks the program's memory and gives this thread a real-time priority. Returns the missing
+/// permissions in one line; empty: none.
 std::string EnterRealTime();
 
 }  // namespace upswing

@@ -40,7 +40,7 @@ bool LogRing::Pop(LoopRow& row) {
 LogWriter::LogWriter(const std::string& path) : ring_(kRows) {
   if (path.empty()) return;
   file_.emplace_back(path);
-  // A log is never replaced: the motion of a machine cannot be had again.
+  // A log is never replaced, because a machine's motion cannot be repeated.
   const AppendFile& file = file_.front();
   if (flock(file.descriptor(), LOCK_EX | LOCK_NB) != 0 || file.size() > 0) {
     throw BadInput(Concat("--log: expected a new file, got ", path, ", which exists"));

@@ -38,7 +38,7 @@ class LogRing {
 };
 
 /// Writes the rows to a CSV file with the columns of RealAIGym, on its own thread. The file grows
-/// during the run, so that a crash leaves what happened before it.
+/// during the run, so that a crash loses only the last rows.
 class LogWriter {
  public:
   /// Expects that the path is new, or an empty file that no other process locks. An empty path:

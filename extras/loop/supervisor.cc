@@ -19,7 +19,7 @@ constexpr int kStuckReadings = 2;     // unchanged readings after a fast one: a 
 constexpr double kLargestReading = 1e6;
 constexpr double kLargestStart = 100;  // rad, rad/s
 
-// What the readings of a machine may show.
+// Limits of plausible readings.
 constexpr double kHardest = 1000;       // acceleration that no joint exceeds, rad/s²
 constexpr double kOldest = 0.001;       // age of an angle when its command comes, s
 constexpr double kShortest = 1e-4;      // time between two measurements, s
@@ -28,7 +28,7 @@ constexpr int kErrorSteps = 4;          // of the encoder, in this change
 constexpr double kUnknownStep = 0.006;  // rad; 1024 steps per turn
 constexpr double kLargestError = 0.2;   // of the estimate at a slow joint, rad
 
-// Braking ends with motors off where it does not work.
+// Braking that does not work ends with motors off.
 constexpr double kBrakeShare = 1.5;                      // of the limits of velocity and energy
 constexpr double kEnergyShare = 1.3, kEnergyRise = 0.1;  // of and above the least energy
 constexpr double kEnergyTime = 0.1;                      // in which the energy is averaged, s

@@ -35,7 +35,7 @@ enum class LoopState {
 };
 const char* NameOf(LoopState state);
 
-/// What a cycle knows when the supervisor decides. All times are of the loop's clock.
+/// The supervisor's inputs in a cycle. All times are of the loop's clock.
 struct CycleFacts {
   double time = 0;           // s
   bool fresh = false;        // whether a new reading came in this cycle
@@ -62,8 +62,8 @@ struct SupervisorConfig {
   double period = 0.002;   // of the cycles, s
 };
 
-/// The state machine. Faults are latched. Whatever the facts are, torques are finite and within
-/// their limits, and 0 after a fault.
+/// The state machine. Faults are latched. For any inputs, torques are finite and within their
+/// limits, and 0 after a fault.
 class Supervisor {
  public:
   explicit Supervisor(const SupervisorConfig& config);
@@ -112,7 +112,7 @@ class Supervisor {
   int64_t clipped_ = 0;
 
   static constexpr double kFastest = 100;  // velocity that no joint exceeds at first, rad/s
-  /// What the readings tell of a joint.
+  /// The readings of a joint.
   struct Joint {
     double angle = 0;  // last reading, rad
     double rate = 0;   // last change over the time between the commands, rad/s

@@ -50,7 +50,7 @@ void CheckClockUnit(double median, Findings& findings) {
 double GapOf(double median) { return std::max(0.05, 20 * median); }
 
 void CheckLostCycles(const std::vector<Cycle>& cycles, double median, Findings& findings) {
-  constexpr double kLate = 1.5;  // a longer cycle, in medians, lost at least another
+  constexpr double kLate = 1.5;  // medians; a longer cycle lost at least one
   int places = 0, standing = 0;
   double lost = 0;
   const Cycle *first_standing = nullptr, *longest = nullptr;

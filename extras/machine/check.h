@@ -85,7 +85,7 @@ void CheckTorques(Pieces pieces, Findings& findings);
 void CheckMotion(Pieces pieces, Findings& findings);
 
 /// Whether the motor of a joint (0 or 1) reports torques without a command: more than idle motors
-/// do, and motors whose rotors the other joint accelerates.
+/// do, including motors whose rotors the other joint accelerates.
 bool ActsWithoutCommand(Pieces pieces, int joint);
 
 /// Rows `first` to `last` (indices) of a piece as rows of the file.

@@ -26,7 +26,7 @@ std::optional<double> QuantumOf(Pieces pieces, int joint) {
   }
   if (steps.size() < 3) return std::nullopt;
   const double quantum = *std::ranges::min_element(steps);
-  // Larger steps tell nothing, because errors of rounding grow with them.
+  // Larger steps are not tested, because rounding errors grow with them.
   double near = 0, multiples = 0;
   for (const double step : steps) {
     const double ratio = step / quantum;

@@ -72,7 +72,7 @@ Panel PanelOf(const std::string& title, const std::string& label, Pieces pieces,
   return panel;
 }
 
-/// The warnings and faults, in words.
+/// The warnings and faults in words.
 std::string CaptionOf(const LogCheck& check) {
   std::vector<std::string> texts;
   for (const Finding& finding : check.findings) {

@@ -159,7 +159,7 @@ TEST(MachineCheck, UnitsAndSignOfVelocities) {
 }
 
 TEST(MachineCheck, DegreesOfAngles) {
-  // With velocities in rad/s, the gain tells; at these speeds the range tells, too.
+  // With velocities in rad/s, the gain shows the fault; at these speeds the range does, too.
   MachineLog log = GoodLog();
   Times(&MachineLog::angle, 1, 180 / std::numbers::pi)(log);
   const Findings found = Check(log);

@@ -18,7 +18,7 @@ struct Response {
   double residual() const { return 1 - std::pow(pairs.correlation(), 2); }
 };
 
-constexpr double kMostPairs = 1e5;  // rows of a fit; more take long and tell no more
+constexpr double kMostPairs = 1e5;  // rows of a fit; more would only take longer
 
 /// Command of joint `from`, delayed and lagged, against the measured torque of joint `to`.
 Response Respond(Pieces pieces, int from, int to, int rows, double lag) {

@@ -23,7 +23,7 @@ Pairs VelocityPairs(Pieces pieces, int joint, int other) {
   return pairs;
 }
 
-/// A gain of velocities that tells of a wrong unit.
+/// A gain of velocities that indicates a wrong unit.
 struct WrongUnit {
   double gain;
   const char* suspect;
@@ -37,7 +37,7 @@ constexpr WrongUnit kWrongUnits[] = {
     {1e3, "a clock in ms"},
     {1e6, "a clock in µs"}};
 
-/// What a gain of the velocities means.
+/// The meaning of a gain of the velocities.
 std::string MeaningOf(double gain) {
   for (const WrongUnit& unit : kWrongUnits) {
     if (std::abs(std::abs(gain) / unit.gain - 1) < 0.07) {
@@ -47,8 +47,8 @@ std::string MeaningOf(double gain) {
   return gain < 0 ? "opposite sign" : "suspect the unit or a gear";
 }
 
-/// The difference of angles that the velocities of a joint are, for at least 99% of the rows; empty
-/// if they are none.
+/// The finite difference of the angle that equals a joint's velocities in at least 99% of the rows;
+/// empty if none does.
 std::string DifferenceOf(Pieces pieces, int joint) {
   struct Kind {
     const char* name;

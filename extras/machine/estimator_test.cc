@@ -122,8 +122,8 @@ TEST(Estimator, AWrongTwinStillFollowsTheAngles) {
 }
 
 /// The largest error of zeros and friction after ten seconds, as a share of that at the beginning.
-/// `push`: torque (N·m) on joint 2 in the last 80 ms of every second, which the estimator is not
-/// told.
+/// `push`: torque (N·m) on joint 2 in the last 80 ms of every second, unknown to the
+/// estimator.
 double LargestShare(Estimator& estimator, const Twin& session, double push = 0) {
   const auto errors = [&] {
     const Joints zero = estimator.zero(), friction = estimator.friction();

@@ -256,8 +256,9 @@ class Problem {
   }
 
  private:
-  /// Covariance (n × n) of the differences between sessions, n machine's values. The prior counts
-  /// as one session, so that a single session, which shows no differences, has that of the prior.
+  /// Covariance (n × n) of the differences between sessions, for n values of the machine. The prior
+  /// counts as one session. So a single session, which shows no differences, gets the prior's
+  /// covariance.
   MatrixXd BetweenSessions(int n) const {
     MatrixXd squares = MatrixXd::Zero(n, n);
     MatrixXd difference = MatrixXd::Zero(std::ssize(sessions_), n);

@@ -211,7 +211,7 @@ TEST(Fit, FindsTheTimesOfTheMotorsAndPredictsWithThemBest) {
   }
 }
 
-TEST(Fit, AJointThatReportsNoTorqueTellsNothingAboutReports) {
+TEST(Fit, AJointWithoutReportedTorqueLeavesTheReportsUnknown) {
   ThreadPool pool(2);
   Twin machine = FirstGuess();
   machine.actuator = {.delay = 0.002,

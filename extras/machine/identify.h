@@ -17,8 +17,8 @@ struct Structure {
 };
 
 /// The structures to choose from. Each adds values to the structure before it. `has_motors`:
-/// whether the logs have torques. A motion without torques tells only ratios of masses; then the
-/// centre of link 2 stays at the first guess.
+/// whether the logs have torques. A motion without torques determines only ratios of masses; then
+/// the centre of link 2 stays at the first guess.
 std::vector<Structure> Structures(bool has_motors);
 
 /// A structure's errors on runs that were left out.

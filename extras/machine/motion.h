@@ -56,7 +56,7 @@ struct Motion {
 };
 
 /// Longest step of the integration (Runge-Kutta of order 4), s. Dry friction needs short steps: a
-/// fit takes the errors of longer ones for delay.
+/// fit would mistake the errors of longer ones for delay.
 inline constexpr double kMotionStep = 0.0005;
 /// Number of equal steps for a time of `seconds`, at least 1.
 int MotionSteps(double seconds);

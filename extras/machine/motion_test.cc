@@ -73,7 +73,7 @@ TEST(Drive, LimitsTheJointThatOnlyCompensatesFriction) {
   EXPECT_NEAR(torque[1], 4, 1e-9);
 }
 
-TEST(Drive, ForgetsOnlyWhatNoLongerMatters) {
+TEST(Drive, ForgetsOnlyCommandsThatNoLongerMatter) {
   Drive all(0.003, 0.004), forgetful(0.003, 0.004);
   for (int k = 0; k < 200; ++k) {
     const double time = 0.002 * k;

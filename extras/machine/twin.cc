@@ -78,7 +78,7 @@ void ReadSessions(const toml::table& table, const std::string& where, Twin& twin
     }
     Session& session = twin.sessions.emplace_back();
     session.name = std::string(name.str());
-    ApplyTable(OptionsOf(session), *node.as_table(), where, /*alone=*/true);
+    ApplyTable(OptionsOf(session), *node.as_table(), where, /*flat=*/true);
   }
 }
 
@@ -213,7 +213,7 @@ Twin ParseTwin(std::string_view text, const std::string& where) {
   take("sessions", [&](const toml::node& node, const std::string& place) {
     ReadSessions(table_of(node, place), where, twin);
   });
-  ApplyTable(OptionsOf(twin), table, where, /*alone=*/false);
+  ApplyTable(OptionsOf(twin), table, where, /*flat=*/false);
   if (!has_plant) throw BadInput(Concat(where, ": expected a table [plant], got none"));
   if (!twin.uncertain.empty()) Factor(twin, where);
   return twin;

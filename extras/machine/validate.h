@@ -46,9 +46,9 @@ std::vector<ErrorRow> CompareErrors(std::span<const MachineLog> logs,
                                     std::span<const Predictor> predictors,
                                     std::span<const double> seconds, ThreadPool* pool);
 
-/// A CSV table of measured angles and of those that the predictors predict under the commanded
-/// torques (rad), every 10 ms. It has a window of 1 s of each log: the window with that log's
-/// median error of the first predictor.
+/// A CSV table of measured angles and of the predictors' angles under the commanded torques (rad),
+/// every 10 ms. It has a window of 1 s of each log: the window with that log's median error of the
+/// first predictor.
 std::string MotionCsv(std::span<const MachineLog> logs, std::span<const Predictor> predictors);
 
 /// Draws two panels as .svg or .png: the errors over the length of the windows, and the measured

@@ -36,7 +36,7 @@ TEST(WindowErrors, AreZeroOnlyForTheRightMachine) {
   Twin twin = RealPlant();
   twin.actuator.lag = 0.004;
   twin.sensors.zero1 = 0.02;
-  // The start states' errors, from the jumps of the torques, are what remains.
+  // The remaining errors come from the start states, where the torques jump.
   EXPECT_LT(Median(WindowErrors(logs[0], twin, 0.5, false)), 2e-3);
   EXPECT_LT(Median(WindowErrors(logs[0], twin, 0.5, true)), 2e-3);
   twin.plant.coulomb1 = 0.1;

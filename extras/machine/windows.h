@@ -14,7 +14,7 @@ struct WindowRules {
   double seconds = 0.5;  // length
   double hop = 0.25;     // time between the starts of two windows
   // Greatest height of the tip over the pivot, as a share of the links' length. Upright, any small
-  // error grows fast, and predictions tell nothing.
+  // error grows fast, and predictions are useless.
   double highest = 0.8;
   double motion = 0.05;  // least sum of both angles' standard deviations, rad
 };

@@ -28,7 +28,7 @@ struct Competitor {
 inline constexpr int kPolicyPeriod = static_cast<int>(kControlPeriod / kBoardTimestep + 0.5);
 
 /// Controls `count` simulations with a policy of the double pendulum. It acts every 20 ms, on
-/// PendulumEnv's observations of the plant that the policy was made for. `loaded` must outlive it.
+/// PendulumEnv's observations of the policy's design plant. `loaded` must outlive it.
 std::unique_ptr<BoardController> ControllerOf(const LoadedPolicy& loaded, size_t count);
 
 /// The name of the benchmark's regulator, which holds upright but does not swing up.
@@ -65,8 +65,8 @@ struct HardwareEntry {
   double best, mean;  // scores of ten runs; a failure counts 0
 };
 
-/// The published entries of the hardware boards, version 2, best mean first. The entries with
-/// pushes are those that were scored with HardwareScales.
+/// The published entries of the hardware boards, version 2, best mean first. Entries with pushes
+/// were scored with HardwareScales.
 std::vector<HardwareEntry> PublishedHardwareEntries(Robot robot, bool pushed);
 
 /// A competitor's scores.

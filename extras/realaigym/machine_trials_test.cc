@@ -201,7 +201,7 @@ std::vector<MachineLog> TvlqrRuns(Robot robot, const char* folder) {
   return logs;
 }
 
-/// The published controller on the twin does what it did on the machine.
+/// The published controller does the same on the twin as on the machine.
 TEST(PublishedTvlqr, SwingsUpTheTwinLikeTheMachine) {
   if (RealData().empty()) GTEST_SKIP() << "no measured data";
   const std::vector<MachineLog> logs = TvlqrRuns(Robot::kAcrobot, "swingup");

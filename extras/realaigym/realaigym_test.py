@@ -101,7 +101,7 @@ class RealAIGym(ProgramTest):
             self.refuse(["realaigym", "--search", "x", "--from", "p.safetensors", flag, 8], flag)
         self.refuse(["realaigym", "--search", "x", "--from", POLICY], "fast.safetensors", "--search")
 
-    def test_a_search_that_is_interrupted_keeps_what_it_has(self):
+    def test_an_interrupted_search_keeps_its_policy(self):
         with subprocess.Popen([UPSWING, "realaigym", "--search", "kept.safetensors", *map(str, SMALL),
                                "--generations", "100000"], cwd=self.folder, stdout=subprocess.PIPE,
                               text=True) as search:

@@ -122,7 +122,7 @@ Played Play(const BoardEpisode& episode, Robot robot = Robot::kPendubot) {
   return played;
 }
 
-TEST(RealAiGymSimulation, OutcomesAreThoseOfTheMotion) {
+TEST(RealAiGymSimulation, OutcomesMatchTheMotion) {
   for (const Robot robot : {Robot::kPendubot, Robot::kAcrobot}) {
     const auto [o, trace, seen] = Play(BoardEpisode(), robot);
     ASSERT_EQ(trace.size(), 5000);
@@ -194,7 +194,7 @@ TEST(RealAiGymSimulation, NoiseIsOfItsSize) {
   EXPECT_NEAR(std::sqrt(squares / 5000), 0.3, 0.02);
 }
 
-TEST(RealAiGymSimulation, APushActsBesideTheMotor) {
+TEST(RealAiGymSimulation, APushActsNextToTheMotor) {
   BoardEpisode episode;
   episode.pushes[0] = {5, 2, 0.05};
   const Played pushed = Play(episode), free = Play(BoardEpisode());
@@ -213,7 +213,7 @@ class Strong : public BoardController {
   }
 };
 
-TEST(RealAiGymSimulation, APushAddsToWhatTheMotorGivesAtItsLimit) {
+TEST(RealAiGymSimulation, APushAddsToTheMotorAtItsLimit) {
   for (const Robot robot : {Robot::kPendubot, Robot::kAcrobot}) {
     BoardEpisode episode;
     episode.pushes[0] = {-5, 2, 0.05};
@@ -234,7 +234,7 @@ TEST(RealAiGymSimulation, APushAddsToWhatTheMotorGivesAtItsLimit) {
   }
 }
 
-TEST(RealAiGymSimulation, WhatBlowsUpIsTheWorst) {
+TEST(RealAiGymSimulation, ABlowUpIsTheWorstOutcome) {
   BoardEpisode episode;
   episode.plant.damping1 = -1e3;
   const BoardOutcome o = Play(episode).outcome;

@@ -84,7 +84,7 @@ TEST(BoardSearch, TheBestStartGoesOn) {
   EXPECT_EQ(run(1, 2).second, std::max(first, second).second);
 }
 
-TEST(SwingNet, PoliciesSideBySideActAsEachAlone) {
+TEST(SwingNet, PoliciesSideBySideActLikeSinglePolicies) {
   for (const int hidden : {8, 16}) {
     const SwingNet net(Robot::kPendubot, hidden);
     const std::vector<double> a = net.Initial(1), b = net.Initial(2);
@@ -117,7 +117,7 @@ TEST(SwingNet, ItIsReadAsItWasWritten) {
   EXPECT_EQ(read.net.robot(), Robot::kAcrobot);
 }
 
-TEST(SwingNet, WhatIsNoPolicyIsRefused) {
+TEST(SwingNet, OtherFilesThanPoliciesAreRefused) {
   const SwingNet net(Robot::kPendubot, 8);
   const auto refuses = [&](const char* key, const std::string& value) {
     Tensors file = net.ToTensors(net.Initial(1));

@@ -151,7 +151,8 @@ class Run {
     }
   }
 
-  /// Adds what a torque (N·m) about the joint without the motor does to the velocities in a step.
+  /// Adds the effect of a torque (N·m) about the joint without the motor to the velocities in a
+  /// step.
   void Kick(size_t lane, const Manipulator& body, double torque) {
     const MassMatrix M = body.Mass(std::cos(block_.q2[lane]));
     const double impulse = torque * kBoardTimestep / M.det();

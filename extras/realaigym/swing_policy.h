@@ -39,8 +39,7 @@ class SwingNet {
   /// A controller of a block of simulations with the same parameters for all.
   std::unique_ptr<BoardController> Control(std::span<const double> numbers) const;
   /// A controller with several parameter vectors, each for `lanes_each` consecutive simulations:
-  /// kSwingGroup (swing_net.h) or 1. If there are too few vectors, the last one serves the other
-  /// simulations.
+  /// kSwingGroup (swing_net.h) or 1. The last vector serves any further simulations.
   std::unique_ptr<BoardController> Control(std::span<const std::span<const double>> numbers,
                                            size_t lanes_each) const;
 

@@ -76,7 +76,7 @@ void CheckMemory(const Config& config, int64_t available, int64_t runs) {
   if (needed <= static_cast<double>(available)) return;
   const AgentSize learner = SizeOfLearner(config);
   throw BadInput(Concat("train: expected at most ", Gigabytes(static_cast<double>(available)),
-                        " of memory, which is what is free, got ", Gigabytes(needed), " for ",
+                        " of free memory, got ", Gigabytes(needed), " for ",
                         runs > 1 ? Concat(runs, " runs at a time, each with a ") : "a ",
                         "network of ", FormatCount(learner.parameters), " parameters and a ",
                         learner.store, " of ", FormatCount(learner.capacity),

@@ -74,7 +74,7 @@ size_t EndOfString(std::string_view text, size_t at) {
 
 /// Throws BadInput if lists, tables or dotted keys of a document are nested deeper than kMostDepth.
 /// The parser and the destructors of its result call themselves for each level, which could
-/// overflow the stack. Ignores what follows a string that is not closed, as the parser does.
+/// overflow the stack. Ignores the text after a string that is not closed, as the parser does.
 void CheckDepth(std::string_view text, const std::string& where) {
   int depth = 0, parts = 1;
   for (size_t at = 0; at < text.size(); ++at) {
@@ -131,14 +131,14 @@ std::optional<std::string> TextOf(const toml::node& node) {
 }
 
 std::vector<FlagValue> ApplyTable(const Options& options, const toml::table& table,
-                                  const std::string& where, bool alone) {
+                                  const std::string& where, bool flat) {
   std::vector<std::string> sections;
   for (const Option& option : options.all()) sections.push_back(option.section);
   std::vector<FlagValue> settings;
   for (const auto& [name, node] : table) {
     const std::string key(name.str());
     const auto* section = node.as_table();
-    if (alone && section == nullptr) {
+    if (flat && section == nullptr) {
       settings.push_back(ApplyNode(options, "", key, node, where));
       continue;
     }

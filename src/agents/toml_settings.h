@@ -22,7 +22,7 @@ std::string PlaceOf(const toml::node& node, const std::string& where);
 /// A TOML value as text for Option::Set; nothing for a type that no setting has.
 std::optional<std::string> TextOf(const toml::node& node);
 
-/// Sets the options in the sections of a table; if `alone`, also options outside of sections.
+/// Sets the options in the sections of a table; if `flat`, also options outside of sections.
 /// Returns the settings that it applied. Throws BadInput with the line.
 std::vector<FlagValue> ApplyTable(const Options& options, const toml::table& table,
                                   const std::string& where, bool alone);
