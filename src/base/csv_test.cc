@@ -78,7 +78,7 @@ TEST(Csv, NamesOfATableAreEscapedAsItsTextsAre) {
             (std::vector<std::string>{"a, \"b\"\\nforged", "\\x1b[2J"}));
 }
 
-TEST(Csv, ATableHasTheNamesOfItsFirstRowAndQuotesWhatHasToBe) {
+TEST(Csv, ATableHasTheNamesOfItsFirstRowAndQuotesWhereNecessary) {
   CsvTable table;
   for (const int64_t row : {int64_t{1}, int64_t{9'000'000'000'000'000}}) {
     table.Add("a", row);

@@ -5,9 +5,9 @@
 
 namespace upswing {
 
-/// The project's only exception type. The message is one line for the user. It says what was
-/// expected, what was given, and where. `exit_code` is the program's exit status if nothing handles
-/// the error.
+/// The project's only exception type. The message is one line for the user. It names the place, the
+/// expected and the given input. `exit_code` is the program's exit status if nothing handles the
+/// error.
 class Error : public std::runtime_error {
  public:
   Error(int exit_code, const std::string& message)

@@ -7,8 +7,8 @@
 #include <string_view>
 
 /// Strict readers of JSON from untrusted files. They do not round, wrap around or convert types.
-/// Each function throws BadInput that says what was expected and what was found. The caller adds
-/// the name of the file.
+/// Each function throws BadInput with the expected and the found value. The caller adds the name of
+/// the file.
 namespace upswing {
 
 /// The value of a JSON integer that fits in int64_t; nothing for any other value, such as 8.9 or

@@ -30,7 +30,7 @@ std::string ErrorOf(const Read& read) {
   return "";
 }
 
-TEST(Json, MessagesSayWhatWasExpectedAndWhatWasFound) {
+TEST(Json, MessagesHaveTheExpectedAndTheFoundValue) {
   const json object = ParseJsonObject(R"({"n": 4294967304, "x": 0.5, "t": "text", "l": [1, 2]})");
   EXPECT_EQ(JsonInteger(object, "n", 0, 1LL << 40), 4294967304);
   EXPECT_EQ(JsonNumber(object, "x"), 0.5);

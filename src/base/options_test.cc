@@ -100,7 +100,7 @@ TEST_F(OptionsTest, AnAliasSetsAllItsMembers) {
   EXPECT_EQ(sample_.mass2, 4);
 }
 
-TEST_F(OptionsTest, SaysWhatWasExpectedWhatWasGivenAndWhere) {
+TEST_F(OptionsTest, MessagesHaveTheExpectedAndTheGivenValueAndThePlace) {
   EXPECT_EQ(ErrorOf("count", "11"), "here: expected an integer in [1, 10], got \"11\"");
   EXPECT_EQ(ErrorOf("count", "2.5"), "here: expected an integer in [1, 10], got \"2.5\"");
   EXPECT_EQ(ErrorOf("the_rate", "nan"), "here: expected a number in [0, 1], got \"nan\"");
@@ -116,7 +116,7 @@ TEST_F(OptionsTest, ARejectedValueLeavesNumbersAndListsAsTheyWere) {
   EXPECT_EQ(sample_.widths, (std::vector<int64_t>{4, 5}));
 }
 
-TEST(Choice, IsOneOfThoseGiven) {
+TEST(Choice, IsOneOfTheChoices) {
   std::string color = "red";
   Options options;
   options.AddChoice(&color, "color", {"red", "green"}, "of the pen");
@@ -174,7 +174,7 @@ TEST_F(OptionsTest, OnACommandLine) {
   EXPECT_EQ(options_.Find("name", "").front()->on_command_line(), "--name 'x; $(id)'");
 }
 
-TEST_F(OptionsTest, SaysWhatEachIsWithUnitRangeAndDefault) {
+TEST_F(OptionsTest, HelpHasUnitRangeAndDefault) {
   const auto find = [&](const char* name) { return *options_.Find(name, "").front(); };
   EXPECT_EQ(find("count").about(), "how many [pieces] (1 to 10)");
   EXPECT_EQ(find("count").about_with_default(), "how many [pieces] (1 to 10; default 3)");

@@ -99,8 +99,8 @@ class Tensors {
   void Widen();
 
   /// Copies a tensor into `values`. Throws BadInput unless the type, the number of elements and the
-  /// shape (if given) match. The message says where, which tensor, what was expected and what was
-  /// found.
+  /// shape (if given) match. The message has the place, the tensor, the expected and the found
+  /// value.
   template <typename T>
   void Read(const std::string& name, std::span<T> values,
             const std::vector<int64_t>& shape = {}) const {

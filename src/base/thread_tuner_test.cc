@@ -81,7 +81,7 @@ TEST(ThreadTuner, CallsOfAlternatingLengthDoNotMislead) {
   EXPECT_EQ(work.threads(), 1);
 }
 
-TEST(ThreadTuner, LeavesAFixedPoolAlone) {
+TEST(ThreadTuner, KeepsAFixedPool) {
   ThreadPool pool(3);
   ThreadTuner tuner(&pool);
   for (int call = 0; call < 100; ++call) {

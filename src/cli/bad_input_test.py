@@ -158,7 +158,7 @@ class CommandLineTest(ProgramTest):
             with self.subTest(seconds=seconds):
                 self.refuse(["simulate", "--seconds", seconds], "--seconds")
 
-    def test_resume_beside_out_or_config(self):
+    def test_resume_with_out_or_config(self):
         self.refuse(["train", "--resume", "a", "--out", "b"], "--resume", "--out")
         self.refuse(["train", "--resume", "a", "--config", "b"], "--resume", "--config")
 
@@ -240,7 +240,7 @@ class ModelTest(ProgramTest):
     def test_missing(self):
         self.refuse(["simulate", "--model", "none.xml"], "none.xml", "No such file")
 
-    def test_what_is_no_mjcf_or_does_not_compile(self):
+    def test_a_file_that_is_no_mjcf_or_does_not_compile(self):
         self.refuse_model("<mujoco><worldbody>", "XML")
         self.refuse_model("", "XML")
         self.refuse_model("no XML at all", "XML")
@@ -315,7 +315,7 @@ class TorqueFileTest(SmallRunTest):
                     "1.02", "torques.csv")
         self.succeed("simulate", "--torque", "torques.csv", "--seconds", "1")
 
-    def test_policy_beside_a_schedule(self):
+    def test_policy_with_a_schedule(self):
         self.write("torques.csv", "torque\n1\n")
         self.refuse(["simulate", "run", "--torque", "torques.csv"], "policy", "--torque")
 
@@ -341,7 +341,7 @@ class UntrustedFileTest(ProgramTest):
                 done = self.run_here(*command, preexec_fn=limits, timeout=PATIENCE)
                 self.assert_one_line(done, 2, *words)
 
-    def test_what_is_no_file(self):
+    def test_a_path_that_is_no_file(self):
         os.mkfifo(self.folder / "pipe")
         (self.folder / "folder").mkdir()
         with open(self.folder / "sparse", "wb") as file:

@@ -31,7 +31,7 @@ class HelpTest(ProgramTest):
         self.assertIsNotNone(found, flag)
         return " ".join(found[0].split())
 
-    def test_defaults_are_those_of_the_agent_and_of_the_file(self):
+    def test_defaults_come_from_the_agent_and_the_file(self):
         self.assertIn("default 256,256)", self.help_of("--hidden", "train"))
         self.assertIn("default 48,32)", self.help_of("--hidden", "train", "--agent", "fast"))
         self.assertIn("(default fast)", self.help_of("--agent", "train", "--agent", "fast"))
@@ -95,7 +95,7 @@ class NumberTest(ProgramTest):
             (["train", "--seeds", ""], "--seeds: expected a number of seeds or a list"),
             (["study", "x", "--seeds", ""], "--seeds: expected a number of seeds or a list"))
 
-    def test_what_is_missing_or_too_much(self):
+    def test_missing_and_superfluous_arguments(self):
         self.refuse_numbers(
             ([], "expected a command, one of train, eval, "),
             (["evla"], 'got "evla" (did you mean eval?)'),
@@ -322,7 +322,7 @@ class LauncherTest(ProgramTest):
                              "without --no-setup")
 
     @unittest.skipIf(os.geteuid() != 0, "only root can become somebody else")
-    def test_a_second_user_runs_what_is_built(self):
+    def test_a_second_user_runs_the_built_program(self):
         os.chmod(self.folder, 0o755)
         nobody = {"user": 65534, "group": 65534, "extra_groups": []}
         done = self.launch("info", "x", **nobody)

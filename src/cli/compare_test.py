@@ -161,7 +161,7 @@ class CompareTest(ProgramTest):
         self.assertEqual([g["group"] for g in self.compare("study/fast", "study/slow")["groups"]],
                          ["d3qn (gamma 0.9)", "d3qn (gamma 0.99)"])
 
-    def test_what_makes_no_other_run_makes_no_other_group(self):
+    def test_settings_outside_the_training_do_not_split_a_group(self):
         self.make_run("r/1", 1, [(1, 1), (1, 1)], steps=9000)
         self.make_run("r/2", 2, [(0, 1)] * 4, stop=False, more="threads = 2\n")
         answer = self.compare("r")

@@ -45,7 +45,7 @@ class Lqr(ProgramTest):
         fall = self.succeed("simulate", "--start", "3.11,0.02,0.1,-0.05", "--seconds", 5)
         self.assertEqual(list(csv.DictReader(io.StringIO(fall)))[-1]["inverted"], "0")
 
-    def test_eval_says_what_it_is(self):
+    def test_eval_describes_it(self):
         result = json.loads(self.succeed("eval", "lqr", "--lqr-torque", 0.1, "--made-for", "mass2=1.2",
                                          "--episodes", 4, "--physics", "closed-form", "--json"))
         self.assertEqual(result["policy"], "lqr (lqr_torque 0.1, for mass2 1.2)")
@@ -100,7 +100,7 @@ class Lqr(ProgramTest):
         self.assertEqual(result["check"]["same_successes"], result["check"]["cells"])
         self.assertTrue((self.folder / "map/map.png").read_bytes().startswith(b"\x89PNG"))
 
-    def test_map_over_plants_says_what_it_was_made_for(self):
+    def test_map_over_plants_names_the_design_plant(self):
         result = json.loads(self.succeed(
             "map", "lqr", "--x", "mass2=-40%:+40%:3", "--y", "damping2=0.1:0.3:3", "--set", "q1=178",
             "--set", "mass1=1.1", "--check", 0, "--json", "--out", "map"))
@@ -172,7 +172,7 @@ class SwingUp(ProgramTest):
         other = self.eval("tvlqr", "--set", "mass2=3", "--episodes", 10)  # not its design plant
         self.assertLess(other["successes"], 10)
 
-    def test_hybrid_catches_what_a_network_brings_up(self):
+    def test_hybrid_catches_a_networks_swing_up(self):
         alone = self.eval(POLICY, "--episodes", 20)
         caught = self.eval("hybrid", "--swing-up", POLICY, "--episodes", 20)
         self.assertEqual(caught["successes"], 20)

@@ -131,7 +131,7 @@ class EvalTest(ProgramTest):
     def test_the_last_set_counts(self):
         self.assertEqual(self.evaluate("--set", "mass=2", "--set", "mass2=1")["plant"]["mass2"], 1)
 
-    def test_table_says_what_the_json_says(self):
+    def test_table_and_json_agree(self):
         result = self.evaluate()
         table = self.succeed("eval", self.policy, "--episodes", 10)
         self.assertNotIn("\x1b", table)
@@ -165,7 +165,7 @@ class EvalTest(ProgramTest):
         with open(self.folder / "episodes.csv", encoding="utf-8", newline="") as file:
             return list(csv.DictReader(file))
 
-    def test_episodes_are_those_of_the_summary(self):
+    def test_episodes_match_the_summary(self):
         flags = ("--randomize", 0.4, "--seed", 3)
         rows = self.episodes(*flags)
         result = self.evaluate(*flags, episodes=6)
@@ -239,7 +239,7 @@ class EvalTest(ProgramTest):
             lean = [math.remainder(angle(row) - math.pi, 2 * math.pi) for row in rows[950:1000]]
             self.assertAlmostEqual(number[link], math.degrees(sum(lean) / 50), delta=1e-9)
 
-    def test_simulate_and_plot_say_what_eval_said(self):
+    def test_simulate_and_plot_agree_with_eval(self):
         flags = ("--randomize", 0.5, "--seed", 2)
         row = self.episodes(*flags)[4]
         verdict = "success" if row["success"] == "1" else "failure"
@@ -269,7 +269,7 @@ class EvalTest(ProgramTest):
         self.refuse(["eval", self.policy, "--episodes-csv", "-", "--json"], "--json",
                     "--episodes-csv")
 
-    def test_episodes_on_standard_output_are_a_table_alone(self):
+    def test_episodes_on_standard_output_are_only_a_table(self):
         rows = self.episodes()
         text = self.succeed("eval", self.policy, "--episodes", 6, "--episodes-csv", "-")
         self.assertEqual(list(csv.DictReader(text.splitlines())), rows)

@@ -41,7 +41,7 @@ class RunTest(SmallRunTest):
 
 
 class LinkTest(RunTest):
-    def test_what_grows_is_neither_cut_nor_appended_to_through_a_link(self):
+    def test_growing_files_are_neither_cut_nor_appended_to_through_a_link(self):
         for name in GROWING:
             for hard in (False, True):
                 with self.subTest(name=name, hard=hard):
@@ -58,7 +58,7 @@ class LinkTest(RunTest):
                 self.link_away(f"run/{name}").unlink()
                 self.refuse(self.RESUME, f"run/{name}")
 
-    def test_what_is_replaced_is_replaced_itself(self):
+    def test_a_link_is_replaced_not_its_target(self):
         whole = {name: self.link_away(f"run/{name}") for name in REPLACED}
         before = {name: path.read_bytes() for name, path in whole.items()}
         self.succeed(*self.RESUME)
@@ -263,7 +263,7 @@ class PlaceTest(ProgramTest):
         self.succeed(*small(**TINY | {"out": "runs/b"}))
         self.assertEqual([path.name for path in (self.folder / "runs").iterdir()], ["b"])
 
-    def test_what_was_left_behind_is_no_run(self):
+    def test_leftovers_are_no_run(self):
         self.succeed(*small(**TINY), "--seeds", 2)
         expected = self.succeed("compare", "many")
         left = self.folder / "many/.seed3.making-0123456789abcdef"

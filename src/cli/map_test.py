@@ -68,7 +68,7 @@ class MapTest(ProgramTest):
             self.assertIn(word, text)
         self.assertEqual(result["files"], ["map/map.csv", "map/map.svg", "map/map.png"])
 
-    def test_a_cell_is_what_an_evaluation_of_its_plant_finds(self):
+    def test_a_cell_equals_an_evaluation_of_its_plant(self):
         result = self.map("--x", "gravity=0.05:0.1:2", "--y", "torque_limit=4:5:2", "--episodes",
                           100, "--check", 0)
         for row, torque in enumerate((4, 5)):
@@ -149,7 +149,7 @@ class MapTest(ProgramTest):
         result = self.map(*GRID, "--check", 0, *more, out=out)
         return result, (self.folder / out / "map.svg").read_text(encoding="utf-8")
 
-    def test_what_is_not_the_trainings_stands_on_the_figure(self):
+    def test_differences_from_the_training_are_on_the_figure(self):
         usual, text = self.figure("--episodes", 1, out="usual")
         self.assertEqual(usual["changes"], "")
         self.assertIn(">as in training<", text)

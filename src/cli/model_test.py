@@ -99,7 +99,7 @@ class BombTest(ProgramTest):
                     self.refuse_quickly(command, "run/model.xml")
             self.refuse_quickly(["study", "s.toml", "--out", "new"], "m.xml")
 
-    def test_what_is_no_file(self):
+    def test_a_path_that_is_no_file(self):
         os.mkfifo(self.folder / "pipe")
         (self.folder / "folder").mkdir()
         for name, words in (("pipe", "expected a file, got a pipe or a device"),
@@ -142,7 +142,7 @@ class RunTest(ProgramTest):
 
     OWN = MODEL.replace('armature="0.01"', 'armature="0.02"', 1)
 
-    def test_it_is_resumed_from_anywhere_and_whatever_becomes_of_the_file(self):
+    def test_it_is_resumed_from_anywhere_and_without_the_file(self):
         (self.folder / "a/sub").mkdir(parents=True)
         (self.folder / "b").mkdir()
         self.write("a/own.xml", self.OWN)
@@ -180,7 +180,7 @@ class RunTest(ProgramTest):
         for command in (["train", "--resume", "run"], ["info", "run"]):
             self.refuse(command, "run/config.toml", "expected model.xml", "../own.xml")
 
-    def test_variants_of_a_study_may_differ_in_the_content_of_their_models_alone(self):
+    def test_variants_of_a_study_may_differ_only_in_the_content_of_their_models(self):
         self.write("one.xml", MODEL)
         self.write("two.xml", self.OWN)
         text = 'seeds = 1\n[settings]\nagent = "d3qn-small"\nsteps = 100\neval_every = 100\n' \

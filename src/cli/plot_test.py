@@ -64,7 +64,7 @@ class PlotTest(ProgramTest):
         text = self.succeed("plot", self.policy, "--seconds", 0.1, "--out", "hanging")
         self.assertIn("not at the end", text)
 
-    def test_a_second_plot_goes_beside_the_first(self):
+    def test_a_second_plot_goes_next_to_the_first(self):
         for number in ("", "-2", "-3"):
             self.succeed("plot", self.policy, "--seconds", 0.1)
             self.addCleanup(shutil.rmtree, self.policy / f"plot{number}")
@@ -83,7 +83,7 @@ class PlotTest(ProgramTest):
                 for path in re.findall(r"<path stroke='[^']*' +d='M([^']*)'", text)
                 for stroke in path.split("M")]
 
-    def test_what_stands_on_the_figures(self):
+    def test_texts_of_the_figures(self):
         self.succeed("plot", self.policy, "--seconds", 0.2, "--set", "mass2=1.3", "--delay", 0.04,
                      "--start", "3,0,0,0", "--seed", 5, "--out", "out")
         for name in ("out/episode.svg", "out/phase.svg"):
@@ -98,7 +98,7 @@ class PlotTest(ProgramTest):
         longest = max(self.curves("out/phase.svg"), key=len)
         self.assertGreater(len(longest), 150)
 
-    def test_what_is_held_is_drawn_as_steps(self):
+    def test_held_values_are_drawn_as_steps(self):
         self.succeed("plot", self.policy, "--seconds", 4, "--start", "3.1,0.1,0,0", "--out", "out")
         rows = list(csv.DictReader(self.succeed("simulate", self.policy, "--seconds", 4, "--start",
                                                 "3.1,0.1,0,0").splitlines()))

@@ -48,7 +48,7 @@ class OutputTest(ProgramTest):
                               encoding="utf-8")
         self.assertIn("cannot write the output: No space left", done.stderr)
 
-    def test_training_goes_on_without_a_place_for_what_it_says(self):
+    def test_training_goes_on_without_a_place_for_its_output(self):
         # More lines than a buffer holds.
         many = TINY | {"steps": 4000, "eval_every": 40, "eval_episodes": 1,
                        "stop_when_solved": False, "eval_physics": "closed-form"}

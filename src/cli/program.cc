@@ -65,7 +65,7 @@ bool OutputIsClosed() {
   return poll(&output, 1, 0) == 1 && (output.revents & POLLERR) != 0;
 }
 
-/// Ends quietly by SIGPIPE, as programs usually do when nobody reads their output.
+/// Ends quietly by SIGPIPE, as programs usually do when the reader of their output has ended.
 int EndByPipe() {
   std::signal(SIGPIPE, SIG_DFL);
   std::raise(SIGPIPE);

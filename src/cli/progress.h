@@ -43,7 +43,7 @@ class ProgressLine {
 /// terminal, it prints a plain line on standard error every ten seconds.
 class EpisodeProgress {
  public:
-  /// Shows no bar if `quiet`. `unit` names what is counted.
+  /// Shows no bar if `quiet`. `unit`: name of the counted items.
   explicit EpisodeProgress(bool quiet, const char* unit = "episodes")
       : quiet_(quiet), unit_(unit) {}
 

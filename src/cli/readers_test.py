@@ -80,7 +80,7 @@ class ReadersTest(ProgramTest):
                                  column)
         self.assertEqual(scalars, {})
 
-    def test_tensorboard_reads_what_the_tables_say(self):
+    def test_tensorboard_reads_the_values_of_the_tables(self):
         self.succeed(*small())
         self.assert_scalars_are_the_tables()
 

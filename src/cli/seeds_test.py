@@ -36,7 +36,7 @@ class SeedsTest(ProgramTest):
 
     # ---- Results.
 
-    def test_each_seed_equals_the_run_alone(self):
+    def test_each_seed_equals_a_single_run(self):
         output = self.succeed(*small(**TINY), "--seeds", "2,5-6")
         self.assertTrue(output.startswith("Training d3qn-small in many\n  seeds 2, 5-6: 3 runs"),
                         output)
@@ -59,7 +59,7 @@ class SeedsTest(ProgramTest):
                           "seed2.log", "settings.toml"])
         self.assertIn("./upswing compare runs/d3qn-small\n", output)
 
-    def test_the_table_tells_what_the_runs_say(self):
+    def test_the_table_matches_the_runs(self):
         # Almost without gravity the pendulum stays where it stops, so it is solved soon.
         easy = {"gravity": 0.05, "damping": 1, "hidden": "64,64", "head": 32, "eval_episodes": 1,
                 "eval_every": 2000, "steps": 100000, "threads": None, "out": "easy"}
@@ -72,7 +72,7 @@ class SeedsTest(ProgramTest):
             self.assertRegex(output, rf"(?m)^  seed {seed} +{step}  .* +100% +-?\d+ *$")
         self.assertRegex(output, rf"(?m)^  median +{sorted(solved.values())[1]:,} .* 3 of 3 solved")
 
-    def test_own_model_beside_the_settings(self):
+    def test_own_model_next_to_the_settings(self):
         self.write("own.xml", MODEL)
         self.succeed(*small(**TINY | {"model": "own.xml"}), "--seeds", 2)
         (self.folder / "own.xml").unlink()
@@ -81,7 +81,7 @@ class SeedsTest(ProgramTest):
 
     # ---- Resuming.
 
-    def test_finished_runs_are_left_alone_and_others_come_to_them(self):
+    def test_finished_runs_stay_and_others_are_added(self):
         self.succeed(*small(**TINY), "--seeds", 2)
         before = snapshot(self.folder)
         self.assertIn("2 already done", self.succeed(*small(**TINY), "--seeds", 2))
@@ -196,7 +196,7 @@ class SeedsTest(ProgramTest):
         self.refuse([*small(**TINY), "--seeds", "1"], "many/settings.toml: made with",
                     "choose another --out")
 
-    def test_other_settings_are_refused_with_what_differs(self):
+    def test_other_settings_are_refused_with_the_difference(self):
         self.succeed(*small(**TINY), "--seeds", 1)
         for changes, words in (({"gamma": 0.9}, ["agent.gamma = 0.99", "has 0.9"]),
                                ({"agent": "d3qn"}, ["train.agent", "d3qn-small"]),

@@ -286,7 +286,7 @@ class PolicyRolloutTest(ProgramTest):
         self.succeed("eval", "remembering", "--episodes", 2)
         self.assertIn(" motion, 3 for each of the last 2 steps\n", self.succeed("info", "remembering"))
 
-    def test_a_policy_that_identifies_the_plant_is_told_nothing_of_it(self):
+    def test_a_policy_that_identifies_the_plant_does_not_observe_it(self):
         self.succeed(*small(memory=1, out="identifying"), "--identify", "--randomize", 0.1)
         metadata, _ = read_tensors(self.folder / "identifying/policy.safetensors")
         self.assertIn("observes    8 numbers for the motion, 13 for the identified plant, 3 for the last step\n", self.succeed("info", "identifying"))

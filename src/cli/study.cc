@@ -148,10 +148,11 @@ void AddStudy(CommandLine& line) {
   line.Text("file", arguments.file, "FILE.toml", "study file: variants, settings and seeds");
   line.Text("--out", arguments.out, "FOLDER", "folder of the study (default runs/FILE)");
   AddManyOptions(line, arguments.seeds, arguments.jobs);
-  line.Text("--keep", arguments.keep, "WHAT",
-            "files of a finished run to keep; all; policy: policy, settings, evaluations and log; "
-            "tables: none, only its rows in the study's tables (default all, or FILE's value)",
-            "all, policy or tables");
+  line.Text(
+      "--keep", arguments.keep, "WHAT",
+      "files of a finished run to keep: all, policy (policy, settings, evaluations and log) or "
+      "tables (only its rows in the study's tables) (default all, or FILE's value)",
+      "all, policy or tables");
   line.Flag(
       "--status", arguments.status,
       "print how many runs are done, running and lost, and exit; also takes the study's folder");

@@ -57,7 +57,7 @@ class StudyTest(ProgramTest):
         self.assertTrue(output.startswith(shown), output)
         self.assertTrue(all(line.isprintable() for line in output.splitlines()), repr(output))
 
-    def test_each_run_equals_the_same_settings_alone(self):
+    def test_each_run_equals_a_single_run(self):
         self.write("little.toml", STUDY)
         output = self.succeed("study", "little.toml")
         self.assertTrue(output.startswith(
@@ -92,7 +92,7 @@ class StudyTest(ProgramTest):
                 self.assertEqual({path.name for path in (self.folder / out / "a").glob("*[0-9]")},
                                  {f"seed{seed}" for seed in seeds})
 
-    def test_finished_runs_are_left_alone_and_a_new_variant_comes_to_them(self):
+    def test_finished_runs_stay_and_a_new_variant_is_added(self):
         self.write("little.toml", STUDY)
         self.succeed("study", "little.toml")
         before = snapshot(self.folder / "runs/little")
@@ -129,7 +129,7 @@ class StudyTest(ProgramTest):
         again = self.succeed("study", "sub/s.toml", "--seeds", "1-1", "--out", "x")
         self.assertIn("2 already done", again)
 
-    def test_other_settings_are_refused_with_what_differs(self):
+    def test_other_settings_are_refused_with_the_difference(self):
         self.write("little.toml", STUDY)
         self.succeed("study", "little.toml")
         self.write("little.toml", STUDY.replace("gamma = 0.9", "gamma = 0.8"))

@@ -132,7 +132,7 @@ class WorkersTest(ProgramTest):
         self.work()
         self.assertEqual(len(list(study.rglob("*.done"))), 8)
 
-    def test_a_worker_that_is_told_to_stop_leaves_its_run_to_be_resumed(self):
+    def test_a_stopped_worker_leaves_its_run_to_be_resumed(self):
         study = self.prepare(ENDLESS)
         for number in (signal.SIGTERM, signal.SIGINT):
             with self.subTest(signal=number):
@@ -170,7 +170,7 @@ class WorkersTest(ProgramTest):
                               stderr=subprocess.DEVNULL)
         self.assertEqual(done.returncode, 2)
 
-    def test_a_run_that_fails_is_left_until_the_study_is_begun_anew(self):
+    def test_a_failed_run_waits_until_the_study_is_started_again(self):
         study = self.prepare()
         (study / "one/seed2").mkdir()
         self.write("study/one/seed2/precious", "mine")
@@ -199,7 +199,7 @@ class WorkersTest(ProgramTest):
         self.assertFalse((study / "one/seed1").exists())
         self.assert_same_study("study", "all")
 
-    def test_a_worker_that_dies_is_replaced_and_what_kills_twice_fails(self):
+    def test_a_worker_that_dies_is_replaced_and_a_run_that_kills_twice_fails(self):
         self.write("little.toml", ENDLESS)
         process = self.start("study", "little.toml", "--out", "study", "--seeds", "1-1", "--jobs", 1)
         log = self.folder / "study/one/seed1/log.txt"
@@ -217,13 +217,13 @@ class WorkersTest(ProgramTest):
         self.assertEqual(failed.read_text(encoding="utf-8"), "ended by signal 9\n")
         self.assertEqual(self.end(process, signal.SIGINT)[0], 130)
 
-    def test_a_worker_that_was_halted_does_not_write_beside_another(self):
+    def test_a_halted_worker_does_not_write_next_to_another(self):
         study = self.prepare(ENDLESS)
         worker = self.start_worker()
         log = study / "one/seed1/log.txt"
         self.wait_for(log.exists)
         claim = study / "one/seed1.claim"
-        # Another worker on this host leaves the claim alone, however old it is.
+        # Another worker on this host leaves the claim untouched, however old it is.
         os.utime(claim, (time.time() - 1000,) * 2)
         other = self.start_worker()
         self.wait_for((study / "two/seed1/log.txt").exists)

@@ -50,7 +50,7 @@ class SmallTrainingTest(ProgramTest):
         self.assertEqual({path.name for path in (self.place / "run").iterdir()}, RUN_FILES)
         self.assertEqual([path.name for path in self.place.iterdir()], ["run"])
 
-    def test_log_tells_what_times_depend_on(self):
+    def test_log_has_the_conditions_of_times(self):
         log = (self.place / "run/log.txt").read_text(encoding="utf-8")
         begin = json.loads(re.search(r"Z started at step 0 (\{.*\})\n", log).group(1))
         self.assertEqual(list(begin), ["host", "vectors", "threads", "processor", "version"])
@@ -104,12 +104,12 @@ class TrainTest(ProgramTest):
 
     # ---- Output.
 
-    def test_a_rate_is_told_once_it_is_known(self):
+    def test_a_rate_is_printed_once_it_is_known(self):
         output = self.succeed(*small(log_every=3000))
         self.assertRegex(output, r"(?m)^ *2,000 steps .* - updates/s ")
         self.assertRegex(output, r"(?m)^ *4,000 steps .* [1-9][\d,]* updates/s ")
 
-    def test_summary_says_not_solved_and_what_to_type_next(self):
+    def test_summary_says_not_solved_and_names_the_next_commands(self):
         output = self.succeed(*small())
         self.assertIn("not solved yet", output)
         self.assertIn("Best policy: run/policy.safetensors", output)
@@ -119,7 +119,7 @@ class TrainTest(ProgramTest):
         for command in commands:
             self.succeed(*command.split())
 
-    def test_progress_bar_tells_all_on_a_terminal(self):
+    def test_progress_bar_on_a_terminal(self):
         facts = (r"[1-9][\d,]* steps/s", r"[1-9][\d,]* updates/s", r"eps \d\.\d\d",
                  r"loss \d\.\d+", r"return -?\d+", r"success \d+%", r"at most [^\r]+ left")
         bar = r"\r\x1b\[K\[[= ]{16}\] +\d+% [^\r]*"
@@ -151,7 +151,7 @@ class TrainTest(ProgramTest):
         (self.folder / "run").mkdir()
         self.succeed(*small())
 
-    def test_a_neighbour_with_a_similar_name_is_left_alone(self):
+    def test_a_neighbour_with_a_similar_name_stays(self):
         for name in ("run.new", "run.tmp"):
             (self.folder / name).mkdir()
             (self.folder / name / "precious").write_text("mine")

@@ -40,7 +40,7 @@ TEST(LqrCatch, CatchesAllOfItsRegion) {
   }
 }
 
-TEST(LqrCatch, HoldsWhatALongerSimulationHolds) {
+TEST(LqrCatch, AgreesWithALongerSimulation) {
   const Plant plant;
   const LqrCatch upright(LqrConfig(), plant);
   PendulumModel model(plant);

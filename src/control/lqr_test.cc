@@ -188,7 +188,7 @@ TEST(Lqr, DearTorqueAsksForLess) {
   EXPECT_GT(std::abs(SolveLqr(cheap, Plant()).K[0]), 1.2 * std::abs(SolveLqr(dear, Plant()).K[0]));
 }
 
-TEST(Lqr, InfoSaysWhatItIsFor) {
+TEST(Lqr, InfoNamesTheDesignPlant) {
   Plant plant;
   plant.mass2 = 1.25;
   LqrConfig config;

@@ -53,7 +53,7 @@ TEST(PendulumModel, StepsAsTheEquationsOfMotionSay) {
   }
 }
 
-TEST(PendulumModel, DerivativesAreThoseOfTheSteps) {
+TEST(PendulumModel, DerivativesMatchTheSteps) {
   Rng rng(2, "states");
   const Plant plant = DrawPlant(rng);
   const Manipulator manipulator = ManipulatorOf(plant);
@@ -91,7 +91,7 @@ TEST(PendulumModel, UprightItIsTheLinearModel) {
   EXPECT_LT((models[0].B - expected.B).norm(), 1e-8);
 }
 
-TEST(Manipulator, EnergyChangesByWorkAndDampingAlone) {
+TEST(Manipulator, EnergyChangesOnlyByWorkAndDamping) {
   Rng rng(3, "states");
   for (int trial = 0; trial < 100; ++trial) {
     const Plant plant = DrawPlant(rng);

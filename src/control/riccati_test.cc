@@ -105,7 +105,7 @@ TEST(Riccati, NoSolutionWhereAGrowingModeCostsNothing) {
   EXPECT_TRUE(SolveDiscreteLqr(model, Q, 1).has_value());
 }
 
-TEST(Riccati, NoSolutionOfWhatIsNotFinite) {
+TEST(Riccati, NoSolutionForNumbersThatAreNotFinite) {
   const Matrix4d Q = Matrix4d::Identity();
   for (const double x :
        {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {

@@ -137,7 +137,7 @@ TEST(Mpc, BrakesAFastJoint) {
   }
 }
 
-TEST(Hybrid, CatchesWhatALawBringsUp) {
+TEST(Hybrid, CatchesTheSwingUpOfALaw) {
   const Plant plant;
   PartialFeedbackConfig pfl;
   LqrConfig lqr;

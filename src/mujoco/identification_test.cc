@@ -93,7 +93,7 @@ TEST_P(IdentifyingEnvs, KnowsItsSensors) {
   EXPECT_LT(DeltaErrors(env).median, 0.04);
 }
 
-TEST_P(IdentifyingEnvs, NothingIsToldOfThePlant) {
+TEST_P(IdentifyingEnvs, ObservationsHideThePlant) {
   PendulumEnvConfig config = Config(), other = Config();
   other.plants.front().mass2 = 1.2;
   other.plants.front().gravity = 8;
@@ -118,7 +118,7 @@ TEST_P(IdentifyingEnvs, AnEpisodeBeginsWithoutKnowledge) {
   }
 }
 
-TEST_P(IdentifyingEnvs, MirroringKeepsWhatIsKnown) {
+TEST_P(IdentifyingEnvs, MirroringKeepsTheEstimate) {
   PendulumEnvConfig config = Config();
   config.memory = 1;
   PendulumEnv env(config);

@@ -16,10 +16,10 @@ inline constexpr size_t kMostMjcfBytes = 65536;
 /// and harmless extras (lights, cameras, sites, sensors of joints, key frames). Each number must be
 /// finite and within 1e6.
 ///
-/// Refused are attributes that read files, repeat elements or set a size. Also refused are those
-/// that change the motion in ways that the plant's parameters do not describe (wind, gravity
-/// compensation, limits of forces). MuJoCo then checks the values, and LoadModel checks that the
-/// model is a double pendulum.
+/// Refused are attributes that read files, repeat elements or set a size. Also refused are
+/// attributes that change the motion in ways that the plant's parameters do not describe (wind,
+/// gravity compensation, limits of forces). MuJoCo then checks the values, and LoadModel checks
+/// that the model is a double pendulum.
 void CheckMjcf(const std::string& mjcf, const std::string& where);
 
 }  // namespace upswing

@@ -54,7 +54,7 @@ TEST(MjcfCheck, TakesTheBuiltInModelOfAnyPlant) {
 }
 
 // Hand-written variants that MuJoCo accepts and that are double pendulums.
-TEST(MjcfCheck, TakesWhatIsWrittenByHand) {
+TEST(MjcfCheck, AcceptsHandWrittenModels) {
   const std::string mjcf =
       "\xef\xbb\xbf"
       R"(<?xml version="1.0" encoding="utf-8"?>
@@ -104,7 +104,7 @@ TEST(MjcfCheck, TakesWhatIsWrittenByHand) {
   EXPECT_TRUE(DifferencesFromBuiltIn(*LoadModel(Mjcf(Plant()), "m.xml")).empty());
 }
 
-TEST(MjcfCheck, SaysWhichElementWasNotExpectedAndWhere) {
+TEST(MjcfCheck, NamesTheUnexpectedElementAndItsPlace) {
   ExpectRefused(Changed("<motor ", "<moter "), "did you mean motor?");
   for (const std::string element :
        {"include file=\"a.xml\"", "size nkey=\"200000000\"", "size nuser_body=\"200000000\"",
@@ -125,7 +125,7 @@ TEST(MjcfCheck, SaysWhichElementWasNotExpectedAndWhere) {
   ExpectRefused("<mujoco/>\n<robot/>", "m.xml:2: expected <mujoco>");
 }
 
-TEST(MjcfCheck, SaysWhichAttributeWasNotExpectedAndWhere) {
+TEST(MjcfCheck, NamesTheUnexpectedAttributeAndItsPlace) {
   const std::string joint = "<joint name=\"joint1\"";
   ExpectRefused(Changed(joint, "<joint actuatorfrcrange=\"-1 1\" name=\"joint1\""),
                 "m.xml:7: <joint> takes no \"actuatorfrcrange\" here");
@@ -198,7 +198,7 @@ TEST(MjcfCheck, BoundsEveryNumber) {
   }
 }
 
-TEST(MjcfCheck, RefusesWhatIsNoPlainXml) {
+TEST(MjcfCheck, RefusesOtherTextThanPlainXml) {
   ExpectRefused("", "m.xml:");
   ExpectRefused("no XML at all", "not well-formed XML");
   ExpectRefused("<mujoco>\n<worldbody>", "not well-formed XML");

@@ -302,7 +302,7 @@ TEST(Model, RefusesMassThatThePlantCannotDescribe) {
             std::string::npos);
 }
 
-TEST(Model, RefusesInAirWhatOnlyAirFeels) {
+TEST(Model, RefusesInAirPropertiesThatOnlyAirFeels) {
   const auto loads = [](const std::string& moments) {
     std::string mjcf =
         WithInertial(Concat("mass=\"1\" pos=\"0 0 -0.4\" diaginertia=\"", moments, "\""));
@@ -330,7 +330,7 @@ TEST(Model, AFileKeepsItsOwnArmature) {
   EXPECT_EQ(model->dof_armature[1], 0.02);
 }
 
-TEST(Model, RefusesWhatThePlantsParametersWouldHide) {
+TEST(Model, RefusesPropertiesOutsideThePlantsParameters) {
   const auto loads = [](const std::string& from, const std::string& to) {
     std::string mjcf = Mjcf(Plant());
     mjcf.replace(mjcf.find(from), from.size(), to);

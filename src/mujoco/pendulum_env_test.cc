@@ -163,7 +163,7 @@ TEST(PendulumEnv, APushAddsToTheMotorUntilTheNextState) {
   EXPECT_THROW(PendulumEnv(config).Push(0, {1, 0}), Error);
 }
 
-TEST_P(PendulumEnvs, ABlowUpTerminatesWithFiniteNumbersAndStartsAnew) {
+TEST_P(PendulumEnvs, ABlowUpTerminatesWithFiniteNumbersAndStartsAgain) {
   PendulumEnv env(SmallConfig());
   StepResult result = env.MakeResult();
   env.SetState(1, {0, 0, 1e200, 0});

@@ -76,7 +76,7 @@ TEST(Randomization, PlantsAreUniformInTheBoxAndTheirNumbersIndependent) {
   }
 }
 
-TEST(Randomization, WhatHasNoWidthStaysAndChangesNothingElse) {
+TEST(Randomization, AParameterWithoutWidthStaysAndChangesNothingElse) {
   Rng a(1, "test"), b(1, "test");
   Plant heavy;
   heavy.mass2 = 3;
@@ -178,7 +178,7 @@ TEST_P(RandomizedEnvs, EveryEpisodeMovesAsItsOwnPlantDoes) {
   EXPECT_EQ(std::ranges::adjacent_find(masses), masses.end());
 }
 
-TEST_P(RandomizedEnvs, StartsAreThoseOfOnePlantAndStreamsAreNamed) {
+TEST_P(RandomizedEnvs, StartsEqualTheStartsOfOnePlantAndStreamsAreNamed) {
   PendulumEnvConfig config = Config(2);
   const PendulumEnv random(config);
   PendulumEnvConfig plain = config;
@@ -229,7 +229,7 @@ TEST_P(RandomizedEnvs, ARestartWithoutASeedIsAnotherEpisodeOfItsOwn) {
   EXPECT_EQ(env.plant(0).mass1, same.plant(0).mass1);
 }
 
-TEST_P(RandomizedEnvs, AStepLeavesWhatIsHeldAsItIs) {
+TEST_P(RandomizedEnvs, AStepKeepsHeldEnvironments) {
   PendulumEnvConfig config = Config(3);
   config.memory = 2;
   config.disturbances = {Disturbance{0, 0.02}};

@@ -137,7 +137,7 @@ TEST_P(KernelTest, LinearLayersMatchTheirDefinitions) {
   }
 }
 
-TEST_P(KernelTest, ARowDoesNotDependOnTheRowsBesideIt) {
+TEST_P(KernelTest, ARowDoesNotDependOnItsNeighbours) {
   // Require equal bits; otherwise results would depend on the number of threads.
   const int B = 37, in = 70, out = 45;
   const Input x(B, in, "x"), w(in, out, "w"), b(1, out, "b");
@@ -260,7 +260,7 @@ TEST_P(KernelTest, TanhAndItsBackwardPass) {
   EXPECT_TRUE(std::isnan(nan[0]));
 }
 
-TEST_P(KernelTest, SquashedSamplesAreThoseOfTheirDefinition) {
+TEST_P(KernelTest, SquashedSamplesFollowTheirDefinition) {
   constexpr Real tolerance = 4 * kEpsilon;
   constexpr size_t kMost = 37;
   Rng rng(3, "samples");

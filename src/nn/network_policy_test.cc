@@ -269,7 +269,7 @@ class QNetworkTest : public ::testing::Test {
   }
 };
 
-TEST_F(QNetworkTest, LoadsWhatItSavedToTheBit) {
+TEST_F(QNetworkTest, LoadsASavedPolicyToTheBit) {
   const NetworkPolicy policy = MakePolicy();
   const NetworkPolicy loaded =
       NetworkPolicy::From(ReadSafetensors(WriteSafetensors(policy.ToTensors()).Joined(), "saved"));

@@ -149,7 +149,7 @@ std::vector<double> Definition(const Network& network, std::span<const Real> par
   return y;
 }
 
-TEST_P(NetworkTest, OutputsAreThoseOfTheDefinitionAndRowsDoNotDependOnTheirBatch) {
+TEST_P(NetworkTest, OutputsFollowTheDefinitionAndRowsDoNotDependOnTheirBatch) {
   Objective f(GetParam(), 5);
   f.Value();
   const AlignedVector<Real> together = f.y;

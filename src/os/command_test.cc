@@ -7,7 +7,7 @@
 namespace upswing {
 namespace {
 
-TEST(RunCommand, GivesWordsAndInputAndTakesWhatIsSaid) {
+TEST(RunCommand, PassesWordsAndInputAndReturnsTheOutput) {
   const auto done = RunCommand(
       {"sh", "-c", "cat; printf '%s|' \"$@\" >&2; exit 3", "sh", "a b", "$(id)"}, "in\nput");
   ASSERT_TRUE(done);
@@ -23,7 +23,7 @@ TEST(RunCommand, MoreThanAPipeHoldsGoesBothWays) {
   EXPECT_EQ(done->output, text);
 }
 
-TEST(RunCommand, SaysWhichSignalEndedIt) {
+TEST(RunCommand, NamesTheSignalThatEndedIt) {
   const auto done = RunCommand({"sh", "-c", "kill -TERM $$"});
   ASSERT_TRUE(done);
   EXPECT_EQ(done->signal, SIGTERM);

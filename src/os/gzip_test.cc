@@ -15,7 +15,7 @@ std::string LongText() {
   return text;
 }
 
-TEST(Gzip, InflatesWhatWasCompressed) {
+TEST(Gzip, InflatesCompressedText) {
   for (const std::string& text : {std::string(), std::string("time,pos1\n0,1\n"), LongText()}) {
     const std::string bytes = Gzip(text);
     EXPECT_TRUE(IsGzip(bytes));

@@ -34,7 +34,7 @@ TEST(Making, AFolderAppearsUnderItsNameWhenItIsPublished) {
   EXPECT_EQ(CountIn(temp.path()), 1);
 }
 
-TEST(Making, WhatIsNotPublishedIsRemoved) {
+TEST(Making, AnUnpublishedFileIsRemoved) {
   const TempFolder temp;
   for (const Kind kind : {Kind::kFile, Kind::kFolder}) {
     const Making making(temp / "a", kind);
@@ -50,7 +50,7 @@ std::string OwnDigits() {
   return name.substr(name.size() - 16, 8) + "01234567";
 }
 
-TEST(Making, WhatAKilledProcessLeftIsRemovedByTheNextAndNothingElse) {
+TEST(Making, TheNextProcessRemovesOnlyTheFilesOfAKilledOne) {
   const TempFolder temp;
   const fs::path left = temp / (".run.making-" + OwnDigits());
   fs::create_directories(left / "below");
@@ -70,7 +70,7 @@ TEST(Making, WhatAKilledProcessLeftIsRemovedByTheNextAndNothingElse) {
   EXPECT_EQ(CountIn(temp.path()), 4);
 }
 
-TEST(Making, WhatAnotherHostMakesIsLeftAloneForAnHour) {
+TEST(Making, AFileOfAnotherHostStaysForAnHour) {
   // Another host's locks may be invisible here.
   const TempFolder temp;
   const fs::path folder = temp / ".run.making-0123456789abcdef";

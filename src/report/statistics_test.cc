@@ -64,7 +64,7 @@ TEST(Statistics, ProbabilityOfImprovementByHand) {
   EXPECT_EQ(ProbabilityOfImprovement(once, never), 0.75);
 }
 
-TEST(Statistics, AnIntervalDependsOnTheScoresAlone) {
+TEST(Statistics, AnIntervalDependsOnlyOnTheScores) {
   const auto a = EstimateIqm({{3, 1, 4, 1, 5}}), b = EstimateIqm({{1, 1, 3, 4, 5}});
   EXPECT_EQ(a.interval->low, b.interval->low);
   EXPECT_EQ(a.interval->high, b.interval->high);

@@ -86,7 +86,7 @@ std::vector<fs::path> RunsIn(const fs::path& folder, Found& found) {
   std::ranges::sort(paths);
   if (paths.empty() && found.left_out.size() == problems) {
     found.LeaveOut(folder,
-                   "expected a run folder (config.toml beside evals.csv or "
+                   "expected a run folder (config.toml next to evals.csv or "
                    "checkpoint.safetensors) or a folder of runs, got neither");
   }
   return paths;

@@ -51,7 +51,7 @@ TEST(Comparison, FinalAndBestEvaluation) {
   EXPECT_EQ(s.final_return.iqm.value, 2525);
 }
 
-TEST(Comparison, TorquesAreThoseOfTheBestEvaluation) {
+TEST(Comparison, TorquesComeFromTheBestEvaluation) {
   RunGroup group{"a", {MadeRun(1, {{1, 2600}, {1, 2500}}), MadeRun(2, {{0, 0}, {1, 9}})}};
   for (RunRecord& run : group.runs) {
     for (EvaluationRow& row : run.evaluations) {

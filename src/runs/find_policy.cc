@@ -37,8 +37,8 @@ LoadedPolicy SwingUpNamed(const std::string& name) {
                         ", which was trained on another model"));
 }
 
-/// Applies --made-for: a plant file, if there is one, then the changes. Returns what was changed:
-/// the file, or the plant before. Throws BadInput.
+/// Applies --made-for: a plant file, if there is one, then the changes. Returns the plant
+/// before the changes. Throws BadInput.
 PlantFile ChangeDesignPlant(const PolicyArguments& a, Plant& plant) {
   std::vector<std::string> changes, files;
   for (const std::string& text : a.made_for) {

@@ -69,7 +69,7 @@ TEST(LearningCurve, CurvesAreDottedFromWhereARunHasEndedOverStepsAndOverTime) {
   EXPECT_NE(apart.caption.find("Dotted"), std::string::npos);
 }
 
-TEST(LearningCurve, TheFigureSaysHowManyRunsAndWhatTheBandIs) {
+TEST(LearningCurve, TheFigureExplainsTheNumberOfRunsAndTheBand) {
   const RunGroup a{"a", {MadeRun(1, {{0, 5}, {0, 10}}), MadeRun(2, {{0, 5}, {0, 10}})}};
   const Figure figure = LearningCurves({a});
   EXPECT_EQ(figure.panels[0].lines[0].name, "");  // one legend for all

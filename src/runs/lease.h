@@ -43,7 +43,7 @@ class Lease {
 
 /// State of a lease as other processes see it.
 struct LeaseInfo {
-  std::string holder;  // text of the file, or a description of what is wrong with it
+  std::string holder;  // text of the file, or a description of its fault
   bool lost = false;   // whether it has expired or its holder has ended
   double seconds = 0;  // since its last renewal
 };

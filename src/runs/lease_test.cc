@@ -50,7 +50,7 @@ TEST(Lease, OneHolderAtATimeAndNothingIsLeft) {
   EXPECT_TRUE(Lease::Take(path, "another one"));
 }
 
-TEST(Lease, ThatOfAnotherHostRunsOutWithoutRenewal) {
+TEST(Lease, ALeaseOfAnotherHostExpiresWithoutRenewal) {
   const TempFolder folder;
   const fs::path path = folder.path() / "seed1.claim";
   WriteForeign(path);
@@ -67,7 +67,7 @@ TEST(Lease, ThatOfAnotherHostRunsOutWithoutRenewal) {
   EXPECT_EQ(FilesIn(folder.path()), 1U);
 }
 
-TEST(Lease, ThatOfAProcessThatHasEndedIsFreeAtOnce) {
+TEST(Lease, ALeaseOfAnEndedProcessIsFreeAtOnce) {
   const TempFolder folder;
   const fs::path path = folder.path() / "seed1.claim";
   const pid_t child = fork();
@@ -96,7 +96,7 @@ TEST(Lease, IsRenewedAsLongAsItIsHeld) {
   EXPECT_LT(ReadLease(path)->seconds, 50);
 }
 
-TEST(Lease, WhoWasHaltedSeesThatItsLeaseIsAnothersAndLeavesThat) {
+TEST(Lease, AHaltedHolderSeesThatItLostItsLease) {
   const TempFolder folder;
   const fs::path path = folder.path() / "seed1.claim";
   {
@@ -113,7 +113,7 @@ TEST(Lease, WhoWasHaltedSeesThatItsLeaseIsAnothersAndLeavesThat) {
   EXPECT_TRUE(fs::exists(path));
 }
 
-TEST(Lease, ThatOfALivingProcessOfThisHostDoesNotRunOut) {
+TEST(Lease, ALeaseOfALivingProcessOfThisHostDoesNotExpire) {
   const TempFolder folder;
   const fs::path path = folder.path() / "seed1.claim";
   const auto lease = Lease::Take(path, "here");

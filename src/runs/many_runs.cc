@@ -123,7 +123,7 @@ class LocalWorkers {
     }
     Look();
     for (const SeedRun* run : running_) {      // runs of stopped workers
-      if (fs::exists(run->claim())) continue;  // the run goes on on another host
+      if (fs::exists(run->claim())) continue;  // the run continues on another host
       auto* stopped = *std::ranges::find(open_, run);
       stopped->Read();
       observer_.End(*stopped);

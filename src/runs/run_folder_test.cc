@@ -9,7 +9,7 @@
 namespace upswing {
 namespace {
 
-TEST(RunFolder, ATableKeepsItsColumnsWhateverVersionGoesOnWithIt) {
+TEST(RunFolder, ATableKeepsItsColumnsUnderAnotherVersion) {
   const TempFolder temp;
   Tensors first;
   RunFolder::Create(temp / "run", {{"config.toml", ""}}, first);

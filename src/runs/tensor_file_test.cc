@@ -317,7 +317,7 @@ struct Component {
   }
 };
 
-TEST_F(TensorFileTest, ArchiveLoadsWhatItSaved) {
+TEST_F(TensorFileTest, ArchiveLoadsItsSavedState) {
   Component saved;
   saved.fixed = {1, 2, 3};
   saved.growing = {4, 5};
