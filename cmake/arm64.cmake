@@ -1,5 +1,5 @@
-# Cross-compiles for 64-bit Arm with Debian's compiler and libraries (multiarch), and runs what is
-# built in QEMU's user-mode emulation. CONTRIBUTING.md has the packages.
+# Cross-compiles for 64-bit Arm with Debian's compiler and libraries (multiarch), and runs the
+# results in QEMU's user-mode emulation. CONTRIBUTING.md has the packages.
 set(CMAKE_SYSTEM_NAME Linux)
 set(CMAKE_SYSTEM_PROCESSOR aarch64)
 set(CMAKE_CXX_COMPILER aarch64-linux-gnu-g++)

@@ -12,7 +12,7 @@ set(UPSWING_INSTALLED_MUJOCO ${CMAKE_INSTALL_LIBDIR}/upswing/mujoco)
 function(upswing_install_layers FOLDER DESTINATION)
   foreach(LAYER IN LISTS ARGN)
     install(TARGETS upswing_${LAYER} EXPORT upswing)
-    # Not what tests share, nor what one kernel includes into another.
+    # Without headers for tests, and without parts of kernels.
     install(DIRECTORY ${FOLDER}/${LAYER} DESTINATION ${DESTINATION} FILES_MATCHING PATTERN "*.h"
             PATTERN "*testing.h" EXCLUDE PATTERN "*-inl.h" EXCLUDE PATTERN "testdata" EXCLUDE)
   endforeach()

@@ -6,7 +6,7 @@ function(upswing_unity)
   set_target_properties(${ARGN} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 6)
 endfunction()
 
-# Compiles tests in half the time: what takes time in them is in the libraries.
+# Compiles tests in half the time. Their slow code is in the libraries.
 function(upswing_quickly name)
   target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
 endfunction()

@@ -17,8 +17,8 @@ BELOW_RUNS = PORTABLE | {"src/os", "src/mujoco", "src/report"}
 PRODUCT = BELOW_RUNS | {"src/runs", "src/judge"}
 EXTRAS = {"extras/machine", "extras/realaigym", "extras/loop", "extras/deploy", "extras/view"}
 
-# Folders that each folder may include, besides itself. The commands of extras are in no folder of their
-# own: they are the files that COMMAND matches.
+# Folders that each folder may include, besides itself. The commands of extras match COMMAND and
+# count as a folder of their own.
 LAYERS = {
     "src/base": set(),
     "src/nn": {"src/base"},

@@ -91,7 +91,7 @@ class CheckLayers(unittest.TestCase):
                                  "src/rl/dqn.h:1", "src/rl/ must not need an operating system")
         self.assertEqual(self.check({"src/os/file.h": "#include <unistd.h>\n"}), (0, []))
 
-    def test_what_is_allowed_has_no_cycle(self):
+    def test_allowed_includes_have_no_cycle(self):
         sys.path.insert(0, str(CHECK.parent))
         import check_layers
         self.assertEqual(check_layers.cycles(check_layers.LAYERS), [])

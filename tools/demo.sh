@@ -4,7 +4,7 @@
 : "${root:?}" "${setup:?}" "${program:?}"
 
 page=$root/build/web
-program=${UPSWING:-$program} # tests have another one
+program=${UPSWING:-$program} # tests set another one
 
 # Runs the program with the page of this copy, or with the one that UPSWING_PAGE names.
 demo() {

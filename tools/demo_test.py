@@ -155,7 +155,7 @@ class DemoTest(ProgramTest):
             server, _ = self.serve("My Run")
 
     def read_only(self, folder):
-        """Takes the right to write from everybody, as in an installed page; root keeps it."""
+        """Makes the page read-only for all users except root, like an installed page."""
         for path in (folder, *folder.rglob("*")):
             path.chmod(path.stat().st_mode & 0o555)
         self.addCleanup(lambda: [path.chmod(0o755) for path in (folder, *folder.rglob("*"))])

@@ -72,7 +72,7 @@ set_site() {
     bad_input "--site: expected the existing folder $(dirname -- "$dist") for $(basename -- "$dist")"
 }
 
-# Installs Doxygen and Sphinx. Where set_up follows, one lock after the other is held.
+# Installs Doxygen and Sphinx.
 set_up_docs() {
   # shellcheck disable=SC2086  # a list of words
   (install_packages $packages doxygen && lock &&
@@ -98,7 +98,7 @@ quoted() {
   esac
 }
 
-# The landing page, the page and the documentation; they appear in their folder whole or not at all.
+# Moves the landing page, the page and the documentation to their folder, complete or not at all.
 write_site() {
   tmp=$(mktemp -d "$(dirname -- "$dist")/.upswing-site.XXXXXX") || fail "cannot write next to $dist"
   trap 'rm -rf "$tmp"' EXIT
@@ -108,7 +108,7 @@ write_site() {
     cp -R "$page" "$tmp/page" && cp -R "$docs" "$tmp/docs" &&
     # GitHub Pages leaves out folders such as _static unless this file is there.
     : >"$tmp/.nojekyll"; } || fail "could not copy the site (see above)"
-  chmod =rwx "$tmp" # as the umask has it
+  chmod =rwx "$tmp" # mode from the umask
   mv -T -- "$tmp" "$dist" || fail "could not move the site to $dist (see above)"
   case $dist in
     *[[:cntrl:]]*) echo "the site is written, for any web server" ;;

@@ -39,7 +39,7 @@ class FetchWheel(unittest.TestCase):
         self.assert_refused(["mujoco", self.folder, "riscv64"],
                             "expected Linux on x86_64 or aarch64", "riscv64")
 
-    def test_what_is_there_is_kept(self):
+    def test_existing_files_are_kept(self):
         (self.folder / "lib").mkdir(parents=True)
         library = self.folder / "lib/libmujoco.so.4.0.0"
         library.write_text("here", encoding="utf-8")

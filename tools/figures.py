@@ -336,7 +336,7 @@ def realaigym_scores():
 
 @figure("machine-motion")
 def machine_motion():
-    """Measured angles of left-out runs, and those that the twin and the benchmark's own model predict."""
+    """Measured angles of left-out runs, and predictions of the twin and the benchmark's own model."""
     from matplotlib.lines import Line2D
     runs = {}
     for row in data_of(CSV / "machine-motion.csv"):

@@ -15,11 +15,11 @@ ROOT = Path(os.environ.get("UPSWING_ROOT", Path(__file__).resolve().parent.paren
 UPSWING = Path(os.environ.get("UPSWING", ROOT / "build/release/bin/upswing"))
 PROGRAM = UPSWING.parent / "portable_test"
 
-# Symbols that may be undefined, as nm prints them, and why. All others are refused: files (open,
-# fopen, stat, std::filesystem, std::ofstream), processes, sockets, MuJoCo (mj_…), protobuf,
+# The only permitted undefined symbols, as nm prints them, by purpose. Refused are all others: files
+# (open, fopen, stat, std::filesystem, std::ofstream), processes, sockets, MuJoCo (mj_…), protobuf,
 # tinyxml2.
 ALLOWED = {
-    "what a compiled C++ program needs to begin, to throw and to allocate":
+    "start, exceptions and allocation of a compiled C++ program":
         r"_ITM_\w+|__gmon_start__|__libc_start_main|__cxa_\w+|__gxx_personality_v0|_Unwind_Resume|"
         r"(typeinfo|vtable|VTT) for (std|__cxxabiv1)::.*|operator (new|delete)\b.*|"
         r"__stack_chk_fail|__errno_location|__tls_get_addr|__libc_single_threaded",
@@ -32,13 +32,13 @@ ALLOWED = {
         r"(a?(sin|cos|tan)h?|sincos|atan2|exp(2|m1)?|log(2|10|1p)?|pow|sqrt|cbrt|hypot|erfc?|fmod|"
         r"remainder|floor|ceil|l?l?round|nearbyint|rint|trunc|fmin|fmax|copysign|lgamma)f?|"
         r"__(mul|div)[sd]c3|c(abs|exp|log|sqrt)f?",
-    "threads: std::mutex, and the waiting of std::atomic (on Linux the system call futex)":
+    "threads: std::mutex, and waiting by std::atomic (on Linux the system call futex)":
         r"pthread_\w+|sched_yield|syscall",
     "toml++, whose parser of text is a shared library":
         r"(typeinfo for |vtable for )?toml::.*",
-    "Highway: which vector instructions the processor has, and how it reports its own errors":
+    "Highway: the processor's vector instructions, and error messages":
         r"hwy::.*",
-    "assertions, in a build that has them":
+    "assertions, in some builds":
         r"__assert_fail|abort",
     "printf of the test's own result":
         r"printf|puts|putchar|__printf_chk",
@@ -75,7 +75,7 @@ class Portable(unittest.TestCase):
         self.assertIn("memcpy", symbols)
         self.assertEqual(offenders(symbols), [])
 
-    def test_the_check_finds_what_is_not_allowed(self):
+    def test_the_check_finds_forbidden_symbols(self):
         bad = ["open", "fopen", "fopen64", "stat", "getenv", "mj_step", "mjb_step", "socket", "fork",
                "google::protobuf::MessageLite::SerializeToString() const", "tinyxml2::XMLUtil::X()",
                "std::filesystem::status(std::filesystem::__cxx11::path const&)", "std::cout",

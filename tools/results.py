@@ -3,7 +3,7 @@
 
   results.py write            renders every table in README.md and docs/ from docs/results/data
                               and from the program
-  results.py check            lists what is out of date, and ends with 1 if anything is
+  results.py check            lists the outdated tables; exit code 1 if there are any
   results.py measure ID       runs the commands of a table and rewrites docs/results/data/ID.json
   results.py measure ID --try    prints the table with few seeds and episodes; writes nothing
   results.py machine          adds this machine to machines.json and prints its ID

@@ -48,13 +48,13 @@ SchedulerType=sched/backfill
 SchedulerParameters=sched_interval=2,bf_interval=2
 PreemptType=preempt/partition_prio
 PreemptMode=REQUEUE
-# A node that has not answered for so long is lost, and its jobs are requeued.
+# A node without an answer for this many seconds is lost, and its jobs are requeued.
 SlurmdTimeout=10
 ReturnToService=2
 # Between TERM and KILL.
 KillWait=20
 MessageTimeout=5
-# The nodes have as many processors as it says here.
+# The nodes have the numbers of processors given here.
 SlurmdParameters=config_overrides
 {nodes}
 PartitionName=low Nodes=ALL PriorityTier=1 PreemptMode=REQUEUE Default=YES

@@ -1,5 +1,5 @@
 # shellcheck shell=sh
-# ./upswing view: what it needs that no other command does. Read by ./upswing, whose functions it uses.
+# ./upswing view: its own packages. Read by ./upswing, whose functions it uses.
 : "${packages:?}" "${picture_packages:?}" "${window_packages:?}"
 
 # view_needs ARGUMENTS: adds to `packages` what these need; sets `viewer` if they open a window.
@@ -25,7 +25,7 @@ view_needs() {
   fi
 }
 
-# Whether a file is one that ffmpeg writes.
+# Whether ffmpeg writes a file of this name.
 is_film() {
   case $1 in *.[mM][pP]4 | *.[gG][iI][fF]) film=yes ;; esac
 }

@@ -1,9 +1,9 @@
 # shellcheck shell=sh
-# What the page needs besides the C++ program: Node, its packages, a Chromium for the tests.
+# Sets up the page's tools: Node, its packages, a Chromium for the tests.
 # Read by ./upswing and tools/web_test, which have the repository's folder in $root.
 : "${root:?}"
 
-# Downloaded where no suitable Node is installed.
+# Downloaded if no suitable Node is installed.
 own_node=$root/build/deps/node-$(sed -n 's/.*==\([0-9.]*\).*/\1/p' "$root/tools/node-requirements.txt")
 
 # Whether Vite runs on this version of Node: 20.19, 22.12 or later ones.
@@ -18,7 +18,7 @@ node_is_suitable() {
   esac
 }
 
-# Puts Node and npm on the PATH if they are not there yet; fails if there are no suitable ones.
+# Puts Node and npm on the PATH unless they are there; fails without suitable ones.
 find_node() {
   ! { node_is_suitable "$(node --version 2>/dev/null)" && command -v npm >/dev/null; } || return 0
   [ -x "$own_node/bin/npm" ] || return 1
@@ -27,7 +27,7 @@ find_node() {
 
 lock_hash() { sha256sum <"$root/web/package-lock.json"; }
 
-# Whether web/node_modules is what the lock file says.
+# Whether web/node_modules matches the lock file.
 modules_are_current() {
   stamp=$root/web/node_modules/.upswing-lock
   [ -f "$stamp" ] && [ "$(cat "$stamp")" = "$(lock_hash)" ]
@@ -46,13 +46,13 @@ find_chromium() {
   return 1
 }
 
-# Where Playwright puts its own Chromium, for systems whose packages have none, such as Ubuntu.
+# The folder for Playwright's own Chromium, for systems without a package, such as Ubuntu.
 export PLAYWRIGHT_BROWSERS_PATH="$root/build/deps/playwright"
 has_own_chromium() { [ -n "$(find "$PLAYWRIGHT_BROWSERS_PATH" -name INSTALLATION_COMPLETE 2>/dev/null)" ]; }
 
-# What follows installs; it is for ./upswing alone and uses what that defines.
+# The functions below install. Only ./upswing uses them, with its own functions.
 
-# Puts Node on the PATH and its packages into web/node_modules, each if it is not there yet.
+# Puts Node on the PATH and its packages into web/node_modules, unless they are there.
 set_up_node() {
   if ! find_node; then
     (install_packages python3 python3-pip ca-certificates && lock &&
@@ -62,7 +62,7 @@ set_up_node() {
   ! modules_are_current || return 0
   (
     lock
-    ! modules_are_current || exit 0 # another process did it meanwhile
+    ! modules_are_current || exit 0 # another process did it
     say "installing the page's packages (npm ci)"
     cd web
     npm ci --loglevel=error >../build/npm.log 2>&1 ||
@@ -71,13 +71,13 @@ set_up_node() {
   ) </dev/null || exit 1
 }
 
-# The package that has a Chromium, where one is wanted and there is one that works without snap.
+# The package with a Chromium that works without snap, if one is wanted and exists.
 chromium_package() {
   ! find_chromium >/dev/null || return 0
   case $(system_name) in debian*) echo chromium-headless-shell ;; esac
 }
 
-# Elsewhere: Playwright's own, with the libraries that it needs.
+# On other systems: Playwright's own Chromium, with the libraries that it needs.
 set_up_chromium() {
   ! { find_chromium >/dev/null || has_own_chromium; } || return 0
   say "installing Chromium (playwright install)"
@@ -85,7 +85,7 @@ set_up_chromium() {
     fail "no Chromium could be installed (see above); set UPSWING_CHROMIUM to one"
 }
 
-# What compiles web/wasm, for the test that its module is that of the sources.
+# The compiler of web/wasm, for the test that the module is up to date.
 set_up_wasm() {
   for name in zig highway; do
     version=$(sed -n 's/^[a-z]*==\([0-9.]*\).*/\1/p' "$root/tools/$name-requirements.txt")

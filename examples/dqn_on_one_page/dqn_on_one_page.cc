@@ -35,8 +35,8 @@
 
 using namespace upswing;
 
-// Torques, dueling streams, Polyak averaging and the decay of ε per episode are those of the post.
-// The sizes and rates are ours: the post has 256-256 units and streams of 128.
+// Torques, dueling streams, Polyak averaging and the decay of ε per episode are from the post. The
+// sizes and rates are ours: the post has 256-256 units and streams of 128.
 constexpr int D = kObservationSize, A = 9, B = 128, E = 20;
 constexpr std::array<double, A> kTorque = {-5, -3.75, -2.5, -1.25, 0, 1.25, 2.5, 3.75, 5};  // N·m
 constexpr int kHidden = 64, kStream = 32;  // units of both hidden layers, and of each stream
@@ -175,7 +175,7 @@ double SuccessRate(Agent& agent, uint64_t seed) {
   PendulumEnvConfig config;
   config.num_envs = E;
   config.seed = seed;
-  config.stream = "evaluation";  // starts that differ from those of the training
+  config.stream = "evaluation";  // other starts than in the training
   PendulumEnv env(config);
   const EnvSpec& spec = env.spec();
   const long steps = std::lround(spec.evaluation.seconds / spec.step_seconds);

@@ -95,8 +95,8 @@ ForeignMaker MakerOf(const nanobind::object& make);
 /// Throws the Python exception of a pending signal, such as Ctrl-C. Needs the interpreter's lock.
 void CheckSignals();
 
-/// Tells when long work should give Python a turn: at intervals, and only in the thread that
-/// created this object.
+/// Decides when long work gives Python a turn: at intervals, and only in the thread that created
+/// this object.
 class Interrupts {
  public:
   /// Whether this is that thread and its last turn is long enough ago.

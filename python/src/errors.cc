@@ -62,10 +62,10 @@ void CheckSignals() {
 
 void BindErrors(nb::module_& m) {
   error_class = MakeClass(m, "Error", "Base class of Upswing's exceptions.", PyExc_Exception);
-  input_error_class = MakeClass(
-      m, "InputError",
-      "Wrong input: the message names the argument, what was expected and what was given.",
-      nb::make_tuple(nb::handle(error_class), nb::handle(PyExc_ValueError)).ptr());
+  input_error_class =
+      MakeClass(m, "InputError",
+                "Wrong input: the message names the argument, the expected and the given value.",
+                nb::make_tuple(nb::handle(error_class), nb::handle(PyExc_ValueError)).ptr());
   failure_class =
       MakeClass(m, "Failure", "The work itself failed: a full disk, a number that is not finite.",
                 nb::make_tuple(nb::handle(error_class), nb::handle(PyExc_RuntimeError)).ptr());

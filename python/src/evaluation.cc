@@ -80,10 +80,11 @@ std::pair<std::string, std::string> EvaluateHandle(const PolicyHandle& policy,
   trial.plant = plant;
   trial.model = model;
   trial.unknown_plant = unknown_plant;
-  PythonProgress told(progress);
+  PythonProgress python_progress(progress);
   const nb::gil_scoped_release unlocked;
   ThreadPool pool(ResolveThreads(threads), threads == 0);
-  const EvalReport report = EvaluatePolicy(policy.loaded(), trial, episodes, pool, std::ref(told));
+  const EvalReport report =
+      EvaluatePolicy(policy.loaded(), trial, episodes, pool, std::ref(python_progress));
   return {EvalJson(report), EpisodesCsv(report)};
 }
 
@@ -114,7 +115,7 @@ nb::tuple MapHandle(const PolicyHandle& policy, const SettingTexts& settings,
   a.trial.plant = plant;
   a.trial.unknown_plant = unknown_plant;
   a.out = out;
-  PythonProgress told(progress);
+  PythonProgress python_progress(progress);
   std::vector<MapResult> maps(1);
   MapResult& map = maps.front();
   std::string json;
@@ -124,7 +125,7 @@ nb::tuple MapHandle(const PolicyHandle& policy, const SettingTexts& settings,
     const std::filesystem::path folder =
         out.empty() ? std::filesystem::path() : MapFolder(a, policy.loaded(), map);
     ThreadPool pool(ResolveThreads(threads), threads == 0);
-    FillMap(a, policy.loaded(), pool, std::ref(told), map);
+    FillMap(a, policy.loaded(), pool, std::ref(python_progress), map);
     if (!out.empty()) {
       MakeNewFolder(folder);
       WriteMaps(maps, folder);

@@ -244,7 +244,7 @@ class Invariance(unittest.TestCase):
                                             np.float32(1))
         self.assertEqual(self.train(wrapped, eval_env=rescaled), self.train(rescaled, num_envs=3))
 
-    def test_the_double_pendulum_alone_and_as_vector(self):
+    def test_the_double_pendulum_as_one_and_as_vector(self):
         name, settings = "upswing/DoublePendulum-v0", {"physics": "closed-form"}
         settings |= {"episode_seconds": 0.4}
         results = []
@@ -329,7 +329,7 @@ class Files(InFolder):
         again = upswing.train(env="CartPole-v1", config=run / "config.toml", progress=False)
         self.assertEqual(sha(again.best), sha(training.best))
 
-    def test_what_needs_the_environment_is_refused(self):
+    def test_commands_that_need_the_environment_are_refused(self):
         run = self.path / "run"
         upswing.train("sac", env=lambda: Reach(size=2), max_episode_steps=20, out=run, **SHORT)
         for command in (["eval", run], ["map", run], ["view", run], ["plot", run],

@@ -102,7 +102,7 @@ class SameBits(InFolder):
 
 
 class Callbacks(InFolder):
-    def test_rows_are_those_of_the_tables(self):
+    def test_rows_equal_the_tables(self):
         heard = {"episode": [], "metrics": [], "evaluation": []}
         best = []
         training = upswing.train("fast", out=self.path / "run", **SMALL,
@@ -129,7 +129,7 @@ class Callbacks(InFolder):
         # The run folder has a checkpoint of step 4000.
         self.assertEqual(upswing.train(resume=self.path / "run").steps, 4000)
 
-    def test_what_is_no_function_is_refused_at_once(self):
+    def test_other_objects_than_functions_are_refused_at_once(self):
         with self.assertRaisesRegex(upswing.InputError, "on_best: expected a function, got 3"):
             upswing.train("fast", **SMALL, out=self.path / "run", on_best=3)
         self.assertFalse((self.path / "run").exists())
@@ -217,7 +217,7 @@ class BadInput(InFolder, BadInputTest):
         self.refuse_training("resume: expected neither out nor config", resume="x", out="y")
         self.refuse_training("out: expected a path, got an empty text", out="")
 
-    def test_what_makes_no_sense_is_warned_of(self):
+    def test_useless_settings_give_a_warning(self):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             upswing.train("fast", **SMALL | {"learning_starts": 5000})

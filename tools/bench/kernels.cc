@@ -137,7 +137,7 @@ BenchCases KernelCases(const BenchOptions& /*options*/) {
 }
 
 double MeasurePeakGflops(int threads) {
-  // Long enough to be alone on all processors for some rounds.
+  // Long enough to have all processors without other load for some rounds.
   constexpr std::chrono::milliseconds kDuration(300);
   constexpr int64_t kRounds = 1 << 19;  // a few milliseconds
   using Clock = std::chrono::steady_clock;

@@ -16,7 +16,7 @@ class RooflineTest : public ::testing::TestWithParam<std::string> {
 INSTANTIATE_TEST_SUITE_P(Paths, RooflineTest, ::testing::ValuesIn(SimdPaths()),
                          [](const auto& info) { return info.param; });
 
-TEST_P(RooflineTest, MultiplyAddChainsCountWhatTheyDo) {
+TEST_P(RooflineTest, MultiplyAddChainsCountTheirOperations) {
   // On every chain and from any start, x ← 0.75 x + 0.25 converges to 1.
   float result = 0;
   const int64_t rounds = 100;
@@ -25,7 +25,7 @@ TEST_P(RooflineTest, MultiplyAddChainsCountWhatTheyDo) {
   EXPECT_NEAR(result, static_cast<float>(chains), 1e-4F * static_cast<float>(chains));
 }
 
-TEST_P(RooflineTest, TriadAddsWhatItShould) {
+TEST_P(RooflineTest, TriadAddsTheRightNumbers) {
   AlignedVector<float> a(48), b(48), c(48);
   for (size_t i = 0; i < b.size(); ++i) {
     b[i] = static_cast<float>(i) / 7;

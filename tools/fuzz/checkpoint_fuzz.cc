@@ -45,7 +45,7 @@ bool TryInput(std::string_view input) {
   // A loaded state can be saved, loaded again, and resumed.
   Tensors saved;
   training.State(Archive::Saver(saved));
-  Expect(Accepts([&] { again.State(Archive::Loader(saved)); }), "to load what was saved");
+  Expect(Accepts([&] { again.State(Archive::Loader(saved)); }), "to load the saved state");
   try {
     again.Step();
   } catch (const Error& error) {

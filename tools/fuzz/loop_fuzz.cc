@@ -7,7 +7,7 @@ namespace upswing {
 
 bool TryInput(std::string_view input) {
   size_t at = 0;
-  // Without further bytes nothing else goes wrong.
+  // Without further bytes there are no further faults.
   const auto next = [&] { return at < input.size() ? static_cast<unsigned char>(input[at++]) : 1; };
   const Chooser choose = [&](uint32_t n) {
     const uint32_t low = next();

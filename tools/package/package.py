@@ -239,7 +239,7 @@ Description: controllers that swing up and balance a double pendulum
         digits = version.replace(".", "")
         say(f"building the wheel of CPython {version} for {self.target.machine}")
         venv = self.venvs / f"venv-{version}"
-        # Both do nothing if all is there in the pinned versions, which the SBOM names.
+        # Both do nothing if the pinned versions, which the SBOM names, are installed.
         run(python, "-m", "venv", venv)
         run(venv / "bin/python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check",
             "--only-binary=:all:", "-r", Path(__file__).with_name("requirements.txt"))

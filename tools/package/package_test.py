@@ -2,7 +2,7 @@
 """Tests of the packages: the same bits twice, and a program that runs from a read-only folder with
 spaces, without HOME. Wheels take minutes to compile; the workflow that makes releases tests them.
 
-UPSWING names the program, of which the packages are made (see src/cli/testing.py). Needs the virtual
+UPSWING names the program, whose packages are made (see src/cli/testing.py). Needs the virtual
 environment build/package/venv, which ./upswing package and ./upswing test make.
 """
 

@@ -29,8 +29,8 @@ CLIP = 0.2
 INITIAL_STD = 2.0  # of actions, in units of the limit
 MAX_GRADIENT_NORM = 0.5  # of Upswing and Stable-Baselines3
 
-# Settings of our task. Pendulum-v1 lacks these settings; here, those that our agents change have
-# their defaults again.
+# Settings of our task. Pendulum-v1 lacks them; here, settings that our agents change have their
+# defaults again.
 OUR_TASK = {"pendulum-v1": {"physics": "mujoco", "random-start-share": 0.5},
             "double-pendulum": {"physics": "mujoco", "episode-seconds": 10, "random-start-share": 0,
                                 "start-noise": 0.1, "start-noise-end": 0.1}}

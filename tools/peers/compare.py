@@ -228,7 +228,7 @@ def compare(a):
     context = describe(a)
     rows = tables.summarize(measure_in_turns(a), SIDES)
     if not rows:
-        raise ours.Failed("none of these sides has what is to be measured "
+        raise ours.Failed("none of these sides supports the requested measures "
                           "(tools/peers/README.md)")
     context["load_average_after"] = os.getloadavg()
     context["versions"] = sorted({result["version"] for row in rows for result in row["rounds"]
