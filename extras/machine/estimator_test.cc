@@ -232,14 +232,14 @@ TEST(Estimator, LearnsNothingAtRestNorFromReadingsThatAreNotNumbers) {
   EXPECT_NEAR(estimator.now().q1, 0.5 - estimator.zero()[0], 1e-9);
 }
 
-/// The logs of the first five runs of each of six real sessions.
-std::vector<std::vector<MachineLog>> RealSessions() {
+/// The logs of the first `runs` runs of each of six real sessions.
+std::vector<std::vector<MachineLog>> RealSessions(int runs) {
   std::vector<std::vector<MachineLog>> sessions;
   for (const char* name :
        {"swingup/acrobot-tvlqr-0", "swingup/pendubot-tvlqr-0", "swingup/acrobot-mcpilco-0",
         "swingup/pendubot-mcpilco-0", "pushed/acrobot-tvlqr-0", "pushed/pendubot-tvlqr-0"}) {
     std::vector<MachineLog>& logs = sessions.emplace_back();
-    for (int run = 1; run <= 5; ++run) {
+    for (int run = 1; run <= runs; ++run) {
       logs.push_back(ReadLog(RealData() / "C.1" / Concat(name, run, ".csv.gz")).front());
     }
   }
@@ -266,7 +266,7 @@ TEST(Estimator, FindsTheZerosOfRealSessions) {
   if (RealData().empty()) GTEST_SKIP() << "no measured data";
   const Twin twin = ReadTwin("realaigym-twin", "test");
   double estimated = 0, given = 0;  // sums of squares, rad²
-  for (const std::vector<MachineLog>& logs : RealSessions()) {
+  for (const std::vector<MachineLog>& logs : RealSessions(3)) {
     for (const MachineLog& log : logs) {
       const MachineSensors session = InSession(twin, log).sensors;
       const auto square = [&](const Joints& zero) {
@@ -294,7 +294,8 @@ Twin FoundIn(const MachineLog& log, const Twin& twin) {
 }
 
 /// The values found in a run, those of the twin, and those identified for the session predict the
-/// session's other runs: median errors over 1 s, rad. UPSWING_RUNS prints them.
+/// session's other runs: median errors over 1 s, rad. UPSWING_RUNS prints them, of five
+/// runs instead of three.
 TEST(Estimator, WhatARunTeachesPredictsTheNextRealRuns) {
   if (RealData().empty()) GTEST_SKIP() << "no measured data";
   const bool print = std::getenv("UPSWING_RUNS") != nullptr;
@@ -306,7 +307,7 @@ TEST(Estimator, WhatARunTeachesPredictsTheNextRealRuns) {
   const auto add = [](Errors& all, const Errors& some) {
     all.insert(all.end(), some.begin(), some.end());
   };
-  for (const std::vector<MachineLog>& logs : RealSessions()) {
+  for (const std::vector<MachineLog>& logs : RealSessions(print ? 5 : 3)) {
     Errors found, given, known;
     for (const MachineLog& log : logs) {
       const Twin after = FoundIn(log, twin);

@@ -93,8 +93,11 @@ double ValueOf(const Twin& twin, const std::string& name) {
   return options.Get(name)->number();
 }
 
-/// UPSWING_DRAWS sets the number of machines. With it, each has 12 logs instead of 3, whose
-/// intervals are wide.
+/// Windows that do not overlap: half as many, from the same rows.
+const FitConfig kWindowsInARow{.windows = {1, 1}};
+
+/// UPSWING_DRAWS sets the number of machines. With it, each has 12 logs of 10 s instead of 3 of 5
+/// s, whose intervals are wide.
 TEST(Fit, FindsTheMachineBehindItsLogs) {
   const char* given = std::getenv("UPSWING_DRAWS");
   const int draws = given != nullptr ? std::atoi(given) : 2;
@@ -104,9 +107,10 @@ TEST(Fit, FindsTheMachineBehindItsLogs) {
   for (int draw = 0; draw < draws; ++draw) {
     Rng rng(7, "machine", static_cast<uint64_t>(draw));
     const Twin machine = SomeMachine(rng);
+    const uint64_t seed = 100 + 10 * static_cast<uint64_t>(draw);
     const auto logs =
-        LogsOf(machine, given != nullptr ? 12 : 3, 10, 100 + 10 * static_cast<uint64_t>(draw));
-    const FitResult fit = Fit(logs, FirstGuess(), kValues, {}, &pool);
+        given != nullptr ? LogsOf(machine, 12, 10, seed) : LogsOf(machine, 3, 5, seed);
+    const FitResult fit = Fit(logs, FirstGuess(), kValues, kWindowsInARow, &pool);
     const Manipulator truth = BodyOf(machine), found = BodyOf(fit.twin);
     const auto note = [&](const char* name, double got, double true_value) {
       errors[name].push_back(got / true_value - 1);
@@ -162,11 +166,11 @@ std::vector<double> CovarianceOfZeros(const std::vector<double>& zeros) {
     Twin machine = FirstGuess();
     machine.sensors.zero1 = zero;
     machine.sensors.zero2 = -zero;
-    logs.push_back(LogsOf(machine, 1, 10, 50 + logs.size()).front());
+    logs.push_back(LogsOf(machine, 1, 3, 50 + logs.size()).front());
     logs.back().name = std::string("session ") + "abcd"[logs.size() - 1];
   }
   ThreadPool pool(2);
-  return Fit(logs, FirstGuess(), {"zero1", "zero2"}, {}, &pool).twin.covariance;
+  return Fit(logs, FirstGuess(), {"zero1", "zero2"}, kWindowsInARow, &pool).twin.covariance;
 }
 
 TEST(Fit, CountsThePriorAsASessionInTheCovarianceBetweenSessions) {
