@@ -148,7 +148,7 @@ class Packager:
 
         path = self.out / f"{self.name}.tar.gz"
         with (path.open("wb") as file,
-              gzip.GzipFile("", "wb", 9, file, mtime=self.epoch) as compressed,
+              gzip.GzipFile("", "wb", 6, file, mtime=self.epoch) as compressed,
               tarfile.open(fileobj=compressed, mode="w|", format=tarfile.GNU_FORMAT) as archive):
             archive.add(self.tree, self.name, recursive=False, filter=owned_by_root)
             for member in sorted(self.tree.rglob("*")):
