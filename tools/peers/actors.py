@@ -1,5 +1,6 @@
 """SAC and PPO: the common settings of all libraries, and Upswing's measurements."""
 
+import functools
 import tempfile
 from pathlib import Path
 
@@ -29,11 +30,9 @@ CLIP = 0.2
 INITIAL_STD = 2.0  # of actions, in units of the limit
 MAX_GRADIENT_NORM = 0.5  # of Upswing and Stable-Baselines3
 
-# Settings of our task. Pendulum-v1 lacks them; here, settings that our agents change have their
-# defaults again.
-OUR_TASK = {"pendulum-v1": {"physics": "mujoco", "random-start-share": 0.5},
-            "double-pendulum": {"physics": "mujoco", "episode-seconds": 10, "random-start-share": 0,
-                                "start-noise": 0.1, "start-noise-end": 0.1}}
+# Settings of the double pendulum's environments.
+DOUBLE_PENDULUM = {"physics": "mujoco", "episode_seconds": 10, "random_start_share": 0,
+                   "start_noise": 0.1, "start_noise_end": 0.1}
 
 # Training settings if none are requested.
 DEFAULTS = {"sac": {"width": 64, "batch": 100, "steps": 20_000},
@@ -55,62 +54,77 @@ def all_steps(what, steps):
     return steps
 
 
-def sac_settings():
-    """Our SAC without the features that the others lack."""
-    return {"agent": "sac", "envs": 1, "updates-per-step": 1, "actor-period": 1, "n-step": 1,
-            "gamma": SAC_GAMMA, "tau": TAU, "alpha": ALPHA, "alpha-rate": LEARNING_RATE,
-            "target-entropy": -1, "bins": 0, "smoothness": 0, "replay": REPLAY,
-            "learning-starts": LEARNING_STARTS, "policy-tau": 1, "max-gradient-norm": 1e9}
+def settings(what, task, width, batch, threads, seed):
+    """Our SAC or PPO without the features that the others lack."""
+    common = {"hidden": f"{width},{width}", "batch": batch, "threads": threads, "seed": seed,
+              "reward_scale": 1, "learning_rate": LEARNING_RATE,
+              "learning_rate_end": LEARNING_RATE, "mirror": False, "layer_norm": False,
+              "stop_when_solved": False, "eval_episodes": ours.EPISODES}
+    if what == "sac":
+        return common | {
+            "envs": 1, "updates_per_step": 1, "actor_period": 1, "n_step": 1, "gamma": SAC_GAMMA,
+            "tau": TAU, "alpha": ALPHA, "alpha_rate": LEARNING_RATE, "target_entropy": -1,
+            "bins": 0, "smoothness": 0, "replay": REPLAY, "learning_starts": LEARNING_STARTS,
+            "policy_tau": 1, "max_gradient_norm": 1e9, "twin": True, "prioritized": False}
+    return common | {
+        "envs": ENVS, "horizon": HORIZON, "epochs": EPOCHS, "gamma": TASKS[task]["ppo_gamma"],
+        "lambda": LAMBDA, "clip": CLIP, "initial_std": INITIAL_STD, "max_std": 5,
+        "entropy_bonus": 0, "entropy_bonus_end": 0, "value_clip": 0, "kl_target": 0,
+        "activation": "relu", "max_gradient_norm": MAX_GRADIENT_NORM, "normalize": False}
 
 
-def ppo_settings(task):
-    """Our PPO without the features that the others lack."""
-    return {"agent": "ppo", "envs": ENVS, "horizon": HORIZON, "epochs": EPOCHS,
-            "gamma": TASKS[task]["ppo_gamma"], "lambda": LAMBDA, "clip": CLIP,
-            "initial-std": INITIAL_STD, "max-std": 5, "entropy-bonus": 0,
-            "entropy-bonus-end": 0, "value-clip": 0, "kl-target": 0,
-            "activation": "relu", "max-gradient-norm": MAX_GRADIENT_NORM}
+def flag(name, value):
+    """A setting as a flag of `upswing train`."""
+    flag_name = name.replace("_", "-")
+    if isinstance(value, bool):
+        return f"--{'' if value else 'no-'}{flag_name}"
+    return f"--{flag_name}={value}"
 
 
-def flags(what, task, width, batch, threads, seed):
-    """The arguments of `upswing train` with these settings, without steps and folder."""
-    settings = sac_settings() if what == "sac" else ppo_settings(task)
-    settings |= {"task": task, "hidden": f"{width},{width}", "batch": batch, "threads": threads,
-                 "seed": seed, "reward-scale": 1, "learning-rate": LEARNING_RATE,
-                 "learning-rate-end": LEARNING_RATE, "log-every": unclocked_steps(what)}
-    switches = ["--no-mirror", "--no-layer-norm", "--no-stop-when-solved"]
-    switches += ["--no-normalize"] if what == "ppo" else ["--twin", "--no-prioritized"]
-    settings |= OUR_TASK[task]
-    return switches + [f"--{name}={value}" for name, value in settings.items()]
+@functools.cache
+def own_task():
+    """The program of examples/own_task, which has Pendulum-v1, against the installed library."""
+    build, library = ours.ROOT / "build/own_task", ours.ROOT / "build/own_task/library"
+    ours.run(["cmake", "--install", ours.PROGRAM.parent.parent, "--prefix", library])
+    ours.run(["cmake", "-S", ours.ROOT / "examples/own_task", "-B", build,
+              "-DCMAKE_BUILD_TYPE=Release", f"-DCMAKE_PREFIX_PATH={library}"])
+    ours.run(["cmake", "--build", build])
+    return build / "own_task"
 
 
-def train(given, steps):
-    """Trains for `steps` steps, with one evaluation and one checkpoint at the end. Returns the CPU
-    time of the whole process, the log's rows and the evaluation's mean return."""
+def train(what, task, given, steps):
+    """Trains for `steps` steps, with one evaluation at the end. Returns the CPU time of the whole
+    process, the training time, and the evaluation's mean return."""
+    given = given | {"steps": steps, "eval_every": steps + 1}
+    if task == "pendulum-v1":
+        program = own_task()
+        cpu = ours.children_cpu_seconds()
+        output = ours.run([program, what, *(f"{name}={str(value).lower()}"
+                                            for name, value in given.items())])
+        cpu = ours.children_cpu_seconds() - cpu
+        words = output.splitlines()[-2].split()  # 20000 steps  12.345 s  return -150.2
+        return cpu, float(words[2]), float(words[5])
     with tempfile.TemporaryDirectory(prefix="upswing-peers-") as folder:
         out = Path(folder, "run")
+        given |= DOUBLE_PENDULUM | {"agent": what, "checkpoint_every": steps + 1, "out": out}
         cpu = ours.children_cpu_seconds()
-        ours.run([ours.PROGRAM, "train", *given, f"--out={out}", f"--steps={steps}",
-                  f"--eval-every={steps + 1}", f"--eval-episodes={ours.EPISODES}",
-                  f"--checkpoint-every={steps + 1}"])
+        ours.run([ours.PROGRAM, "train", *(flag(*setting) for setting in given.items())])
         cpu = ours.children_cpu_seconds() - cpu
-        mean_return = ours.read_rows(out / "evals.csv")[-1]["mean_return"]
-        return cpu, ours.read_rows(out / "metrics.csv"), mean_return
+        row = ours.read_rows(out / "evals.csv")[-1]
+        return cpu, row["seconds"], row["mean_return"]
 
 
 def measure(what, task, width, batch, threads, steps, seed):
-    """Measures a training to its last step, and the mean return of its last policy. The rate comes
-    from the log's rows after the first. A second training, which ends at the first row, has the
-    same start, evaluation and checkpoint; its CPU time is subtracted."""
-    given = flags(what, task, width, batch, threads, seed)
+    """Measures a training to its last step, and the mean return of its last policy. A second
+    training, which ends where the clock starts, has the same start and evaluation; its times are
+    subtracted for the rates."""
+    given = settings(what, task, width, batch, threads, seed)
     short, steps = unclocked_steps(what), all_steps(what, steps)
-    cpu_short, _, _ = train(given, short)
-    cpu, rows, mean_return = train(given, steps)
-    first, last = rows[0], rows[-1]
-    counted = last["step"] - first["step"]
-    return {"steps_per_second": counted / (last["seconds"] - first["seconds"]),
+    cpu_short, seconds_short, _ = train(what, task, given, short)
+    cpu, seconds, mean_return = train(what, task, given, steps)
+    return {"steps_per_second": (steps - short) / (seconds - seconds_short),
             "cpu_seconds_per_step": (cpu - cpu_short) / (steps - short),
-            "mean_return": mean_return, "seconds": last["seconds"]}
+            "mean_return": mean_return, "seconds": seconds}
 
 
 def sac(**arguments):

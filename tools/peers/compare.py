@@ -5,15 +5,13 @@ Examples:
   tools/peers/compare.py                                   gradient and training, about six minutes
   tools/peers/compare.py --measure training --threads 1 --rounds 3
   tools/peers/compare.py --width 64 --json peers.json
-  tools/peers/compare.py --measure acrobot --threads 1 --rounds 10
   tools/peers/compare.py --measure sac,ppo --threads 1
   tools/peers/compare.py --measure sac --task double-pendulum --width 256 --batch 256 --steps 2000
   tools/peers/compare.py --measure ppo --threads 1 --sides rltools,stable-baselines3
 
 gradient: updates of DQN on a full replay memory. training: steps of a DQN training with one
-environment and one update per step. acrobot: a whole training of the agent `acrobot`, and its return.
-sac, ppo: whole trainings with SAC and PPO. The seed is the number of the round. The first call
-installs the other libraries into build/.
+environment and one update per step. sac, ppo: whole trainings with SAC and PPO, and their returns. The
+seed is the number of the round. The first call installs the other libraries into build/.
 """
 
 import argparse
@@ -48,15 +46,15 @@ PEERS = {
                     {"sac": "rltools_actor.py", "ppo": "rltools_actor.py"}),
     "stable-baselines3": Peer("peers-venv", "requirements.txt", [],
                               {"gradient": "sb3_dqn.py", "training": "sb3_dqn.py",
-                               "acrobot": "sb3_dqn.py", "sac": "sb3_actor.py",
-                               "ppo": "sb3_actor.py"})}
+                               "sac": "sb3_actor.py", "ppo": "sb3_actor.py"})}
 SIDES = ["upswing", *PEERS]
 MEASURES = ours.MEASURES | {"sac": actors.sac, "ppo": actors.ppo}
 # Arguments of each measure, and their defaults.
 ARGUMENTS = ours.ARGUMENTS | {what: ["task", "width", "batch", "threads", "steps", "seed"]
                               for what in actors.DEFAULTS}
-DEFAULTS = {"gradient": {"width": 256, "batch": 128}, "training": {"width": 256, "batch": 128},
-            "acrobot": {}} | actors.DEFAULTS
+DEFAULTS = {"gradient": {"width": 256, "batch": 128},
+            "training": {"width": 256, "batch": 128}} | actors.DEFAULTS
+
 
 def say(text):
     """Prints progress to standard error, so that the table can be piped."""

@@ -8,7 +8,6 @@ import resource
 import statistics
 import subprocess
 import tempfile
-import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -23,7 +22,7 @@ EPSILON = 0.05
 REPLAY = 100_000
 LEARNING_STARTS = 256  # steps before the first update
 
-EPISODES = 100  # per evaluation on Acrobot-v1
+EPISODES = 100  # per evaluation of SAC and PPO
 LOG_EVERY = 200  # steps between rows of metrics.csv; learning begins before the second row
 
 
@@ -117,29 +116,6 @@ def gradient(width, batch, threads, seconds):
         return read_bench(file.read_text(encoding="utf-8"))
 
 
-def acrobot_settings():
-    """The settings of the named agent `acrobot`, as a dictionary of TOML tables."""
-    return tomllib.loads(run([PROGRAM, "train", "--agent", "acrobot", "--print-config"]))
-
-
-def acrobot(threads, seed):
-    """Trains the named agent `acrobot` to its last step, and evaluates its last policy over
-    EPISODES episodes. The rate counts only training; the CPU time is of the whole process."""
-    steps = acrobot_settings()["train"]["steps"]
-    with tempfile.TemporaryDirectory(prefix="upswing-peers-") as folder:
-        out = Path(folder, "run")
-        cpu = children_cpu_seconds()
-        run([PROGRAM, "train", "--agent", "acrobot", "--seed", seed, "--threads", threads, "--out",
-             out, "--no-stop-when-solved", "--eval-every", steps + 1, "--eval-episodes", EPISODES])
-        cpu = children_cpu_seconds() - cpu
-        seconds = read_rows(out / "metrics.csv")[-1]["seconds"]
-        mean_return = read_rows(out / "evals.csv")[-1]["mean_return"]
-    return {"steps_per_second": steps / seconds, "cpu_seconds_per_step": cpu / steps,
-            "seconds": seconds, "mean_return": mean_return}
-
-
-MEASURES = {"gradient": gradient, "training": training, "acrobot": acrobot}
+MEASURES = {"gradient": gradient, "training": training}
 # Arguments of each measure.
-ARGUMENTS = {"gradient": ["width", "batch", "threads", "seconds"],
-             "training": ["width", "batch", "threads", "seconds"],
-             "acrobot": ["threads", "seed"]}
+ARGUMENTS = dict.fromkeys(MEASURES, ["width", "batch", "threads", "seconds"])

@@ -3,23 +3,18 @@
 
   build/peers-venv/bin/python tools/peers/sb3_dqn.py gradient --threads 2
   build/peers-venv/bin/python tools/peers/sb3_dqn.py training --width 64 --seconds 5
-  build/peers-venv/bin/python tools/peers/sb3_dqn.py acrobot --seed 3
 
 gradient: model.train on a full replay memory. training: model.learn with one update per step, after
-the warm-up. Both use the double pendulum. acrobot: trains on Gymnasium's Acrobot-v1 with the
-settings of our agent `acrobot`, then evaluates.
+the warm-up. Both use the double pendulum.
 """
 
 import argparse
 import json
-import math
 import time
 
 import stable_baselines3
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.env_util import make_vec_env
-from stable_baselines3.common.evaluation import evaluate_policy
 
 import ours
 from pendulum import DoublePendulum
@@ -90,52 +85,10 @@ def training(width, batch, seconds):
     return timed.result
 
 
-def make_for_acrobot(settings, seed):
-    """The agent with those of our settings that it supports. It lacks dueling heads, Double DQN,
-    layer normalisation, prioritised replay, mirrored minibatches, scaled rewards and averaged
-    policies."""
-    train, network, agent = settings["train"], settings["network"], settings["agent"]
-    envs = train["envs"]
-    updates = max(1, round(envs * agent["updates_per_step"]))  # after a step of all environments
-    # Our epsilon decays by a factor per episode of about 130 steps; theirs decays linearly.
-    decay_episodes = math.log(agent["epsilon_end"]) / math.log(agent["epsilon_decay"])
-
-    def learning_rate(remaining):
-        """The learning rate, from the remaining share of the steps."""
-        done = min(1.0, (1 - remaining) * train["steps"] / agent["learning_rate_steps"])
-        return agent["learning_rate"] + done * (agent["learning_rate_end"] - agent["learning_rate"])
-
-    return stable_baselines3.DQN(
-        "MlpPolicy", make_vec_env("Acrobot-v1", envs, seed=seed),
-        policy_kwargs={"net_arch": network["hidden"]}, batch_size=agent["batch"],
-        learning_rate=learning_rate, gamma=agent["gamma"], n_steps=agent["n_step"],
-        # Their target network moves once for all updates of a step.
-        tau=1 - (1 - agent["tau"])**updates, target_update_interval=1,
-        train_freq=1, gradient_steps=updates, max_grad_norm=agent["max_gradient_norm"],
-        buffer_size=agent["replay"], learning_starts=agent["learning_starts"],
-        exploration_fraction=min(1.0, 130 * decay_episodes / train["steps"]),
-        exploration_initial_eps=agent["epsilon_start"],
-        exploration_final_eps=agent["epsilon_end"], seed=seed, device="cpu")
-
-
-def acrobot(seed):
-    """Times model.learn on Acrobot-v1, then evaluates the greedy policy."""
-    settings = ours.acrobot_settings()
-    model = make_for_acrobot(settings, seed)
-    clock = Clock()
-    model.learn(settings["train"]["steps"])
-    result = clock.result(settings["train"]["steps"])
-    result["seconds"] = settings["train"]["steps"] / result["steps_per_second"]
-    result["mean_return"], _ = evaluate_policy(
-        model, make_vec_env("Acrobot-v1", 10, seed=1000 + seed), ours.EPISODES, deterministic=True)
-    return result
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("measure", choices=["gradient", "training", "acrobot"],
-                        help="what to measure")
+    parser.add_argument("measure", choices=["gradient", "training"], help="what to measure")
     parser.add_argument("--width", type=int, default=256,
                         help="width of both hidden layers (default 256)")
     parser.add_argument("--batch", type=int, default=128,
@@ -144,15 +97,10 @@ def main():
                         help="number of threads of PyTorch (default 1)")
     parser.add_argument("--seconds", type=float, default=3.0,
                         help="length of the measurement [s] (default 3)")
-    parser.add_argument("--seed", type=int, default=1,
-                        help="seed of the training on Acrobot-v1 (default 1)")
     a = parser.parse_args()
     torch.set_num_threads(a.threads)
-    if a.measure == "acrobot":
-        result = acrobot(a.seed)
-    else:
-        measure = {"gradient": gradient, "training": training}[a.measure]
-        result = measure(a.width, a.batch, a.seconds)
+    measure = {"gradient": gradient, "training": training}[a.measure]
+    result = measure(a.width, a.batch, a.seconds)
     version = f"stable-baselines3 {stable_baselines3.__version__}, torch {torch.__version__}"
     print(json.dumps(result | {"version": version}))
 

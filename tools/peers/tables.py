@@ -14,9 +14,6 @@ DQN = (
     f"{ours.GAMMA}, replay memory of {ours.REPLAY:,}. In training: one environment, one update a "
     f"step from step {ours.LEARNING_STARTS} on, Polyak target at each with tau {ours.TAU}, epsilon "
     f"{ours.EPSILON}.")
-ACROBOT = (
-    "acrobot: Gymnasium's Acrobot-v1 and the settings of our agent `acrobot`, as far as both sides "
-    "have them (tools/peers/README.md); one round for each seed.")
 SAC = (
     "sac: a step is one of the environment and one round: both critics, actor and temperature, "
     "each network with two hidden layers of W and ReLU, batch of B transitions, one-step targets, "
@@ -29,7 +26,7 @@ PPO = (
     f"{actors.TASKS['pendulum-v1']['ppo_gamma']} (double pendulum: "
     f"{actors.TASKS['double-pendulum']['ppo_gamma']}), lambda {actors.LAMBDA}, clip {actors.CLIP}, "
     f"spread from {actors.INITIAL_STD:g} of the limit. One round for each seed.")
-SAME = {"gradient": DQN, "training": DQN, "acrobot": ACROBOT, "sac": SAC, "ppo": PPO}
+SAME = {"gradient": DQN, "training": DQN, "sac": SAC, "ppo": PPO}
 
 
 def print_heading(measures, values):
