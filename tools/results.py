@@ -125,7 +125,8 @@ def differences_table(algorithm, *names):
     return markdown_table(["setting", *(f"`{name}`" for name in names)], rows)
 
 
-BOOKKEEPING = {"agent", "algorithm", "seed", "log_every", "checkpoint_every", "threads"}
+BOOKKEEPING = {"agent", "algorithm", "seed", "log_every", "checkpoint_every", "threads",
+               "environment"}
 
 
 def readable(value):

@@ -18,9 +18,8 @@ int main(int argc, char** argv) try {
   if (argc != 2) throw BadInput("usage: control_loop policy.safetensors");
   const LoadedPolicy loaded = LoadPolicy(argv[1]);
   const Policy& policy = *loaded.policy;
-  if (!HasPlant(loaded.task) || loaded.memory() > 0) {
-    throw BadInput("expected a policy of the double pendulum without memory, got another");
-  }
+  ExpectPendulum(loaded);
+  if (loaded.memory() > 0) throw BadInput("expected a policy without memory, got one with it");
 
   const std::unique_ptr<Policy::Memory> memory = policy.Start(/*num_envs=*/1);
   PendulumState s;

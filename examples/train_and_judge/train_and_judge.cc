@@ -2,10 +2,10 @@
 #include <cstdio>
 
 #include "agents/config.h"
-#include "agents/task.h"
 #include "agents/training.h"
 #include "base/error.h"
 #include "mujoco/engines.h"
+#include "pendulum/pendulum_env.h"
 #include "runs/config_files.h"
 #include "runs/this_host.h"
 
@@ -27,11 +27,12 @@ int main() try {
   while (training.Step()) continue;
   std::printf("%s\n", training.state().solved ? "solved" : "not solved");
 
-  EnvConfig test;  // the double pendulum, hanging with little noise
+  PendulumEnvConfig test;  // hanging with little noise
   test.engine = &kMuJoCo;
   test.num_envs = 100;
   test.seed = 2;
-  const Evaluation e = Evaluate(*training.policy(), *MakeEnv(test));
+  PendulumEnv pendulums(test);
+  const Evaluation e = Evaluate(*training.policy(), pendulums);
   std::printf("judged in MuJoCo: %d of %d episodes succeed; swing-up in %.2f s (median)\n",
               static_cast<int>(e.successes), static_cast<int>(e.episodes),
               e.swing_up_seconds.median);

@@ -49,10 +49,9 @@ class Observer {
  public:
   explicit Observer(const ExportedPolicy& policy) : policy_(policy) {
     if (policy.is_foreign()) return;
-    EnvConfig config;
-    config.task = policy.loaded->task;
+    PendulumEnvConfig config;
     config.plants = {policy.loaded->plant};
-    env_ = MakeEnv(config);
+    env_ = std::make_unique<PendulumEnv>(config);
   }
 
   /// The observation of a state (S) that consists of floats.
@@ -75,9 +74,9 @@ class Observer {
 
  private:
   const ExportedPolicy& policy_;
-  std::unique_ptr<VectorEnv> env_;  // without memory; none for a foreign task
-  std::vector<float> before_;       // (D) previous observation; empty: none
-  double torque_ = 0;               // torque chosen at it
+  std::unique_ptr<PendulumEnv> env_;  // without memory; none for a foreign task
+  std::vector<float> before_;         // (D) previous observation; empty: none
+  double torque_ = 0;                 // torque chosen at it
 };
 
 /// Whether rounding cannot change which output is the largest.
@@ -99,7 +98,7 @@ CSamples DrawSamples(const ExportedPolicy& policy, const std::vector<LayerView>&
   bool all_clear = true;
   int draws = 0;
   for (int i = 0; i < kSamples; ++i) {
-    std::vector<double> state(policy.spec.state_names.size()), outputs;
+    std::vector<double> state(policy.state_size()), outputs;
     std::vector<float> obs;
     do {
       for (size_t k = 0; k < state.size(); ++k) {

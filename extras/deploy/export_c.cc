@@ -145,10 +145,10 @@ CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
   header.prefix = prefix;
   CParts parts;
   parts.task = policy.task;
-  if (HasPlant(loaded.task)) AddPlant(loaded.plant, parts);
+  if (!policy.is_foreign()) AddPlant(loaded.plant, parts);
   if (policy.is_discrete()) {
     parts.constants.push_back({"torques",
-                               policy.spec.action_unit.empty() ? "" : "N m",
+                               policy.is_foreign() ? "" : "N m",
                                {policy.torques().begin(), policy.torques().end()}});
   }
   AddLayers(layers, prefix, parts);
@@ -167,7 +167,7 @@ CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
   parts.origin = Concat("It is the ", CommentText(Replaced(loaded.policy->description(), "→", "-")),
                         "; ", OriginOf(loaded.policy->info()));
   parts.limit = policy.limit;
-  parts.period = policy.spec.step_seconds;
+  parts.period = *loaded.policy->info().control_period;
   const std::string angles = policy.is_foreign()
                                  ? std::string()
                                  : Concat(", ", parts.task.state.size(), " sines and cosines");
@@ -186,7 +186,7 @@ CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
                   {"RULE", policy.is_discrete() ? "'l' /* the largest output's torque */"
                            : squashed           ? "'s' /* the mean, squashed */"
                                                 : "'c' /* the mean, clipped */"},
-                  {"STATE_SIZE", Concat(policy.spec.state_names.size())},
+                  {"STATE_SIZE", Concat(policy.state_size())},
                   {"SAMPLES", Concat(samples.count)},
                   {"OUTPUT_TOLERANCE", CLiteral(samples.output_tolerance)},
                   {"TORQUE_TOLERANCE", CLiteral(samples.torque_tolerance)}};
@@ -194,10 +194,9 @@ CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
     parts.macros.emplace_back("MEMORY_SIZE",
                               Concat(kMemorySize * memory, " /* for ", memory, " past steps */"));
   }
-  parts.samples = {
-      {"sample_states", "", samples.states},
-      {"sample_outputs", "", samples.outputs},
-      {"sample_torques", policy.spec.action_unit.empty() ? "" : "N m", samples.torques}};
+  parts.samples = {{"sample_states", "", samples.states},
+                   {"sample_outputs", "", samples.outputs},
+                   {"sample_torques", policy.is_foreign() ? "" : "N m", samples.torques}};
   WriteHeader(parts, header);
   return header;
 }

@@ -157,13 +157,13 @@ void AddMetadata(OnnxModel& model, const ExportedPolicy& policy) {
   add("task", loaded.task);
   add("policy", loaded.policy->description());
   add("observation", observation);
-  add("control_period", policy.spec.step_seconds);
+  add("control_period", *info.control_period);
   if (!policy.is_foreign()) add("torque_limit", policy.limit);
   if (policy.is_foreign() && !policy.is_discrete()) {
     add("action_limit", policy.policy->parts().action_limit);
   }
   if (policy.is_discrete()) add(policy.is_foreign() ? "actions" : "torques", policy.torques());
-  if (HasPlant(loaded.task)) {
+  if (!policy.is_foreign()) {
     ordered_json plant;
     for (const auto& [name, value] : PlantValues(loaded.plant)) plant[name] = value;
     add("plant", plant);

@@ -143,13 +143,6 @@ class OnnxTest(ProgramTest):
                 self.check_actor(path, kinds[-1])
         self.assertEqual(set(kinds), {"squashed-gaussian", "clipped-gaussian", "categorical"})
 
-    def test_tasks(self):
-        for agent in ("pendulum-v1", "acrobot"):
-            with self.subTest(agent):
-                self.succeed("train", "--agent", agent, "--steps", 3000, "--out", agent,
-                             "--eval-every", 3000, "--eval-episodes", 2, "--threads", 1)
-                self.check_q_network(self.folder / agent)
-
     def test_metadata(self):
         model, _, _ = self.export(AGENTS / "d3qn-randomized.safetensors")
         about = {entry.key: entry.value for entry in model.metadata_props}

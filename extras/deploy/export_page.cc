@@ -160,10 +160,7 @@ void AddCheckpoints(PageAgent& agent, const LoadedPolicy& loaded, int64_t count)
 PageAgent ReadAgent(const fs::path& path, const std::string& given_id, int64_t checkpoints) {
   const LoadedPolicy loaded = LoadPolicy(path);
   const std::string where = loaded.path;
-  if (!HasPlant(loaded.task)) {
-    throw BadInput(Concat(where, ": expected a policy of ", kDoublePendulum,
-                          ", the only task of the page, got one of ", loaded.task));
-  }
+  ExpectPendulum(loaded);
   if (!loaded.mjcf.empty()) {
     throw BadInput(
         Concat(where,

@@ -7,8 +7,6 @@
 
 #include "base/error.h"
 #include "base/text.h"
-#include "pendulum/acrobot_v1.h"
-#include "pendulum/pendulum_v1.h"
 
 namespace upswing {
 namespace {
@@ -50,43 +48,11 @@ std::vector<NamedInput> PendulumInputs(int memory) {
 /// The description of a foreign task, whose observation only its environment explains. The
 /// observation stands for the state.
 ExportedTask ForeignTaskOf(const LoadedPolicy& loaded) {
-  ExportedTask task{loaded.task, "foreign.c", "acts in " + loaded.task, "", {}, {}};
+  ExportedTask task{"foreign.c", "acts in " + loaded.task, "", {}, {}};
   for (int i = 0; i < loaded.policy->obs_size(); ++i) {
     task.observation.push_back({Concat("observation ", i), "as the environment gives it"});
   }
   return task;
-}
-
-/// The description of the policy's task. Throws BadInput for a task without a description here.
-ExportedTask TaskOf(const LoadedPolicy& loaded) {
-  if (IsForeign(loaded.task)) return ForeignTaskOf(loaded);
-  for (const ExportedTask& task :
-       {PendulumTask(loaded.plant.actuated_joint, loaded.memory()),
-        ExportedTask{kPendulumV1,
-                     "pendulum_v1.c",
-                     "swings up and balances a pendulum (Gymnasium's Pendulum-v1)",
-                     "at the joint",
-                     {{"theta", "rad    angle, 0 upright"}, {"omega", "rad/s  its velocity"}},
-                     {{"cos theta", "cosine of the angle, 0 upright"},
-                      {"sin theta", "its sine"},
-                      {"omega", "velocity of theta, rad/s"}}},
-        ExportedTask{kAcrobotV1,
-                     "acrobot_v1.c",
-                     "swings the end of a double pendulum up (Gymnasium's Acrobot-v1)",
-                     "at the joint between the links",
-                     {{"theta1", "rad    angle of link 1, 0 hanging"},
-                      {"theta2", "rad    angle of link 2 relative to link 1, 0 in line with it"},
-                      {"omega1", "rad/s  velocity of theta1"},
-                      {"omega2", "rad/s  velocity of theta2"}},
-                     {{"cos theta1", "cosine of the angle of link 1, 0 hanging"},
-                      {"sin theta1", "its sine"},
-                      {"cos theta2", "cosine of the angle of link 2 relative to link 1"},
-                      {"sin theta2", "its sine"},
-                      {"omega1", "velocity of theta1, rad/s"},
-                      {"omega2", "velocity of theta2, rad/s"}}}}) {
-    if (task.name == loaded.task) return task;
-  }
-  throw BadInput(Concat(loaded.path, ": expected a task that can be exported, got ", loaded.task));
 }
 
 }  // namespace
@@ -98,8 +64,7 @@ double LargestSize(std::span<const double> values) {
 }
 
 ExportedTask PendulumTask(double actuated_joint, int memory) {
-  return {kDoublePendulum,
-          "pendulum.c",
+  return {"pendulum.c",
           "swings up and balances a double pendulum with one motor",
           Concat("at joint ", actuated_joint),
           {{"q1", "rad    angle of link 1, 0 hanging"},
@@ -124,23 +89,14 @@ ExportedPolicy ViewForExport(const LoadedPolicy& loaded) {
   const std::string where = loaded.path;
   ExportedPolicy exported;
   exported.loaded = &loaded;
-  exported.task = TaskOf(loaded);
+  exported.task = loaded.is_foreign() ? ForeignTaskOf(loaded)
+                                      : PendulumTask(loaded.plant.actuated_joint, loaded.memory());
   exported.policy = dynamic_cast<const NetworkPolicy*>(loaded.policy.get());
   if (exported.policy == nullptr) {
     throw BadInput(
         Concat(where, ": expected a learned policy, got ", loaded.policy->description()));
   }
   const NetworkPolicyParts& parts = exported.policy->parts();
-  if (IsForeign(loaded.task)) {
-    exported.spec.task = loaded.task;
-    exported.spec.action_unit = "";
-    exported.spec.state_names = NamesOf(exported.task.observation);
-    exported.spec.step_seconds = *loaded.policy->info().control_period;
-  } else {
-    EnvConfig env;
-    env.task = loaded.task;
-    exported.spec = SpecOf(env);
-  }
   CheckTorques(parts.torques, where);
   CheckTorques(parts.action_limit, where);
   exported.limit = LargestSize(exported.is_discrete() ? parts.torques : parts.action_limit);

@@ -24,7 +24,7 @@ struct NamedInput {
 /// The exports' description of a task, and the file of extras/deploy/c that computes its
 /// observation.
 struct ExportedTask {
-  std::string name, file;
+  std::string file;
   std::string goal;                     // purpose of a policy
   std::string motor;                    // where the torque acts
   std::vector<NamedInput> state;        // (S)
@@ -36,7 +36,6 @@ ExportedTask PendulumTask(double actuated_joint, int memory);
 
 struct ExportedPolicy {
   const LoadedPolicy* loaded = nullptr;
-  EnvSpec spec;                           // of the policy's task
   const NetworkPolicy* policy = nullptr;  // of `loaded`
   std::vector<LayerView> layers;          // of the policy's network; see Network::Views
   std::vector<LayerView> critic;          // of an actor's critic, if any: "critic.…"
@@ -51,8 +50,9 @@ struct ExportedPolicy {
   bool critic_takes_action() const { return !critic.empty() && critic.front().in() > obs_size(); }
   int obs_size() const { return policy->obs_size(); }
   int action_size() const { return policy->action_size(); }
-  /// Whether the task's environment is outside the program.
-  bool is_foreign() const { return IsForeign(spec.task); }
+  bool is_foreign() const { return loaded->is_foreign(); }
+  /// Size of a state; for a foreign task, the observation stands for the state.
+  size_t state_size() const { return is_foreign() ? task.observation.size() : task.state.size(); }
   /// The layers whose outputs choose the action: the features and, in a dueling network, the
   /// advantages.
   std::vector<LayerView> ActingLayers() const;

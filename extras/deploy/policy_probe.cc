@@ -1,7 +1,7 @@
 // Evaluates the library's policy on many observations or states, so that tests can check exports.
 //
 //     policy_probe POLICY observations <rows >rows    each row D numbers
-//     policy_probe POLICY states       <rows >rows    each row S numbers, the start of an episode
+//     policy_probe POLICY states       <rows >rows    each row q1 q2 w1 w2, the start of an episode
 //
 // All numbers are doubles in this machine's byte order. Each output row is the torque, then an
 // actor's outputs, then Q-values or V.
@@ -23,26 +23,24 @@ int main(int argc, char** argv) try {
   }
   const LoadedPolicy loaded = LoadPolicy(argv[1]);
   const Policy& policy = *loaded.policy;
-  EnvConfig config;
-  config.task = loaded.task;
+  PendulumEnvConfig config;
   config.plants = {loaded.plant};
   config.memory = loaded.memory();
   if (loaded.identifies()) config.identified_from = loaded.plant;
-  const std::unique_ptr<VectorEnv> env = MakeEnv(config);
+  PendulumEnv env(config);
   const auto* learned = dynamic_cast<const NetworkPolicy*>(&policy);
   const bool is_actor = learned != nullptr && learned->is_actor();
 
   const auto write = [](double number) { std::fwrite(&number, sizeof(number), 1, stdout); };
-  std::vector<double> row(what == "states" ? env->spec().state_names.size()
-                                           : static_cast<size_t>(policy.obs_size()));
+  std::vector<double> row(what == "states" ? 4 : static_cast<size_t>(policy.obs_size()));
   std::vector<float> outputs(is_actor ? static_cast<size_t>(learned->num_outputs()) : 0);
   std::vector<float> values(static_cast<size_t>(policy.num_values()));
   while (std::fread(row.data(), sizeof(double), row.size(), stdin) == row.size()) {
     std::vector<float> numbers(row.begin(), row.end());
     Matrix<const float> obs(numbers.data(), 1, policy.obs_size());
     if (what == "states") {
-      env->SetState(0, row);
-      obs = env->obs();
+      env.SetState(0, row);
+      obs = env.obs();
     }
     const auto memory = policy.Start(1);
     double torque = 0;

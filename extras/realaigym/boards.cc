@@ -166,12 +166,7 @@ Competitor GetCompetitor(PolicyArguments a, const std::string& robot,
     }
   }
   const auto loaded = std::make_shared<const LoadedPolicy>(GetPolicy(a));
-  if (!HasPlant(loaded->task)) {
-    throw BadInput(Concat(Printable(loaded->name),
-                          ": expected a policy of the double pendulum, got "
-                          "one of ",
-                          loaded->task));
-  }
+  ExpectPendulum(*loaded);
   const auto own = static_cast<Robot>(static_cast<int>(loaded->plant.actuated_joint));
   ExpectRobot(loaded->name, own, ParseRobot(robot, own));
   return {loaded->name, own, [loaded](size_t) { return ControllerOf(*loaded, kBoardBlock); },

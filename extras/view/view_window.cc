@@ -130,8 +130,7 @@ class Session {
     for (size_t i = 0; i < view_.episodes().size(); ++i) {
       Episode& episode = view_.episodes()[i];
       RolloutConfig entry = episode.config();
-      const PendulumState s = episode.pendulum()->state(0);
-      entry.start = std::vector<double>{s.q1, s.q2, s.w1, s.w2};
+      entry.start = episode.StateAt(static_cast<double>(episode.steps()));
       change(entry, static_cast<int>(i));
       view_.Replace(i, std::move(entry));
     }

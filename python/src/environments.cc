@@ -59,12 +59,7 @@ Config ConfigOf(const std::string& num_envs, const SettingTexts& settings) {
                             ", a setting of a training"));
     }
   }
-  Config config = BuildConfig("", flags);
-  if (!HasPlant(config.task)) {
-    throw BadInput(Concat("agent: expected an agent of the task ", kDoublePendulum, ", got ",
-                          config.agent, " of the task ", config.task));
-  }
-  return config;
+  return BuildConfig("", flags);
 }
 
 PendulumEnvConfig EnvConfigOf(const Config& config, ThreadPool& pool) {

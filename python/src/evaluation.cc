@@ -72,10 +72,6 @@ std::pair<std::string, std::string> EvaluateHandle(const PolicyHandle& policy,
   DescribeThreads(own, &threads);
   DescribePhysics(own, &trial.physics);
   SetArguments(own, arguments);
-  if (!HasPlant(policy.loaded().task) && !settings.empty()) {
-    throw BadInput(Concat(Printable(settings.front().first), ": expected none, because the task ",
-                          policy.loaded().task, " has no such setting"));
-  }
   SetSurroundings(FlagsOf(settings), trial);
   trial.plant = plant;
   trial.model = model;

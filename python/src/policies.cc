@@ -91,7 +91,7 @@ nb::dict DescribeInfo(const PolicyHandle& self) {
   d["control_period"] = info.control_period;
   d["gamma"] = info.gamma;
   d["reward_scale"] = info.reward_scale;
-  d["plant"] = HasPlant(self.loaded().task) ? PlantDict(self.loaded().plant) : nb::dict();
+  d["plant"] = self.loaded().is_foreign() ? nb::dict() : PlantDict(self.loaded().plant);
   return d;
 }
 

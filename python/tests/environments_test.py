@@ -278,7 +278,7 @@ class BadInput(BadInputTest):
                 "actions: expected one of continuous, levels": {"actions": "discrete"},
                 "delay: expected a multiple of 0.02": {"delay": 0.03},
                 'mass1: expected a number in [0.01, 100], got "nan"': {"mass1": np.nan},
-                "agent: expected an agent of the task double-pendulum": {"agent": "acrobot"},
+                'got "acrobot"; train on Gymnasium': {"agent": "acrobot"},
                 'got "fsat"': {"agent": "fsat"},
                 "render_mode: expected": {"render_mode": "human"},
                 "/nothing/here.xml": {"model": "/nothing/here.xml"}}.items():

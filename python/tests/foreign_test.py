@@ -337,15 +337,17 @@ class Files(InFolder):
                         ["train", "--config", run / "config.toml", "--out", self.path / "x"],
                         ["export", run, "--c", self.path / "x.h"],  # two numbers per action
                         ["export", run, "--page", self.path / "page"],
-                        ["train", "--task", "gymnasium", "--out", self.path / "x"]):
+                        ["train", "--environment", "x", "--out", self.path / "x"]):
             with self.subTest(command[0]):
                 done = program(*command)
                 self.assertEqual(done.returncode, 2, done.stdout)
                 self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
-                self.assertRegex(done.stderr, "gymnasium/Reach|upswing.train|one number per action")
+                self.assertRegex(done.stderr, "gymnasium/Reach|environment: |one number per action")
         self.assertEqual(sorted(os.listdir(self.path)), ["run"])
-        with self.assertRaisesRegex(upswing.InputError, "gymnasium/Reach: expected a task"):
-            upswing.evaluate(run)
+        for refused in (upswing.evaluate, upswing.map):
+            with self.assertRaisesRegex(upswing.InputError, "expected a policy of double-pendulum, got "
+                                                            "one of gymnasium/Reach"):
+                refused(run)
         onnx = program("export", run, "--onnx", self.path / "policy.onnx")
         self.assertEqual(onnx.returncode, 0, onnx.stderr)
 
@@ -592,7 +594,7 @@ class BadInput(InFolder, BadInputTest):
     def test_descriptions(self):
         good = {"name": "A", "observations": 2, "action_limit": [1], "choices": [],
                 "episode_steps": 9}
-        for text, what in (("", "expected a description of an environment"), ("[]", "a JSON object"),
+        for text, what in (("[]", "a JSON object"),
                            ({"name": "A\n"}, '"name"'), ({"observations": 0}, '"observations"'),
                            ({"action_limit": []}, '"action_limit"'),
                            ({"action_limit": [0]}, '"action_limit"'),
@@ -601,12 +603,9 @@ class BadInput(InFolder, BadInputTest):
                            ({"solved_return": "x"}, "solved_return"),
                            ({}, "gymnasium/A: expected a task of the program")):
             text = json.dumps(good | text) if isinstance(text, dict) else text
-            done = program("train", "--agent", "ppo", "--task", "gymnasium", "--environment", text,
-                           "--out", self.path / "run")
+            done = program("train", "--agent", "ppo", "--environment", text, "--out", self.path / "run")
             self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1), done.stderr)
             self.assertIn(what, done.stderr)
-        self.refuse("environment: expected none, because the task double-pendulum", upswing.train,
-                    environment="x")
         self.assertEqual(os.listdir(self.path), [])
 
     def test_settings(self):
@@ -616,7 +615,7 @@ class BadInput(InFolder, BadInputTest):
         self.refuse_env("envs: expected none with env; set num_envs", Reach(), envs=2)
         self.refuse_env("levels: expected none with discrete actions", "CartPole-v1", levels=3)
         self.refuse_env("mirror: expected a task with mirror symmetry", Reach(), mirror=True)
-        self.refuse_env("mass2: expected none, because the task gymnasium", Reach(), mass2=2)
+        self.refuse_env("mass2: expected none with a Gymnasium environment", Reach(), mass2=2)
         self.refuse_env("solved_return: expected a finite number", Reach(), solved_return=np.nan)
         self.refuse_env("got \"fsat\" (did you mean fast?)", "CartPole-v1", "fsat")
 

@@ -214,7 +214,7 @@ def _source_of(agent: str | None, env: EnvLike | None, num_envs: int | None,
         raise _upswing.InputError(
             "resume: expected none with env: the state of its environments cannot be saved, so "
             "that their runs cannot resume")
-    for name, instead in (("envs", "num_envs"), ("task", "env"), ("environment", "env")):
+    for name, instead in (("envs", "num_envs"), ("environment", "env")):
         if name in settings:
             raise _upswing.InputError(f"{name}: expected none with env; set {instead}")
     source = Source(env, num_envs, eval_env, max_episode_steps, solved_return)
@@ -222,7 +222,7 @@ def _source_of(agent: str | None, env: EnvLike | None, num_envs: int | None,
         if name in settings and source.discrete:
             raise _upswing.InputError(
                 f"{name}: expected none with discrete actions, got {settings[name]!r}")
-    found: dict[str, Any] = {"task": "gymnasium", "environment": source.description}
+    found: dict[str, Any] = {"environment": source.description}
     if source.num_envs > 0 or num_envs is not None:
         found["envs"] = source.num_envs
     if agent is None and config is None:

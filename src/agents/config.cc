@@ -44,17 +44,12 @@ void Config::Describe(Options& o) {
       .implied = true;
   train.Describe(o);
   o.Section("task");
-  o.AddChoice(&task, "task", TaskNames(), "task to learn").implied = true;
   o.Add(&environment, "environment",
-        "environment of the task gymnasium, as upswing.train(env=...) in Python describes it")
+        "environment of Gymnasium, as upswing.train(env=...) in Python describes it; empty: double "
+        "pendulum")
       .implied = true;
   DescribeEnvironment(o);
   learner().Describe(o);
-}
-
-void Config::DescribePlantTask(Options& o) {
-  train.DescribeCurriculum(o);
-  DescribeEnvironment(o);
 }
 
 void Config::DescribeEnvironment(Options& o) {
@@ -97,7 +92,6 @@ Options EverySetting(Config& scratch) {
 
 EnvConfig Config::Environments() const {
   EnvConfig env;
-  env.task = task;
   env.environment = environment;
   env.plants = {plant};
   env.disturbances = {disturbance};

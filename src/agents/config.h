@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "agents/task.h"
+#include "agents/foreign_task.h"
 #include "base/options.h"
 #include "pendulum/double_pendulum.h"
 #include "rl/dqn_config.h"
@@ -34,8 +34,7 @@ struct Config {
   std::string algorithm;       // one of AlgorithmNames
   std::string model;           // path of an MJCF file; empty: the built-in model
   TrainConfig train;
-  std::string task = kDoublePendulum;  // one of TaskNames
-  std::string environment;             // description of a foreign task's environment
+  std::string environment;  // description of a foreign task's environment; empty: double pendulum
   double episode_seconds = 4, random_start_share = 0.9, random_start_velocity = 5;
   int64_t memory = 0;
   bool identify = false;
@@ -60,8 +59,6 @@ struct Config {
 
   /// Describes all settings. Of the learners, only the settings of `algorithm`.
   void Describe(Options& options);
-  /// Describes the settings that only tasks with a plant have.
-  void DescribePlantTask(Options& options);
   /// Describes the settings of the double pendulum's environments.
   void DescribeEnvironment(Options& options);
 
@@ -69,6 +66,8 @@ struct Config {
   /// engine that `physics` names.
   EnvConfig Environments() const;
   EnvSpec Spec() const { return SpecOf(Environments()); }
+  /// Whether Python makes and steps the environments.
+  bool is_foreign() const { return !environment.empty(); }
 
   /// Makes an agent for environments of this kind. The threads of the pool share its work.
   std::unique_ptr<Agent> MakeAgent(const EnvSpec& spec, ThreadPool& pool) const {

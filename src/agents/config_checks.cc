@@ -18,22 +18,20 @@ std::string Gigabytes(double bytes) {
 
 AgentSize SizeOfLearner(const Config& config) { return config.learner().Size(config.Spec()); }
 
-/// Throws BadInput if a setting of the double pendulum differs from its default in a task without
-/// that setting.
-void CheckTask(Config& config, const std::string& where) {
-  if (!IsForeign(config.task) && !config.environment.empty()) {
-    throw BadInput(Concat(where.empty() ? "" : where + ": ", "environment: expected none, because ",
-                          "the task ", config.task, " is not ", kGymnasium, ", got one"));
-  }
-  if (HasPlant(config.task)) return;
+/// Throws BadInput if a setting of the double pendulum differs from its default in another
+/// environment.
+void CheckForeign(Config& config, const std::string& where) {
   Config defaults;
   Options now, usual;
-  config.DescribePlantTask(now);
-  defaults.DescribePlantTask(usual);
+  for (auto [from, options] : {std::pair(&config, &now), {&defaults, &usual}}) {
+    from->train.DescribeCurriculum(*options);
+    from->DescribeEnvironment(*options);
+  }
   for (const auto& [option, other] : Differences(now, usual)) {
     throw BadInput(Concat(where.empty() ? "" : where + ": ", option.name,
-                          ": expected none, because the task ", config.task, " of agent ",
-                          config.agent, " has no such setting, got ", option.text()));
+                          ": expected none with a Gymnasium environment, which has no such "
+                          "setting, got ",
+                          option.text()));
   }
 }
 
@@ -46,7 +44,7 @@ void CheckSettings(Config& config, const std::string& where) {
   } catch (const Error& error) {
     throw BadInput(Concat(where, where.empty() ? "" : ": ", error.what()));
   }
-  CheckTask(config, where);
+  if (config.is_foreign()) CheckForeign(config, where);
 }
 
 std::vector<std::string> Warnings(const Config& config) {

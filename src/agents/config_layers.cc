@@ -17,8 +17,9 @@ const NamedAgent& FindAgent(const std::string& name, const std::string& where) {
   const auto found = std::ranges::find_if(agents, [&](const auto& a) { return a.name == name; });
   if (found != agents.end()) return *found;
   const std::vector<std::string> names = NamesOf(agents);
+  const std::string instead = ReplacementOf(name);
   throw BadInput(Concat(where, ": expected an agent, one of ", Join(names, ", "), ", got \"", name,
-                        "\"", DidYouMean(name, names)));
+                        "\"", instead.empty() ? DidYouMean(name, names) : instead));
 }
 
 /// A text setting that other settings depend on: its value in the last layer that sets it, and the
@@ -179,7 +180,7 @@ Config ParseConfig(std::string_view text, const std::string& where,
                    const std::vector<FlagValue>& flags, const ModelReader& read_model) {
   const toml::table table = ParseToml(text, where);
   const ChosenAgent agent = ChooseAgent(table, where, flags);
-  const bool foreign = FindEarly("task", "task", table, where, flags).value == kGymnasium;
+  const bool foreign = !FindEarly("task", "environment", table, where, flags).value.empty();
   Config config(agent.algorithm);
   config.agent = agent.name;
   const Options options = KnownOptions(config);

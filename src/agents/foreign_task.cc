@@ -10,6 +10,7 @@
 namespace upswing {
 namespace {
 
+constexpr std::string_view kBeginning = "gymnasium/";  // of a foreign task's name
 constexpr int64_t kMostInputs = 65536, kMostActions = 1024, kMostEpisodeSteps = 100'000'000;
 constexpr double kMostAction = 1e6;  // largest size of an action
 constexpr size_t kLongestName = 50;
@@ -51,10 +52,6 @@ ForeignTask ParseObject(const std::string& text) {
 }  // namespace
 
 ForeignTask ForeignTask::Parse(const std::string& text, const std::string& where) {
-  if (text.empty()) {
-    throw BadInput(Concat(where, ": expected a description of an environment, which only ",
-                          "upswing.train(env=...) in Python writes, got none"));
-  }
   try {
     return ParseObject(text);
   } catch (const Error& error) {
@@ -64,7 +61,7 @@ ForeignTask ForeignTask::Parse(const std::string& text, const std::string& where
 
 EnvSpec ForeignTask::Spec(int num_envs) const {
   EnvSpec spec;
-  spec.task = Concat(kGymnasium, "/", name);
+  spec.task = Concat(kBeginning, name);
   spec.num_envs = num_envs;
   spec.obs_size = obs_size;
   spec.action_limit = action_limit;
@@ -77,14 +74,31 @@ EnvSpec ForeignTask::Spec(int num_envs) const {
   return spec;
 }
 
-bool IsForeign(std::string_view task) {
-  return task == kGymnasium || task.starts_with(Concat(kGymnasium, "/"));
-}
+bool IsForeign(std::string_view task) { return task.starts_with(kBeginning); }
 
 Error NoForeignEnvironment(const std::string& task) {
   return BadInput(Concat(task, ": expected a task of the program, got an environment of ",
                          "Gymnasium, which only Python makes and steps (upswing.train, "
                          "Policy.act)"));
+}
+
+std::string ReplacementOf(std::string_view name) {
+  const std::string_view env = name.ends_with("pendulum-v1") ? "Pendulum-v1"
+                               : name.starts_with("acrobot") ? "Acrobot-v1"
+                                                             : "";
+  if (env.empty()) return "";
+  return Concat("; train on Gymnasium's ", env, " in Python: upswing.train(env=\"", env, "\")");
+}
+
+std::unique_ptr<VectorEnv> MakeEnv(const EnvConfig& config) {
+  if (config.environment.empty()) return std::make_unique<PendulumEnv>(config);
+  if (!config.make_foreign) throw NoForeignEnvironment(SpecOf(config).task);
+  return config.make_foreign(config);
+}
+
+EnvSpec SpecOf(const EnvConfig& config) {
+  if (config.environment.empty()) return PendulumSpec(config);
+  return ForeignTask::Parse(config.environment, "environment").Spec(config.num_envs);
 }
 
 }  // namespace upswing

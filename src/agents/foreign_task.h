@@ -10,12 +10,9 @@
 
 #include "base/env.h"
 #include "base/error.h"
+#include "pendulum/pendulum_env.h"
 
 namespace upswing {
-
-/// The task of all environments from outside the program (docs/howto/gymnasium.md). The name of an
-/// environment's task is kGymnasium, a slash and the environment's name.
-inline constexpr const char* kGymnasium = "gymnasium";
 
 /// An environment with Gymnasium's interface. Python makes and steps it.
 struct ForeignTask {
@@ -30,7 +27,8 @@ struct ForeignTask {
   /// that begins with `where`.
   static ForeignTask Parse(const std::string& text, const std::string& where);
 
-  /// The task has no seconds: a step counts as 1 s. Without `solved_return` it is never solved.
+  /// The name of the task is `gymnasium/` and `name`. It has no seconds: a step counts as 1 s.
+  /// Without `solved_return` it is never solved.
   EnvSpec Spec(int num_envs) const;
 };
 
@@ -40,8 +38,26 @@ bool IsForeign(std::string_view task);
 /// The error for work that needs a foreign task's environment.
 Error NoForeignEnvironment(const std::string& task);
 
+/// What replaces a task or agent that version 0.5.0 had, for messages: `; train on …`. Empty for
+/// another name.
+std::string ReplacementOf(std::string_view name);
+
 struct EnvConfig;
 /// Makes environments of a foreign task.
 using ForeignMaker = std::function<std::unique_ptr<VectorEnv>(const EnvConfig&)>;
+
+/// Settings of the environments of a training and its evaluations: double pendulums, or a foreign
+/// task. A foreign task uses only the number of environments and their random streams.
+struct EnvConfig : PendulumEnvConfig {
+  std::string environment;      // description, see ForeignTask::Parse; empty: double pendulums
+  ForeignMaker make_foreign;    // empty: this program cannot make foreign environments
+  bool for_evaluation = false;  // environments need not go on after their first episode
+};
+
+/// Makes environments. Throws BadInput as PendulumEnv does, or if they cannot be made here.
+std::unique_ptr<VectorEnv> MakeEnv(const EnvConfig& config);
+
+/// The EnvSpec of the environments of MakeEnv, without making them.
+EnvSpec SpecOf(const EnvConfig& config);
 
 }  // namespace upswing

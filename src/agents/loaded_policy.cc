@@ -40,35 +40,28 @@ void CheckObservation(const LoadedPolicy& loaded, const std::string& where) {
   }
 }
 
-/// Throws BadInput unless the policy is for a task of this program.
+/// Throws BadInput unless the policy is for the double pendulum of this program, or a foreign task,
+/// whose spaces only its environment knows.
 void CheckTask(const LoadedPolicy& loaded, const std::string& where) {
-  if (IsForeign(loaded.task)) {  // only the environment knows its spaces
-    if (loaded.policy->info().control_period) return;
-    throw BadInput(Concat(where, ": no metadata \"control_period\""));
-  }
-  const std::vector<std::string> names = TaskNames();
-  if (std::ranges::find(names, loaded.task) == names.end()) {
-    throw BadInput(Concat(where, ": metadata \"task\": expected one of ", Join(names, ", "),
-                          ", got \"", loaded.task, "\""));
-  }
-  EnvConfig config;
-  config.task = loaded.task;
-  const EnvSpec spec = SpecOf(config);
   const auto& period = loaded.policy->info().control_period;
-  if (period != spec.step_seconds) {
-    throw BadInput(Concat(
-        where, ": metadata \"control_period\": expected ", FormatNumber(spec.step_seconds),
-        " s, the control period of the task, got ", period ? FormatNumber(*period) : "none"));
+  if (loaded.is_foreign()) {
+    if (!period) throw BadInput(Concat(where, ": no metadata \"control_period\""));
+    return;
   }
-  if (loaded.policy->action_size() != spec.action_size()) {
-    throw BadInput(Concat(where, ": expected ", spec.action_size(), " number per action, as in ",
-                          loaded.task, ", got ", loaded.policy->action_size()));
+  if (loaded.task != kDoublePendulum) {
+    throw BadInput(Concat(where, ": metadata \"task\": expected ", kDoublePendulum, ", got \"",
+                          loaded.task, "\"", ReplacementOf(loaded.task)));
   }
-  if (HasPlant(loaded.task)) return CheckObservation(loaded, where);
-  if (loaded.policy->obs_size() != spec.obs_size) {
-    throw BadInput(Concat(where, ": expected a policy of ", spec.obs_size, " observations, as in ",
-                          loaded.task, ", got ", loaded.policy->obs_size()));
+  if (period != kControlPeriod) {
+    throw BadInput(Concat(where, ": metadata \"control_period\": expected ",
+                          FormatNumber(kControlPeriod), " s, the control period of the task, got ",
+                          period ? FormatNumber(*period) : "none"));
   }
+  if (loaded.policy->action_size() != 1) {
+    throw BadInput(Concat(where, ": expected 1 number per action, as in ", loaded.task, ", got ",
+                          loaded.policy->action_size()));
+  }
+  CheckObservation(loaded, where);
 }
 
 /// The plant of a policy's training. Throws BadInput.
@@ -100,19 +93,26 @@ LoadedPolicy PolicyIn(const Tensors& file) {
   const std::string task = info.task.empty() ? kDoublePendulum : info.task;
   LoadedPolicy loaded{where, where, policy, task, Plant(), ""};
   CheckTask(loaded, where);
-  if (!HasPlant(loaded.task)) return loaded;
+  if (loaded.is_foreign()) return loaded;
   loaded.plant = TrainingPlant(info, where);
   loaded.mjcf = info.model;
   return loaded;
 }
 
+void ExpectPendulum(const LoadedPolicy& loaded) {
+  if (!loaded.is_foreign()) return;
+  throw BadInput(Concat(Printable(loaded.name), ": expected a policy of ", kDoublePendulum,
+                        ", got one of ", loaded.task,
+                        ", an environment that only Python steps (Policy.act)"));
+}
+
 int LoadedPolicy::memory() const {
-  return HasPlant(task) ? MemorySteps(policy->obs_size(), identifies()) : 0;
+  return is_foreign() ? 0 : MemorySteps(policy->obs_size(), identifies());
 }
 
 bool LoadedPolicy::identifies() const {
   const auto& observation = policy->info().observation;
-  return HasPlant(task) && observation && observation->identified;
+  return !is_foreign() && observation && observation->identified;
 }
 
 PolicyInfo InfoOf(const Config& config) {
@@ -124,7 +124,7 @@ PolicyInfo InfoOf(const Config& config) {
   const EnvSpec spec = config.Spec();
   info.task = spec.task;
   info.control_period = spec.step_seconds;
-  if (!HasPlant(config.task)) return info;
+  if (config.is_foreign()) return info;
   for (const auto& [name, value] : PlantValues(config.plant)) info.plant[name] = value;
   info.observation = ObservationInfoOf(config.memory, config.identify);
   info.model = config.mjcf;

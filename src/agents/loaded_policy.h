@@ -16,7 +16,7 @@ struct LoadedPolicy {
   std::string name;  // for messages
   std::string path;  // its file; empty for a controller
   std::shared_ptr<const Policy> policy;
-  std::string task;  // see TaskNames
+  std::string task;  // kDoublePendulum, or that of an environment of Gymnasium
   // Of the double pendulum:
   Plant plant;       // plant of the training or of the design
   std::string mjcf;  // empty: the built-in model
@@ -24,6 +24,8 @@ struct LoadedPolicy {
   // such controller exists.
   std::function<std::shared_ptr<const Policy>(const Plant&)> design_for = {};
 
+  /// Whether it is for an environment that only Python makes and steps.
+  bool is_foreign() const { return IsForeign(task); }
   /// Number of past steps in its observations.
   int memory() const;
   /// Whether its observations contain an estimate of the plant.
@@ -35,6 +37,9 @@ struct LoadedPolicy {
 /// The policy in a file. Its MJCF model is not checked. Throws BadInput also for a task that this
 /// program lacks: another control period or other observations.
 LoadedPolicy PolicyIn(const Tensors& file);
+
+/// Throws BadInput unless the policy is for the double pendulum.
+void ExpectPendulum(const LoadedPolicy& loaded);
 
 /// Metadata of a policy file on its agent and task.
 PolicyInfo InfoOf(const Config& config);

@@ -13,19 +13,23 @@ namespace {
 struct RemovedSetting {
   std::string_view section, name, value;
 };
-constexpr RemovedSetting kRemoved[] = {{"network", "precision", "float32"}};
+constexpr RemovedSetting kRemoved[] = {{"network", "precision", "float32"},
+                                       {"task", "task", "double-pendulum"},
+                                       {"task", "task", "gymnasium"}};  // has an environment
 
-/// Whether this setting was removed. Throws BadInput if its value is not the one that is now fixed.
+/// Whether this setting was removed. Throws BadInput if it has a value that is no longer possible.
 bool IsRemoved(std::string_view section, std::string_view name, const toml::node& node,
                const std::string& where) {
+  const std::string text = TextOf(node).value_or("another type");
+  std::vector<std::string> possible;
   for (const RemovedSetting& removed : kRemoved) {
     if (section != removed.section || name != removed.name) continue;
-    if (TextOf(node) == removed.value) return true;
-    throw BadInput(Concat(PlaceOf(node, where), ": ", name, ": expected ", removed.value,
-                          ", the only value since version 0.5.0, got ",
-                          TextOf(node).value_or("another type")));
+    if (text == removed.value) return true;
+    possible.emplace_back(removed.value);
   }
-  return false;
+  if (possible.empty()) return false;
+  throw BadInput(Concat(PlaceOf(node, where), ": ", name, ": expected ", Join(possible, " or "),
+                        ", got ", Printable(text), ReplacementOf(text)));
 }
 
 /// Sets one key of a section, or a key without a section if `section` is empty.

@@ -31,7 +31,7 @@ std::unique_ptr<VectorEnv> MakeTrainingEnv(const Config& config, const Host& hos
 }  // namespace
 
 bool IsScreened(const Config& config) {
-  return config.eval_physics == kScreened && config.mjcf.empty() && HasPlant(config.task);
+  return config.eval_physics == kScreened && config.mjcf.empty() && !config.is_foreign();
 }
 
 EnvConfig EvaluationEnvironments(const Config& config, int64_t step) {

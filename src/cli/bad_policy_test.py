@@ -258,6 +258,20 @@ class PolicyFileTest(SmallRunTest):
         self.change_inputs(4)
         self.refuse_policy("expected", "8", "4")
 
+    def test_policies_of_other_tasks(self):
+        policy = "run/policy.safetensors"
+        self.change({"task": "gymnasium/CartPole-v1"})
+        self.succeed("export", policy, "--onnx", "policy.onnx")
+        self.assertIn("task        gymnasium/CartPole-v1", self.succeed("info", policy))
+        for command in (["eval"], ["simulate"], ["plot"], ["map"], ["bounds"], ["realaigym"],
+                        ["view", "--record", "x.png"], ["export", "--page", "page"]):
+            self.refuse([*command, policy], f"{policy}: expected a policy of double-pendulum, got one "
+                        "of gymnasium/CartPole-v1")
+        self.refuse(["eval", "hybrid", "--swing-up", policy], "--swing-up", "CartPole")
+        self.change({"task": "acrobot-v1"})
+        self.refuse_policy('expected double-pendulum, got "acrobot-v1"; train on Gymnasium',
+                           'upswing.train(env="Acrobot-v1")')
+
     def change_inputs(self, inputs):
         """Writes a policy of zeros for observations of another size."""
         metadata, tensors = read_tensors(self.policy)

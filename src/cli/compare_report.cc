@@ -128,13 +128,12 @@ void PrintPolicy(const JudgedPolicy& policy, const std::string& task) {
   print("episodes", fmt::format("{}, from the final evaluations of {}", FormatCount(e.episodes),
                                 policy.runs == 1 ? "one run" : Concat(policy.runs, " runs")));
   print("success", EstimateText({e.success_rate(), e.success_interval}, Percent));
-  const bool upright = policy.upright();
+  const bool upright = e.successes > 0;
   if (upright) print("swing-up time", QuartilesText(e.swing_up_seconds));
   print("return", MomentsText(e.reward_sum));
-  const std::string& unit = policy.spec.action_unit;
-  print("rms torque", Concat(Torque(e.rms_torque.mean), ' ', unit));
-  print("torque change", Concat(Torque(e.torque_variation.mean), ' ', unit, "/s"));
-  if (upright) print("  once upright", Concat(Torque(e.goal_variation.mean), ' ', unit, "/s"));
+  print("rms torque", Concat(Torque(e.rms_torque.mean), " N·m"));
+  print("torque change", Concat(Torque(e.torque_variation.mean), " N·m/s"));
+  if (upright) print("  once upright", Concat(Torque(e.goal_variation.mean), " N·m/s"));
   fmt::print("\n");
 }
 
@@ -246,7 +245,7 @@ std::string ComparisonJson(const Comparison& comparison) {
   j["policies"] = ordered_json::array();
   for (const JudgedPolicy& policy : comparison.policies) {
     ordered_json p{{"policy", policy.name}, {"task", policy.task + 1}, {"runs", policy.runs}};
-    AddFigures(policy.figures, policy.spec, false, p);
+    AddFigures(policy.figures, false, p);
     j["policies"].push_back(p);
   }
   j["against_policies"] = ordered_json::array();

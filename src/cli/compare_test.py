@@ -420,10 +420,8 @@ class CompareTest(ProgramTest):
             self.assertIn(f">{title}<", svg)
         self.refuse(["compare", *names[:2], "./run/../run/policy.safetensors"], "got it twice")
 
-    def test_refuses_policies_without_runs_or_of_another_task(self):
+    def test_refuses_policies_without_runs_or_for_another_joint(self):
         self.make_group("r", [1, 2])
-        self.succeed(*small(agent="acrobot", steps=1000, eval_every=1000, eval_episodes=1,
-                            out="acrobot"))
         refuse = lambda arguments, *words: self.refuse(["compare", *arguments], *words)
         refuse(["lqr", "tvlqr"], "expected runs too, whose episodes lqr tvlqr", "bounds lqr tvlqr")
         refuse(["r", "lqr", "--different-tasks"], "--different-tasks", "got lqr")
@@ -433,8 +431,6 @@ class CompareTest(ProgramTest):
                "one for joint 2")
         refuse(["r", "lqr", "lqr"], "lqr: expected each policy once, got it twice")
         refuse(["r", "none.safetensors"], "none.safetensors: no such file")
-        refuse(["r", "acrobot/policy.safetensors"],
-               "expected a policy of double-pendulum, the task of the runs, got one of acrobot-v1")
 
 
 if __name__ == "__main__":

@@ -143,7 +143,6 @@ class Lqr(ProgramTest):
         for command in ("eval", "simulate", "plot", "map", "info"):
             self.refuse([command, "lqrr"], "lqrr: no such file", "did you mean lqr?")
         self.refuse(["export", "lqr", "--page", "page"], "lqr: no such file", "not a controller")
-        self.refuse(["eval", "lqr", "--task", "acrobot-v1"], "unknown flag --task")
 
     def test_a_file_of_that_name(self):
         self.write("lqr", "no policy")

@@ -20,21 +20,13 @@ std::string LengthText(const Moments& seconds) {
   return fmt::format("{} s per episode", MomentsText(seconds));
 }
 
-/// The condition of success, such as `a return of -100 or more`.
-std::string SuccessText(const EvaluationRule& rule) {
-  if (rule.by_return()) return fmt::format("a return of {:.6g} or more", rule.solved_return);
-  return fmt::format("the goal held throughout the last {} of {} s", rule.hold_seconds,
-                     rule.seconds);
-}
-
-/// Prints figures over successful episodes, for a task whose goal has to be held.
+/// Prints figures over successful episodes.
 void PrintSuccesses(const Evaluation& e) {
   if (e.successes == 0) {
     fmt::print("  swing-up time  none: no episode stays upright\n");
     return;
   }
   fmt::print("  swing-up time  {}\n", QuartilesText(e.swing_up_seconds));
-  if (e.tilt.empty()) return;  // the task has no bodies that lean
   const std::string within = fmt::format("{:.0f}° of upright", kSettledTilt * kDegrees);
   if (e.settled > 0) {
     fmt::print("  settling time  {}, within {}: {} of {}\n", QuartilesText(e.settling_seconds),
@@ -49,13 +41,12 @@ void PrintSuccesses(const Evaluation& e) {
   fmt::print("  steady tilt    {}   in the last {} s\n", Join(tilts, ", "), kSteadyTiltSeconds);
 }
 
-void PrintTorques(const Evaluation& e, const EnvSpec& spec) {
-  const std::string& unit = spec.action_unit;
-  fmt::print("  torque         peak {:.4g} {}, rms {} {}\n", e.peak_torque, unit,
-             MomentsText(e.rms_torque), unit);
-  fmt::print("  torque change  {} {}/s", MomentsText(e.torque_variation), unit);
-  const bool upright = !spec.evaluation.by_return() && e.successes > 0;
-  if (upright) fmt::print("; {} {}/s once upright", MomentsText(e.goal_variation), unit);
+void PrintTorques(const Evaluation& e) {
+  fmt::print("  torque         peak {:.4g} N·m, rms {} N·m\n", e.peak_torque,
+             MomentsText(e.rms_torque));
+  fmt::print("  torque change  {} N·m/s", MomentsText(e.torque_variation));
+  const bool upright = e.successes > 0;
+  if (upright) fmt::print("; {} N·m/s once upright", MomentsText(e.goal_variation));
   fmt::print("\n");
   if (upright) {
     fmt::print("  chatter        {} torque changes per second once upright\n",
@@ -85,13 +76,8 @@ std::string QuartilesText(const Quartiles& q) {
 void PrintEvalTable(const EvalReport& report) {
   const Evaluation& e = report.figures;
   fmt::print("{}\n", Printable(report.policy));
-  const EvaluationRule& rule = report.spec.evaluation;
-  if (HasPlant(report.spec.task)) {
-    fmt::print("  plant          {}, physics {}\n", PlantText(report.env.plant(0)),
-               report.env.engine->name);
-  } else {
-    fmt::print("  task           {}, success is {}\n", report.spec.task, SuccessText(rule));
-  }
+  fmt::print("  plant          {}, physics {}\n", PlantText(report.env.plant(0)),
+             report.env.engine->name);
   if (report.model) fmt::print("  {:<15}{}\n", "model", report.model->Text());
   const std::string changes = ChangesText(report.env);
   if (!changes.empty()) fmt::print("  {:<15}{}\n", "with", changes);
@@ -107,11 +93,11 @@ void PrintEvalTable(const EvalReport& report) {
   fmt::print("  success        {} of {} = {:.1f}%   (95% interval {:.1f}% to {:.1f}%)\n",
              e.successes, e.episodes, 100 * e.success_rate(), 100 * e.success_interval.low,
              100 * e.success_interval.high);
-  if (!rule.by_return()) PrintSuccesses(e);
+  PrintSuccesses(e);
   fmt::print("  return         {}   in the first {} s\n", MomentsText(e.reward_sum),
-             rule.return_seconds);
+             kReturnSeconds);
   for (size_t k = 0; k < e.term_means.size(); ++k) {
-    fmt::print("    {:<18}{:8.2f}\n", report.spec.term_names[k], e.term_means[k]);
+    fmt::print("    {:<18}{:8.2f}\n", kRewardTermNames[k], e.term_means[k]);
   }
   if (report.knows_values) {
     fmt::print("  value at start {:.4g} expected, {:.4g} attained (discounted reward)\n", e.value,
@@ -121,7 +107,7 @@ void PrintEvalTable(const EvalReport& report) {
     }
   }
   fmt::print("  energy used    {} J   in {}\n", MomentsText(e.work), LengthText(e.seconds));
-  PrintTorques(e, report.spec);
+  PrintTorques(e);
   fmt::print("  ± is the standard deviation over the episodes\n");
 }
 

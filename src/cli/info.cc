@@ -96,19 +96,16 @@ void PrintActions(const LoadedPolicy& loaded, const NetworkPolicy* learned) {
   std::span<const double> levels, limits;
   if (learned != nullptr) levels = learned->parts().torques;
   if (learned != nullptr) limits = learned->parts().action_limit;
-  if (IsForeign(loaded.task)) {
+  if (loaded.is_foreign()) {
     fmt::print("  actions     {}\n", levels.empty()
                                          ? fmt::format("within ±{}", fmt::join(limits, ", ±"))
                                          : fmt::format("one of {}", fmt::join(levels, ", ")));
     return;
   }
-  EnvConfig env;
-  env.task = loaded.task;
   fmt::print("  torques     {}, every {} s\n",
-             levels.empty()
-                 ? "any within the torque limit"
-                 : fmt::format("{} {}", fmt::join(levels, ", "), SpecOf(env).action_unit),
-             *loaded.policy->info().control_period);
+             levels.empty() ? "any within the torque limit"
+                            : fmt::format("{} N·m", fmt::join(levels, ", ")),
+             kControlPeriod);
 }
 
 void PrintPolicy(const LoadedPolicy& loaded) {
@@ -117,13 +114,13 @@ void PrintPolicy(const LoadedPolicy& loaded) {
   fmt::print("{}\n", Printable(loaded.name));
   fmt::print("  what        {}, {} parameters\n", policy.description(),
              FormatCount(policy.num_parameters()));
-  if (!HasPlant(loaded.task)) fmt::print("  task        {}\n", loaded.task);
+  if (loaded.is_foreign()) fmt::print("  task        {}\n", loaded.task);
   const auto* learned = dynamic_cast<const NetworkPolicy*>(&policy);
   PrintActions(loaded, learned);
   fmt::print("  made by     agent {}, seed {}, step {}, upswing {}\n", Known(info.agent),
              Known(info.seed), Known(info.step), Known(info.upswing_version));
   fmt::print("  evaluated   {}\n", EvaluationText(info));
-  if (HasPlant(loaded.task)) {
+  if (!loaded.is_foreign()) {
     fmt::print("  observes    {}\n", ObservationText(loaded));
     fmt::print("  plant       {}\n", PlantText(loaded.plant));
   }

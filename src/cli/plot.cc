@@ -30,8 +30,8 @@ struct PlotArguments {
 double UprightSince(const std::vector<RolloutRow>& rows) {
   double since = -1;
   for (const RolloutRow& row : rows) {
-    if (!row.at_goal) since = -1;
-    if (row.at_goal && since < 0) since = row.t;
+    if (!row.inverted) since = -1;
+    if (row.inverted && since < 0) since = row.t;
   }
   return since;
 }
@@ -41,14 +41,10 @@ std::string Caption(const PlotArguments& a, const RolloutConfig& config, const R
                     const LoadedPolicy& loaded) {
   std::vector<std::string> parts;
   if (a.trial.is_of_eval()) parts.push_back(Concat("episode ", a.trial.episode, " of eval"));
-  const bool pendulum = HasPlant(config.env.task);
-  const char* usual = TaskNamed(config.env.task).usual_start;
   if (!a.trial.is_of_eval()) {
-    parts.push_back(
-        Concat("start ", a.trial.start.value_or(usual != nullptr ? usual : "of its own")));
+    parts.push_back(Concat("start ", a.trial.start.value_or("0,0,0,0")));
   }
   parts.push_back(Concat("seed ", a.trial.seed));
-  if (!pendulum) return Join(parts, "; ");
   parts.push_back(a.trial.physics);
   for (const std::string& text :
        {PlantChangesText(rollout.plant, loaded), ChangesText(config.env)}) {
@@ -60,9 +56,7 @@ std::string Caption(const PlotArguments& a, const RolloutConfig& config, const R
 int RunPlot(const PlotArguments& a) {
   const LoadedPolicy loaded = GetPolicy(a.policy);
   RolloutConfig config = TrialEpisode(a.trial, &loaded);
-  const EnvSpec spec = SpecOf(config.env);
-  const bool pendulum = HasPlant(spec.task);
-  const double usual = a.trial.is_of_eval() || !pendulum ? spec.evaluation.seconds : 10;
+  const double usual = a.trial.is_of_eval() ? kEvaluationSeconds : 10;
   config.seconds = a.seconds < 0 ? usual : a.seconds;
   config.estimates = true;
   const std::optional<ModelInfo> model = InfoOfModel(config.env.mjcf, a.trial.model);
@@ -72,8 +66,7 @@ int RunPlot(const PlotArguments& a) {
 
   MakeNewFolder(folder);
   std::vector<std::pair<std::string, Figure>> figures{
-      {"episode", EpisodeFigure(rollout, *loaded.policy)}};
-  if (pendulum) figures.emplace_back("phase", PhaseFigure(rollout));
+      {"episode", EpisodeFigure(rollout, *loaded.policy)}, {"phase", PhaseFigure(rollout)}};
   std::vector<std::string> files;
   for (auto& [name, figure] : figures) {
     figure.title = WithModel(loaded.name, model);
@@ -85,17 +78,11 @@ int RunPlot(const PlotArguments& a) {
     }
   }
   fmt::print("{}\n", Printable(loaded.name));
-  if (pendulum) {
-    fmt::print("  plant      {}, physics {}\n", EpisodeText(rollout), a.trial.physics);
-  } else {
-    fmt::print("  task       {}\n", spec.task);
-  }
+  fmt::print("  plant      {}, physics {}\n", EpisodeText(rollout), a.trial.physics);
   if (model) fmt::print("  model      {}\n", model->Text());
-  // In other tasks, a row has the state after its step.
-  const double later = pendulum ? 0 : spec.step_seconds;
   const double since = UprightSince(rollout.rows);
-  fmt::print("  {}    {}\n", pendulum ? "upright" : "at goal",
-             since < 0 ? "not at the end" : fmt::format("from {:.2f} s to the end", since + later));
+  fmt::print("  upright    {}\n",
+             since < 0 ? "not at the end" : fmt::format("from {:.2f} s to the end", since));
   fmt::print("  torque     {}\n", TorqueText(rollout));
   if (a.trial.is_of_eval()) {
     fmt::print("  episode    {} of eval: {}\n", a.trial.episode,

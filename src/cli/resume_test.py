@@ -58,6 +58,20 @@ class ResumeTest(ProgramTest):
         self.succeed(*small(steps=4000, out="never-stopped"))
         self.assert_same_run("run", "never-stopped")
 
+    def test_a_run_of_version_0_5(self):
+        """Settings of version 0.5 have a `task`."""
+        self.succeed(*small(steps=2000))
+        config = self.folder / "run/config.toml"
+        settings = config.read_text()
+        config.write_text(settings.replace("[task]\n", '[task]\ntask = "double-pendulum"\n'))
+        self.succeed("info", "run")
+        config.write_text(settings.replace("[task]\n", '[task]\ntask = "pendulum-v1"\n'))
+        for command in (["info", "run"], ["train", "--config", config, "--out", "x"]):
+            self.refuse(command, "task: expected double-pendulum or gymnasium, got pendulum-v1; train "
+                        'on Gymnasium\'s Pendulum-v1 in Python: upswing.train(env="Pendulum-v1")')
+        self.refuse(["train", "--agent", "sac-pendulum-v1"], "--agent: expected an agent",
+                    'upswing.train(env="Pendulum-v1")')
+
     def test_a_run_that_is_being_trained_is_not_resumed(self):
         process = self.start(*small(steps=ENDLESS, stop_when_solved=False))
         refused = run("train", "--resume", "run", cwd=self.folder)

@@ -35,9 +35,10 @@ bool IsTime(std::string_view name) {
   return std::ranges::find(kNames, word) != kNames.end();
 }
 
-/// The column `torque` of a CSV file with a row per `step` (s). Throws BadInput with the line
+/// The column `torque` of a CSV file with a row per control step. Throws BadInput with the line
 /// number, and if a column of times has other steps.
-std::vector<double> ReadTorqueFile(const std::string& path, double step) {
+std::vector<double> ReadTorqueFile(const std::string& path) {
+  constexpr double step = kControlPeriod;
   const std::string where = InputName(path), text = ReadInput(path);
   std::vector<std::string> names{"torque"};
   std::ranges::copy_if(CsvNames(text, where), std::back_inserter(names), IsTime);
@@ -71,15 +72,14 @@ int RunSimulate(const SimulateArguments& a) {
   std::optional<LoadedPolicy> loaded;
   if (!a.policy.empty()) loaded.emplace(GetPolicy(a.policy));
   RolloutConfig config = TrialEpisode(a.trial, loaded ? &*loaded : nullptr);
-  const EnvSpec spec = SpecOf(config.env);
-  if (!a.torque.empty()) config.schedule = ReadTorqueFile(a.torque, spec.step_seconds);
+  if (!a.torque.empty()) config.schedule = ReadTorqueFile(a.torque);
 
   // The requested number of steps, or one step for each row of the schedule.
-  const double scheduled = static_cast<double>(config.schedule.size()) * spec.step_seconds;
-  const double usual = config.schedule.empty() ? spec.evaluation.seconds : scheduled;
+  const double scheduled = static_cast<double>(config.schedule.size()) * kControlPeriod;
+  const double usual = config.schedule.empty() ? kEvaluationSeconds : scheduled;
   config.seconds = a.seconds < 0 ? usual : a.seconds;
   if (!config.schedule.empty() &&
-      RolloutSteps(spec, config.seconds) > static_cast<int64_t>(config.schedule.size())) {
+      RolloutSteps(config.seconds) > static_cast<int64_t>(config.schedule.size())) {
     throw BadInput(Concat("--seconds: expected at most ", FormatNumber(scheduled),
                           " s, the length of ", InputName(a.torque), ", got ",
                           FormatNumber(config.seconds)));
@@ -89,7 +89,7 @@ int RunSimulate(const SimulateArguments& a) {
   WriteOutput(a.csv, RolloutCsv(rollout));
   if (IsStandardStream(a.csv)) return 0;
   fmt::print("{}: {} rows\n", Printable(a.csv), rollout.rows.size());
-  if (HasPlant(spec.task)) fmt::print("  plant      {}\n", EpisodeText(rollout));
+  fmt::print("  plant      {}\n", EpisodeText(rollout));
   fmt::print("  torque     {}\n", TorqueText(rollout));
   if (loaded && a.trial.is_of_eval()) {
     fmt::print("  episode    {} of eval: {}\n", a.trial.episode,

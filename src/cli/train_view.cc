@@ -39,7 +39,6 @@ class TrainView : public TrainObserver {
     Say("  {}, {} parameters; {}, {}\n", config.learner().Text(),
         FormatCount(training_.policy()->num_parameters()),
         Counted(config.train.envs, "environment"), Counted(training_.threads(), "thread"));
-    if (!HasPlant(config.task)) Say("  task {}\n", config.task);
     if (config.physics != kMuJoCo.name) Say("  physics {}\n", config.physics);
     const std::optional<ModelInfo> model = InfoOfModel(config.mjcf, config.model);
     if (model) Say("  model {}\n", model->Text());
@@ -102,8 +101,7 @@ class TrainView : public TrainObserver {
     const std::string folder = ShellQuoted(run.string());
     Say("Next:\n");
     if (has_policy) {
-      if (HasPlant(training_.config().task)) Say("  {} demo {}\n", LaunchCommand(), folder);
-      Say("  {0} eval {1}\n  {0} info {1}\n", LaunchCommand(), folder);
+      Say("  {0} demo {1}\n  {0} eval {1}\n  {0} info {1}\n", LaunchCommand(), folder);
     }
     std::string how;
     if (finished && s.solved && config.stop_when_solved) how += " --no-stop-when-solved";

@@ -25,9 +25,8 @@ void BoundsConfig::Describe(Options& o) {
 }
 
 void CheckComparable(const LoadedPolicy& loaded, const BoundsConfig& config) {
-  if (!HasPlant(loaded.task) || !loaded.mjcf.empty()) {
-    throw BadInput(
-        Concat("bounds: expected policies of the built-in double pendulum, got ", loaded.name));
+  if (!loaded.mjcf.empty()) {
+    throw BadInput(Concat("bounds: expected policies of the built-in model, got ", loaded.name));
   }
   const Plant searched = TrialEnvironments(config.trial, nullptr).plants.front();
   const Plant judged = TrialEnvironments(config.trial, &loaded).plants.front();
@@ -38,9 +37,9 @@ void CheckComparable(const LoadedPolicy& loaded, const BoundsConfig& config) {
 }
 
 EpisodeBounds FindBounds(const BoundsConfig& config, ThreadPool& pool, const Progress& progress) {
-  const EnvConfig env = TrialEnvironments(config.trial, nullptr);
+  const PendulumEnvConfig env = TrialEnvironments(config.trial, nullptr);
   const Plant& plant = env.plants.front();
-  const EvaluationRule rule = SpecOf(env).evaluation;
+  const EvaluationRule rule = PendulumSpec(env).evaluation;
   const auto n = static_cast<size_t>(config.episodes);
 
   const std::vector<TorqueTable> tables{{}, TorqueLevels(plant.torque_limit, config.torques)};
@@ -58,13 +57,13 @@ EpisodeBounds FindBounds(const BoundsConfig& config, ThreadPool& pool, const Pro
     const auto i = static_cast<size_t>(index);
     std::vector<double>& start = bounds.starts[i];
     start.resize(4);
-    OneEpisode(env, index)->GetState(0, start);
+    OneEpisode(env, index).GetState(0, start);
     BestEpisodeSearch own = search;  // a copy per thread: it has buffers
     const auto found = own.From(StateVector(start.data()), tables);
     for (size_t k = 0; k < tables.size(); ++k) {
       const auto judged = [&](const BestEpisode& episode) {
-        return EvaluateEpisodes(EpisodePolicy(episode, own, tables[k]), *OneEpisode(env, index))
-            .front();
+        PendulumEnv one = OneEpisode(env, index);
+        return EvaluateEpisodes(EpisodePolicy(episode, own, tables[k]), one).front();
       };
       BestEpisodes& best = k == 0 ? bounds.any : bounds.table;
       best.of_return[i] = judged(found[k].of_return);

@@ -39,37 +39,37 @@ bool IsKnown(const EvaluationFigure& figure, bool upright, bool settled, bool va
 
 /// Adds conditions and figures of an episode to its row.
 void AddCells(const EvalReport& report, const JudgedEpisode& episode, CsvTable& csv) {
-  const EnvSpec& spec = report.spec;
   const EvaluationEpisode& e = episode.result;
   const auto add = [&](const std::string& name, double value, bool known = true) {
     csv.Add(name, known ? FormatNumber(value) : "");
   };
-  for (size_t i = 0; i < episode.start.size(); ++i) add(spec.state_names[i], episode.start[i]);
-  if (HasPlant(spec.task)) {
-    for (const auto& [name, value] : PlantValues(episode.plant)) add(name, value);
-    const double delta = ModesOf(episode.plant).delta;
-    add("delta", delta, std::isfinite(delta));
-    const Options disturbance = OptionsOf(episode.disturbance);
-    for (const Option& option : disturbance.all()) add(option.name, option.number());
-  }
+  add("q1", episode.start.q1);
+  add("q2", episode.start.q2);
+  add("w1", episode.start.w1);
+  add("w2", episode.start.w2);
+  for (const auto& [name, value] : PlantValues(episode.plant)) add(name, value);
+  const double delta = ModesOf(episode.plant).delta;
+  add("delta", delta, std::isfinite(delta));
+  const Options disturbance = OptionsOf(episode.disturbance);
+  for (const Option& option : disturbance.all()) add(option.name, option.number());
   add("success", e.success ? 1 : 0);
   for (size_t body = 0; body < e.tilt.size(); ++body) {
     add(Concat("tilt", body + 1, "_degrees"), e.tilt[body] * kDegrees);
   }
-  for (size_t k = 0; k < e.terms.size(); ++k) add(spec.term_names[k], e.terms[k] + 0.0);
-  const bool held = !spec.evaluation.by_return();  // the goal has to be held
-  const bool upright = held && e.swing_up_seconds, settled = held && e.settling_seconds;
+  for (size_t k = 0; k < e.terms.size(); ++k) add(kRewardTermNames[k], e.terms[k] + 0.0);
   for (const EvaluationFigure& figure : EvaluationFigures()) {
     add(figure.name, figure.Of(e).value_or(0),
-        IsKnown(figure, upright, settled, report.knows_values));
+        IsKnown(figure, e.swing_up_seconds.has_value(), e.settling_seconds.has_value(),
+                report.knows_values));
   }
 }
 
 using DesignFor = decltype(LoadedPolicy::design_for);
 
 /// Evaluates the episodes of `config`, each with a controller designed for its plant.
-void JudgeDesigned(const Policy& policy, const DesignFor& design_for, const EnvConfig& config,
-                   const Progress& progress, size_t first, EvalReport& report) {
+void JudgeDesigned(const Policy& policy, const DesignFor& design_for,
+                   const PendulumEnvConfig& config, const Progress& progress, size_t first,
+                   EvalReport& report) {
   std::mutex mutex;
   int done = 0;
   config.pool->ParallelFor(config.num_envs, [&](int i) {
@@ -80,9 +80,10 @@ void JudgeDesigned(const Policy& policy, const DesignFor& design_for, const EnvC
       episode.for_its_plant = true;
     } catch (const Error&) {  // no controller holds or swings up this plant
     }
-    EnvConfig one = config;
+    PendulumEnvConfig one = config;
     one.pool = nullptr;
-    episode.result = EvaluateEpisodes(made ? *made : policy, *OneEpisode(one, i)).front();
+    PendulumEnv env = OneEpisode(one, i);
+    episode.result = EvaluateEpisodes(made ? *made : policy, env).front();
     const std::lock_guard lock(mutex);
     progress(++done, config.num_envs);
   });
@@ -90,21 +91,15 @@ void JudgeDesigned(const Policy& policy, const DesignFor& design_for, const EnvC
 
 /// Evaluates the episodes of the environments of `config` and appends them to the report. With
 /// `design_for`, each episode has a controller designed for its plant.
-void JudgeEpisodes(const Policy& policy, const DesignFor* design_for, const EnvConfig& config,
-                   const Progress& progress, EvalReport& report) {
-  const std::unique_ptr<VectorEnv> env = MakeEnv(config);
+void JudgeEpisodes(const Policy& policy, const DesignFor* design_for,
+                   const PendulumEnvConfig& config, const Progress& progress, EvalReport& report) {
+  PendulumEnv env(config);
   const auto first = report.episodes.size();
-  const auto* pendulum = dynamic_cast<const PendulumEnv*>(env.get());
   for (int i = 0; i < config.num_envs; ++i) {
-    JudgedEpisode& episode = report.episodes.emplace_back();
-    episode.start.resize(report.spec.state_names.size());
-    env->GetState(i, episode.start);
-    if (pendulum == nullptr) continue;
-    episode.plant = pendulum->plant(i);
-    episode.disturbance = pendulum->disturbance(i);
+    report.episodes.push_back({env.state(i), env.plant(i), env.disturbance(i), false, {}});
   }
   if (design_for) return JudgeDesigned(policy, *design_for, config, progress, first, report);
-  std::vector<EvaluationEpisode> results = EvaluateEpisodes(policy, *env, config.pool, progress);
+  std::vector<EvaluationEpisode> results = EvaluateEpisodes(policy, env, config.pool, progress);
   for (size_t i = 0; i < results.size(); ++i) {
     report.episodes[first + i].result = std::move(results[i]);
   }
@@ -112,8 +107,8 @@ void JudgeEpisodes(const Policy& policy, const DesignFor* design_for, const EnvC
 
 }  // namespace
 
-void AddFigures(const Evaluation& e, const EnvSpec& spec, bool knows_values, ordered_json& j) {
-  const bool upright = !spec.evaluation.by_return() && e.successes > 0;
+void AddFigures(const Evaluation& e, bool knows_values, ordered_json& j) {
+  const bool upright = e.successes > 0;
   const bool settled = upright && e.settled > 0;
   j["episodes"] = e.episodes;
   j["successes"] = e.successes;
@@ -121,12 +116,12 @@ void AddFigures(const Evaluation& e, const EnvSpec& spec, bool knows_values, ord
   j["success_interval_95"] = {e.success_interval.low, e.success_interval.high};
   j["settled"] = upright ? e.settled : 0;
   j["steady_tilt_degrees"] = nullptr;
-  if (upright && e.tilt.size() == 2) {
+  if (upright) {
     j["steady_tilt_degrees"] = {{"link1", FigureJson(e.tilt[0], kDegrees)},
                                 {"link2", FigureJson(e.tilt[1], kDegrees)}};
   }
   for (size_t k = 0; k < e.term_means.size(); ++k) {
-    j["reward_terms"][spec.term_names[k]] = e.term_means[k];
+    j["reward_terms"][kRewardTermNames[k]] = e.term_means[k];
   }
   for (const EvaluationFigure& figure : EvaluationFigures()) {
     ordered_json& value = j[figure.name] = nullptr;
@@ -150,12 +145,11 @@ EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& tria
   report.env = TrialEnvironments(trial, &loaded);
   report.model = InfoOfModel(report.env.mjcf, trial.model);
   report.env.num_envs = static_cast<int>(episodes);
-  report.spec = SpecOf(report.env);
   report.knows_values = ValueUnitsOf(*loaded.policy).gamma > 0;
   report.only_balances = OnlyBalances(loaded.policy->kind());
   constexpr int64_t kAtOnce = 4096;
   for (int64_t done = 0; done < episodes; done += kAtOnce) {
-    EnvConfig config = report.env;
+    PendulumEnvConfig config = report.env;
     config.pool = &pool;
     config.first_index += static_cast<uint64_t>(done);
     config.num_envs = static_cast<int>(std::min(kAtOnce, episodes - done));
@@ -168,7 +162,7 @@ EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& tria
   }
   std::vector<EvaluationEpisode> results;
   for (const JudgedEpisode& episode : report.episodes) results.push_back(episode.result);
-  report.figures = Summarize(results, report.spec.evaluation);
+  report.figures = Summarize(results, PendulumSpec(report.env).evaluation);
   return report;
 }
 
@@ -180,13 +174,8 @@ std::string EvalJson(const EvalReport& report) {
   ordered_json j;
   j["policy"] = report.policy;
   j["seed"] = report.env.seed;
-  j["physics"] = nullptr;
-  if (HasPlant(report.spec.task)) j["physics"] = report.env.engine->name;
-  j["task"] = report.spec.task;
-  if (!HasPlant(report.spec.task)) {
-    AddFigures(report.figures, report.spec, report.knows_values, j);
-    return PrintableJson(j);
-  }
+  j["physics"] = report.env.engine->name;
+  j["task"] = kDoublePendulum;
   for (const auto& [name, value] : PlantValues(report.env.plant(0))) j["plant"][name] = value;
   j["model"] = report.model ? report.model->Json() : kBuiltIn;
   j["unknown_plant"] = report.env.assumed_plant.has_value();
@@ -197,7 +186,7 @@ std::string EvalJson(const EvalReport& report) {
     if (option.name == "posterior" && conditions.randomization.posterior.empty()) continue;
     j[option.section][option.name] = JsonOf(option);
   }
-  AddFigures(report.figures, report.spec, report.knows_values, j);
+  AddFigures(report.figures, report.knows_values, j);
   return PrintableJson(j);
 }
 

@@ -17,8 +17,7 @@ namespace upswing {
 
 /// One episode: its conditions and its result.
 struct JudgedEpisode {
-  std::vector<double> start;  // (S)
-  // Of the double pendulum:
+  PendulumState start;
   Plant plant;
   Disturbance disturbance;
   bool for_its_plant = false;  // had its own controller (TrialArguments::known_plant)
@@ -29,8 +28,7 @@ struct JudgedEpisode {
 struct EvalReport {
   std::string policy;              // path
   std::optional<ModelInfo> model;  // none: the built-in one
-  EnvConfig env;                   // common settings of all episodes
-  EnvSpec spec;
+  PendulumEnvConfig env;           // common settings of all episodes
   std::vector<JudgedEpisode> episodes;
   Evaluation figures;
   bool known_plant = false;    // a controller was designed for the plant of each episode
@@ -48,8 +46,7 @@ EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& tria
 int64_t NumDesigned(const EvalReport& report);
 
 /// Adds the figures of an evaluation to a JSON document.
-void AddFigures(const Evaluation& e, const EnvSpec& spec, bool knows_values,
-                nlohmann::ordered_json& j);
+void AddFigures(const Evaluation& e, bool knows_values, nlohmann::ordered_json& j);
 
 /// The report as a JSON document.
 std::string EvalJson(const EvalReport& report);

@@ -135,10 +135,7 @@ void MapArguments::Describe(Options& o) {
 }
 
 MapResult PlanMap(const MapArguments& a, const LoadedPolicy& loaded) {
-  if (!HasPlant(loaded.task)) {
-    throw BadInput(
-        Concat("map: expected a policy of ", kDoublePendulum, ", got one of ", loaded.task));
-  }
+  ExpectPendulum(loaded);
   MapResult map;
   const DesignConditions design = DesignOf(loaded);
   map.config = ConfigOf(a, loaded, design);

@@ -28,15 +28,15 @@ std::vector<Moment> MotionOf(const Rows& rows) {
   constexpr int kPieces = 4;
   std::vector<Moment> motion;
   for (size_t i = 0; i + 1 < rows.size(); ++i) {
-    const PendulumState a = StateOf(rows[i]);
-    const PendulumState b = StateOf(rows[i + 1]);
+    const PendulumState a = rows[i].state;
+    const PendulumState b = rows[i + 1].state;
     const double h = rows[i + 1].t - rows[i].t;
     for (int k = 0; k < kPieces; ++k) {
       const double share = static_cast<double>(k) / kPieces;
       motion.push_back({rows[i].t + share * h, StateBetween(a, b, h, share)});
     }
   }
-  motion.push_back({rows.back().t, StateOf(rows.back())});
+  motion.push_back({rows.back().t, rows.back().state});
   return motion;
 }
 
@@ -151,18 +151,16 @@ Panel Energies(const std::vector<Moment>& motion, const Plant& plant) {
                                 OverTime("target", motion, [&](const Moment&) { return target; })});
 }
 
-std::string TorqueLabel(const EnvSpec& spec) { return Concat("torque (", spec.action_unit, ")"); }
+constexpr const char* kTorqueLabel = "torque (N·m)";
 
-Panel Torques(const Rollout& rollout) {
-  return PanelOf(TorqueLabel(rollout.spec),
-                 {Held("", rollout.rows, [](const RolloutRow& row) { return row.torque; })});
+Panel Torques(const Rows& rows) {
+  return PanelOf(kTorqueLabel, {Held("", rows, [](const RolloutRow& row) { return row.torque; })});
 }
 
-Panel Rewards(const Rollout& rollout) {
-  const Rows& rows = rollout.rows;
+Panel Rewards(const Rows& rows) {
   std::vector<Line> lines;
-  for (size_t k = 0; k < rollout.spec.term_names.size(); ++k) {
-    std::string name = rollout.spec.term_names[k];
+  for (size_t k = 0; k < kRewardTermNames.size(); ++k) {
+    std::string name = kRewardTermNames[k];
     std::ranges::replace(name, '_', ' ');
     lines.push_back(Held(name, rows, [k](const RolloutRow& row) { return row.terms[k]; }));
   }
@@ -182,19 +180,17 @@ Panel Values(const Rows& rows) {
 }
 
 /// A panel of the chosen torque within the central 68% of the torques that the policy would draw.
-Panel Spread(const Rollout& rollout) {
-  const Rows& rows = rollout.rows;
+Panel Spread(const Rows& rows) {
   Line line =
       Held("chosen (band: central 68%)", rows, [](const RolloutRow& row) { return row.chosen; });
   line.low = Held("", rows, [](const RolloutRow& row) { return row.spread->low; }).y;
   line.high = Held("", rows, [](const RolloutRow& row) { return row.spread->high; }).y;
-  return PanelOf(TorqueLabel(rollout.spec), {line});
+  return PanelOf(kTorqueLabel, {line});
 }
 
 /// A panel of each action's Q-value minus the best action's. In long episodes a cell is the mean
 /// over some steps, because more cells would make a large file.
-Panel QValues(const Rollout& rollout, std::span<const double> torques) {
-  const Rows& rows = rollout.rows;
+Panel QValues(const Rows& rows, std::span<const double> torques) {
   constexpr size_t kMostColumns = 250;
   const size_t steps = std::max<size_t>(1, rows.size() - 1);  // the last row has no duration
   const size_t width = (steps + kMostColumns - 1) / kMostColumns;
@@ -220,25 +216,9 @@ Panel QValues(const Rollout& rollout, std::span<const double> torques) {
   const Line greedy = Held("greedy action", rows, [&](const RolloutRow& row) {
     return torques[static_cast<size_t>(std::ranges::max_element(row.q) - row.q.begin())];
   });
-  Panel panel = PanelOf(TorqueLabel(rollout.spec), {greedy});
+  Panel panel = PanelOf(kTorqueLabel, {greedy});
   panel.heat_map = std::move(map);
   return panel;
-}
-
-/// Panels of the motion over time. The double pendulum has its energy, too; other tasks have a
-/// panel for each state variable.
-std::vector<Panel> StatePanels(const Rollout& rollout) {
-  if (HasPlant(rollout.spec.task)) {
-    const std::vector<Moment> motion = MotionOf(rollout.rows);
-    return {Angles(motion), Velocities(motion), Energies(motion, rollout.plant)};
-  }
-  std::vector<Panel> panels;
-  for (size_t i = 0; i < rollout.spec.state_names.size(); ++i) {
-    panels.push_back(
-        PanelOf(Concat(rollout.spec.state_names[i], " (", rollout.spec.state_units[i], ")"),
-                {OverTime("", rollout.rows, [i](const RolloutRow& row) { return row.state[i]; })}));
-  }
-  return panels;
 }
 
 /// The axes of a phase portrait.
@@ -284,14 +264,14 @@ Figure EpisodeFigure(const Rollout& rollout, const Policy& policy) {
   const Rows& rows = rollout.rows;
   Figure figure;
   figure.width = 1000;
-  figure.panels = StatePanels(rollout);
-  figure.panels.push_back(Torques(rollout));
-  figure.panels.push_back(Rewards(rollout));
+  const std::vector<Moment> motion = MotionOf(rows);
+  figure.panels = {Angles(motion), Velocities(motion), Energies(motion, rollout.plant),
+                   Torques(rows), Rewards(rows)};
   constexpr int kPanelHeight = 170;
-  if (rows.front().spread) figure.panels.push_back(Spread(rollout));
+  if (rows.front().spread) figure.panels.push_back(Spread(rows));
   if (!rows.front().q.empty()) figure.panels.push_back(Values(rows));
   if (!policy.value_actions().empty()) {
-    figure.panels.push_back(QValues(rollout, policy.value_actions().values()));
+    figure.panels.push_back(QValues(rows, policy.value_actions().values()));
   }
   figure.height = kPanelHeight * static_cast<int>(figure.panels.size());
   for (Panel& panel : figure.panels) panel.x_range = {0, rows.back().t};

@@ -13,8 +13,8 @@
 namespace upswing {
 namespace {
 
-/// Control steps per second, a whole number in all tasks.
-double StepsPerSecond(const EnvSpec& spec) { return std::round(1 / spec.step_seconds); }
+constexpr double kStepsPerSecond = 50;
+static_assert(kStepsPerSecond * kControlPeriod == 1);
 
 /// The policy's values (Q) in units of reward.
 std::vector<double> ValuesOf(const Policy& policy, Matrix<const float> obs,
@@ -37,45 +37,37 @@ void AddEstimates(const Policy& policy, Matrix<const float> obs, Policy::Memory&
   policy.Spread(obs, {&row.spread->low, 1, 1}, {&row.spread->high, 1, 1}, memory);
 }
 
-/// Sets the double pendulum's reward for the state and torque of a row.
+/// Sets the reward for the state and torque of a row.
 void RewardRow(const Plant& plant, RolloutRow& row) {
-  const auto terms = RewardTerms(plant, StateOf(row), row.torque);
-  row.terms.assign(terms.begin(), terms.end());
+  row.terms = RewardTerms(plant, row.state, row.torque);
   row.reward = 0;
   for (const double term : row.terms) row.reward += term;
-  row.at_goal = Inverted(StateOf(row));
+  row.inverted = Inverted(row.state);
 }
 
 }  // namespace
 
-int64_t RolloutSteps(const EnvSpec& spec, double seconds) {
-  return std::llround(seconds * StepsPerSecond(spec));
-}
-
-PendulumState StateOf(const RolloutRow& row) {
-  return {row.state[0], row.state[1], row.state[2], row.state[3]};
-}
+int64_t RolloutSteps(double seconds) { return std::llround(seconds * kStepsPerSecond); }
 
 Episode::Episode(RolloutConfig config)
     : config_(std::move(config)),
       env_([&] {
-        EnvConfig env = config_.env;
+        PendulumEnvConfig env = config_.env;
         env.episode_seconds = config_.seconds + 1;
-        return MakeEnv(env);
+        return std::make_unique<PendulumEnv>(env);
       }()),
       result_(env_->spec()),
-      rollout_{env_->spec(), {}, Plant(), Disturbance()} {
+      rollout_{{}, Plant(), Disturbance()} {
   if (config_.start) env_->SetState(0, *config_.start);
   if (config_.policy != nullptr) memory_ = config_.policy->Start(1);
-  if (pendulum() == nullptr) return;
-  rollout_.plant = pendulum()->plant(0);
-  rollout_.disturbance = pendulum()->disturbance(0);
+  rollout_.plant = env_->plant(0);
+  rollout_.disturbance = env_->disturbance(0);
 }
 
 void Episode::Step(bool motor, const std::array<double, 2>& push) {
   const std::array<double, 2> before =
       inputs_.empty() ? std::array<double, 2>{} : inputs_.back().push;
-  if (push != before) pendulum()->Push(0, push);
+  if (push != before) env_->Push(0, push);
   inputs_.push_back({motor, push});
   const size_t step = rollout_.rows.size();
   double torque = 0;
@@ -83,19 +75,15 @@ void Episode::Step(bool motor, const std::array<double, 2>& push) {
   if (step < config_.schedule.size()) torque = config_.schedule[step];
   if (!motor) torque = 0;
   RolloutRow row;
-  row.t = static_cast<double>(step) / StepsPerSecond(rollout_.spec);
-  row.state.resize(rollout_.spec.state_names.size());
-  env_->GetState(0, row.state);
+  row.t = static_cast<double>(step) / kStepsPerSecond;
+  row.state = env_->state(0);
   row.chosen = torque;
   if (config_.estimates) AddEstimates(*config_.policy, env_->obs(), *memory_, row);
-  env_->Step({&torque, 1, 1}, result_);
+  env_->Step({&torque, 1}, result_);
   row.torque = result_.torque[0];
-  row.at_goal = result_.at_goal[0] != 0;
-  row.reward = result_.reward[0];
-  row.terms = result_.reward_terms;
-  if (pendulum() != nullptr) RewardRow(rollout_.plant, row);
+  RewardRow(rollout_.plant, row);
   rollout_.rows.push_back(std::move(row));
-  if (pendulum() == nullptr || result_.terminated[0] == 0) return;
+  if (result_.terminated[0] == 0) return;
   throw Failure(
       Concat("the simulation diverged after t = ", FormatNumber(rollout_.rows.back().t), " s"));
 }
@@ -108,7 +96,7 @@ void Episode::GoBack(int64_t steps) {
 }
 
 PendulumState Episode::StateOfRow(int64_t k) const {
-  return k < steps() ? StateOf(rollout_.rows[static_cast<size_t>(k)]) : pendulum()->state(0);
+  return k < steps() ? rollout_.rows[static_cast<size_t>(k)].state : env_->state(0);
 }
 
 PendulumState Episode::StateAt(double steps) const {
@@ -127,53 +115,44 @@ Rollout RunRollout(const RolloutConfig& config) {
   Episode episode(config);
   // Step once more than the rollout has steps: the extra step computes the motor's torque in the
   // last state.
-  const int64_t steps = RolloutSteps(episode.rollout().spec, config.seconds);
+  const int64_t steps = RolloutSteps(config.seconds);
   while (episode.steps() <= steps && !episode.done()) episode.Step();
   return episode.rollout();
 }
 
 std::string TorqueText(const Rollout& rollout) {
-  const bool pendulum = HasPlant(rollout.spec.task);
   const std::vector<RolloutRow>& rows = rollout.rows;
-  // Leave out the double pendulum's last state, because no step follows it.
-  const size_t steps = rows.size() - (pendulum && rows.size() > 1 ? 1 : 0);
-  TorqueTally tally(1, rollout.spec.step_seconds);
+  // Leave out the last state, because no step follows it.
+  const size_t steps = std::max<size_t>(1, rows.size() - 1);
+  TorqueTally tally(1, kControlPeriod);
   for (size_t k = 0; k < steps; ++k) {
-    const size_t after = std::min(pendulum ? k + 1 : k, rows.size() - 1);
-    tally.Add({&rows[k].torque, 1}, rows[after].at_goal);
+    const size_t after = std::min(k + 1, rows.size() - 1);
+    tally.Add({&rows[k].torque, 1}, rows[after].inverted);
   }
-  const bool upright = !rollout.spec.evaluation.by_return() && tally.has_goal_steps();
   EvaluationEpisode e;
-  tally.Finish(upright, e);
-  const std::string& unit = rollout.spec.action_unit;
-  const std::string text =
-      fmt::format("peak {:.4g} {}, rms {:.4g} {}, variation {:.4g} {}/s", e.peak_torque, unit,
-                  e.rms_torque, unit, e.torque_variation, unit);
-  if (!upright) return text;
-  return text + fmt::format(", once upright {:.4g} {}/s", e.goal_variation, unit);
+  tally.Finish(tally.has_goal_steps(), e);
+  const std::string text = fmt::format("peak {:.4g} N·m, rms {:.4g} N·m, variation {:.4g} N·m/s",
+                                       e.peak_torque, e.rms_torque, e.torque_variation);
+  if (!tally.has_goal_steps()) return text;
+  return text + fmt::format(", once upright {:.4g} N·m/s", e.goal_variation);
 }
 
 std::string RolloutCsv(const Rollout& rollout) {
-  const bool pendulum = HasPlant(rollout.spec.task);
-  std::string csv;
-  if (pendulum) {
-    csv =
-        "t,qpos0,qpos1,qvel0,qvel1,torque,energy,height,inverted,reward,energy_reward,"
-        "height_reward,balance_reward,velocity_penalty,torque_penalty\n";
-  } else {
-    csv = Concat("t,", Join(rollout.spec.state_names, ","), ",torque,reward,",
-                 Join(rollout.spec.term_names, ","), '\n');
-  }
+  std::string csv =
+      "t,qpos0,qpos1,qvel0,qvel1,torque,energy,height,inverted,reward,energy_reward,"
+      "height_reward,balance_reward,velocity_penalty,torque_penalty\n";
   for (const RolloutRow& row : rollout.rows) {
-    std::vector<double> cells{row.t};
-    cells.insert(cells.end(), row.state.begin(), row.state.end());
-    cells.push_back(row.torque);
-    if (pendulum) {
-      const PendulumState s = StateOf(row);
-      const double inverted = row.at_goal ? 1 : 0;
-      cells.insert(cells.end(), {Energy(rollout.plant, s), TipHeight(rollout.plant, s), inverted});
-    }
-    cells.push_back(row.reward);
+    const PendulumState& s = row.state;
+    std::vector<double> cells{row.t,
+                              s.q1,
+                              s.q2,
+                              s.w1,
+                              s.w2,
+                              row.torque,
+                              Energy(rollout.plant, s),
+                              TipHeight(rollout.plant, s),
+                              row.inverted ? 1.0 : 0.0,
+                              row.reward};
     for (const double term : row.terms) cells.push_back(term + 0.0);  // turns -0 into 0
     std::vector<std::string> texts;
     texts.reserve(cells.size());
@@ -183,21 +162,18 @@ std::string RolloutCsv(const Rollout& rollout) {
   return csv;
 }
 
-std::string JudgementText(const Policy& policy, const EnvConfig& config) {
-  const std::unique_ptr<VectorEnv> env = MakeEnv(config);
-  const EvaluationEpisode episode = EvaluateEpisodes(policy, *env).front();
-  std::string upright;
-  if (!env->spec().evaluation.by_return()) {
-    upright = episode.swing_up_seconds
-                  ? fmt::format("upright from {:.2f} s to the end, ", *episode.swing_up_seconds)
-                  : "not upright at the end, ";
-  }
-  return fmt::format("{}, {}return {:.6g}", episode.success ? "success" : "failure", upright,
+std::string JudgementText(const Policy& policy, const PendulumEnvConfig& config) {
+  PendulumEnv env(config);
+  const EvaluationEpisode episode = EvaluateEpisodes(policy, env).front();
+  const std::string upright =
+      episode.swing_up_seconds
+          ? fmt::format("upright from {:.2f} s to the end", *episode.swing_up_seconds)
+          : "not upright at the end";
+  return fmt::format("{}, {}, return {:.6g}", episode.success ? "success" : "failure", upright,
                      episode.reward_sum);
 }
 
 std::string EpisodeText(const Rollout& rollout) {
-  if (!HasPlant(rollout.spec.task)) return "";
   std::string text = PlantText(rollout.plant);
   const Options options = OptionsOf(rollout.disturbance);
   for (const Option& option : options.all()) {

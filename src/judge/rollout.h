@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "agents/task.h"
 #include "base/policy.h"
 #include "base/sample.h"
+#include "pendulum/pendulum_env.h"
 #include "rl/evaluate.h"
 
 /// Rollouts: one episode, step by step, that `simulate` writes and `plot` draws.
@@ -17,14 +17,13 @@ namespace upswing {
 
 /// One moment and the torque that acts from this moment on.
 struct RolloutRow {
-  double t = 0;               // s
-  std::vector<double> state;  // (S)
-  double torque = 0;          // applied by the motor, delayed and limited; N·m or the task's unit
-  // Double pendulum: for the state and torque of this row. Other tasks: for the step that begins
-  // here.
-  bool at_goal = false;
-  double reward = 0;          // sum of the terms
-  std::vector<double> terms;  // (K)
+  double t = 0;  // s
+  PendulumState state;
+  double torque = 0;  // applied by the motor, delayed and limited; N·m
+  // For the state and torque of this row:
+  bool inverted = false;
+  double reward = 0;  // sum of the terms
+  std::array<double, kRewardTerms> terms{};
   // Only if requested, and if the policy estimates them:
   std::vector<double> q;           // (Q) values of the actions, or only V, in units of reward
   std::optional<Interval> spread;  // central 68% of the torques that the policy would draw
@@ -32,21 +31,18 @@ struct RolloutRow {
 };
 
 struct RolloutConfig {
-  const Policy* policy = nullptr;            // chooses the torques; none: the schedule
-  std::vector<double> schedule;              // one torque per step; 0 after its end
-  EnvConfig env;                             // a single environment
-  std::optional<std::vector<double>> start;  // (S); none: that of the environment's own episode
-  double seconds = 20;                       // (S); none: the environment's own start
+  const Policy* policy = nullptr;      // chooses the torques; none: the schedule
+  std::vector<double> schedule;        // one torque per step; 0 after its end
+  PendulumEnvConfig env;               // a single environment
+  std::optional<PendulumState> start;  // none: that of the environment's own episode
+  double seconds = kEvaluationSeconds;
   bool estimates = false;  // whether rows have the policy's estimates q and spread
   std::string title;       // for figures
 };
 
 struct Rollout {
-  EnvSpec spec;
-  // One row per control step. The double pendulum has one more row, for its last state; other tasks
-  // end with the last step.
-  std::vector<RolloutRow> rows;
-  // Only for the double pendulum, of this episode:
+  std::vector<RolloutRow> rows;  // one per control step, and one for the last state
+  // Of this episode:
   Plant plant;
   Disturbance disturbance;
 };
@@ -54,12 +50,12 @@ struct Rollout {
 /// An episode that advances step by step, for RunRollout and `view`.
 class Episode {
  public:
-  /// The policy must outlive the episode. Throws BadInput as MakeEnv does.
+  /// The policy must outlive the episode. Throws BadInput as PendulumEnv does.
   explicit Episode(RolloutConfig config);
 
   /// Adds a row with the present state, then steps the environment. Without `motor` the torque is 0
-  /// instead of the policy's or schedule's. `push` (N·m) adds a torque to each joint of a double
-  /// pendulum. Throws Failure if the state blows up, or if the physics does not support pushes.
+  /// instead of the policy's or schedule's. `push` (N·m) adds a torque to each joint. Throws
+  /// Failure if the state blows up, or if the physics does not support pushes.
   void Step(bool motor = true, const std::array<double, 2>& push = {});
   /// Goes back to the state after the first `steps` steps.
   void GoBack(int64_t steps);
@@ -70,10 +66,7 @@ class Episode {
   int64_t steps() const { return static_cast<int64_t>(rollout_.rows.size()); }
   /// Whether the last step ended the episode; the environment is then in a new episode.
   bool done() const { return result_.done(0); }
-  /// The environment as a double pendulum; null for other tasks.
-  PendulumEnv* pendulum() const { return dynamic_cast<PendulumEnv*>(env_.get()); }
-
-  /// The double pendulum's state after `steps` steps, at most steps(), fractions included. Between
+  /// The state after `steps` steps, at most steps(), fractions included. Between
   /// two steps it follows the cubic that matches their angles and velocities.
   PendulumState StateAt(double steps) const;
   /// The motor's torque after `steps` steps, N·m.
@@ -88,7 +81,7 @@ class Episode {
   PendulumState StateOfRow(int64_t k) const;
 
   RolloutConfig config_;
-  std::unique_ptr<VectorEnv> env_;
+  std::unique_ptr<PendulumEnv> env_;
   StepResult result_;
   std::unique_ptr<Policy::Memory> memory_;
   Rollout rollout_;
@@ -96,7 +89,7 @@ class Episode {
 };
 
 /// Number of control steps in `seconds`, rounded to the nearest.
-int64_t RolloutSteps(const EnvSpec& spec, double seconds);
+int64_t RolloutSteps(double seconds);
 
 /// Runs an episode to its end. Throws Failure if the state blows up.
 Rollout RunRollout(const RolloutConfig& config);
@@ -105,19 +98,16 @@ Rollout RunRollout(const RolloutConfig& config);
 /// `peak 5 N·m, rms 1.2 N·m, variation 34 N·m/s, once upright 2 N·m/s`.
 std::string TorqueText(const Rollout& rollout);
 
-/// A rollout as CSV, one row for each state: t, state, torque, reward and its terms. The double
-/// pendulum also has energy, height and whether it is inverted, before the reward.
+/// A rollout as CSV, one row for each state: t, state, torque, energy, height, whether it is
+/// inverted, reward and its terms.
 std::string RolloutCsv(const Rollout& rollout);
-
-/// The double pendulum's state in a row.
-PendulumState StateOf(const RolloutRow& row);
 
 /// The judgement of `eval` on the environment's own episode, such as `success, upright from 2.34 s
 /// to the end, return 2345`.
-std::string JudgementText(const Policy& policy, const EnvConfig& config);
+std::string JudgementText(const Policy& policy, const PendulumEnvConfig& config);
 
 /// The conditions that distinguish an episode from others with the same flags: its plant, `mass1
-/// 0.93, …`, and the disturbance settings that are not 0. Empty for other tasks.
+/// 0.93, …`, and the disturbance settings that are not 0.
 std::string EpisodeText(const Rollout& rollout);
 
 }  // namespace upswing

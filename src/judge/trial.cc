@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "agents/task.h"
 #include "base/error.h"
 #include "base/text.h"
 #include "mujoco/engines.h"
@@ -19,25 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The environments of a policy for a task without plant, sensors and engines. Throws BadInput if
-/// the arguments set one of these.
-EnvConfig OtherTask(const TrialArguments& a, const LoadedPolicy& loaded) {
-  const auto refuse = [&](const std::string& flag) {
-    throw BadInput(
-        Concat(flag, ": expected none, because the task ", loaded.task, " has no such setting"));
-  };
-  if (!a.set.empty()) refuse("--set");
-  if (!a.model.empty()) refuse("--model");
-  if (!a.plant.empty()) refuse("--plant");
-  if (a.unknown_plant) refuse("--unknown-plant");
-  if (!a.flags.empty()) refuse(FlagOf(a.flags.front().name));
-  EnvConfig env;
-  env.task = loaded.task;
-  env.seed = static_cast<uint64_t>(a.seed);
-  env.stream = "evaluation";
-  return env;
-}
-
 /// The folder for figures if the user names none.
 fs::path DefaultOut(const LoadedPolicy& loaded, const std::string& name) {
   const bool has_file = !loaded.path.empty();
@@ -47,21 +27,18 @@ fs::path DefaultOut(const LoadedPolicy& loaded, const std::string& name) {
   return FreePath(of_run ? run / name : fs::path("runs") / Concat(name, "-", stem));
 }
 
-/// Parses the value of --start: a number for each state variable, such as q1,q2,w1,w2 (rad, rad/s).
-/// Throws BadInput.
-std::vector<double> ParseStart(const std::string& text, const EnvSpec& spec) {
+/// Parses the value of --start, q1,q2,w1,w2 (rad, rad/s). Throws BadInput.
+PendulumState ParseStart(const std::string& text) {
   const std::vector<std::string_view> pieces = Split(text, ',');
-  const size_t S = spec.state_names.size();
   std::vector<double> numbers;
   for (const std::string_view piece : pieces) {
     const auto number = ParseNumber(piece);
     if (number && std::isfinite(*number)) numbers.push_back(*number);
   }
-  if (pieces.size() != S || numbers.size() != S) {
-    throw BadInput(Concat("--start: expected ", S, " numbers ", Join(spec.state_names, ","),
-                          ", got \"", text, "\""));
+  if (pieces.size() != 4 || numbers.size() != 4) {
+    throw BadInput(Concat("--start: expected 4 numbers q1,q2,w1,w2, got \"", text, "\""));
   }
-  return numbers;
+  return {numbers[0], numbers[1], numbers[2], numbers[3]};
 }
 
 }  // namespace
@@ -72,9 +49,9 @@ TrialConditions ConditionsOf(const std::vector<FlagValue>& flags) {
   return conditions;
 }
 
-EnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded) {
-  EnvConfig env;
-  if (loaded != nullptr && !HasPlant(loaded->task)) return OtherTask(a, *loaded);
+PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded) {
+  if (loaded != nullptr) ExpectPendulum(*loaded);
+  PendulumEnvConfig env;
   env.engine = &FindEngine(a.physics, "--physics");
   Plant plant = loaded != nullptr ? loaded->plant : Plant();
   std::vector<FlagValue> flags;
@@ -106,14 +83,13 @@ EnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded)
   return env;
 }
 
-std::unique_ptr<VectorEnv> OneEpisode(EnvConfig config, int index) {
+PendulumEnv OneEpisode(PendulumEnvConfig config, int index) {
   config.num_envs = 1;
   config.first_index += static_cast<uint64_t>(index);
-  return MakeEnv(config);
+  return PendulumEnv(config);
 }
 
-std::string ChangesText(const EnvConfig& env) {
-  if (!HasPlant(env.task)) return "";
+std::string ChangesText(const PendulumEnvConfig& env) {
   const TrialConditions now{env.disturbance(0), env.randomization}, usual;
   std::vector<std::string> texts;
   for (const auto& [option, before] : Differences(OptionsOf(now), OptionsOf(usual))) {
@@ -154,9 +130,10 @@ RolloutConfig TrialEpisode(const TrialArguments& a, const LoadedPolicy* loaded) 
   if (loaded != nullptr) config.policy = loaded->policy.get();
   config.env = TrialEnvironments(a, loaded);
   config.env.first_index = static_cast<uint64_t>(std::max<int64_t>(0, a.episode));
-  const char* usual = TaskNamed(config.env.task).usual_start;
-  if (a.start || (!a.is_of_eval() && usual != nullptr)) {
-    config.start = ParseStart(a.start ? *a.start : usual, SpecOf(config.env));
+  if (a.start) {
+    config.start = ParseStart(*a.start);
+  } else if (!a.is_of_eval()) {
+    config.start = PendulumState();
   }
   return config;
 }

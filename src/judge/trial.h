@@ -49,14 +49,14 @@ TrialConditions ConditionsOf(const std::vector<FlagValue>& flags);
 
 /// The environments of a trial: the environments of the policy's training with the changes of the
 /// arguments; without a policy (null), environments of the built-in plant. Environment i has
-/// episode i. Throws BadInput.
-EnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded);
+/// episode i. Throws BadInput, also if the policy is not for the double pendulum.
+PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded);
 
 /// An environment whose only episode is episode `index` of `config`.
-std::unique_ptr<VectorEnv> OneEpisode(EnvConfig config, int index);
+PendulumEnv OneEpisode(PendulumEnvConfig config, int index);
 
 /// Conditions that differ from the defaults, such as `delay 0.02, …`; empty if there are none.
-std::string ChangesText(const EnvConfig& env);
+std::string ChangesText(const PendulumEnvConfig& env);
 
 /// Differences of a plant from the policy's own plant, such as `mass2 1.3 kg (training: 1), …`;
 /// empty if there are none.

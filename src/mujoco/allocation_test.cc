@@ -5,9 +5,7 @@
 #include <cstdlib>
 
 #include "mujoco/engines.h"
-#include "pendulum/acrobot_v1.h"
 #include "pendulum/pendulum_env.h"
-#include "pendulum/pendulum_v1.h"
 
 // Sanitizers replace malloc themselves, and other C libraries do not export the original malloc.
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
@@ -52,17 +50,6 @@ void* aligned_alloc(size_t alignment, size_t size) noexcept {
 namespace upswing {
 namespace {
 
-/// Number of allocations in `steps` control steps.
-int64_t Allocations(VectorEnv& env, int steps) {
-  StepResult result = env.MakeResult();
-  const std::vector<double> torque(40, 1.0);
-  const Matrix<const double> action(torque.data(), env.num_envs(), 1);
-  env.Step(action, result);
-  const int64_t before = g_allocations;
-  for (int step = 0; step < steps; ++step) env.Step(action, result);
-  return g_allocations - before;
-}
-
 /// Number of allocations of 40 double pendulums in `steps` control steps, resets included.
 int64_t Allocations(const Engine* engine, int steps) {
   PendulumEnvConfig config;
@@ -71,7 +58,12 @@ int64_t Allocations(const Engine* engine, int steps) {
   config.episode_seconds = 0.5;
   config.start.random_share = 0.5;
   PendulumEnv env(config);
-  return Allocations(env, steps);
+  StepResult result = env.MakeResult();
+  const std::vector<double> torque(40, 1.0);
+  env.Step(torque, result);
+  const int64_t before = g_allocations;
+  for (int step = 0; step < steps; ++step) env.Step(torque, result);
+  return g_allocations - before;
 }
 
 TEST(Allocation, IsCounted) {
@@ -85,15 +77,6 @@ TEST(Allocation, AStepInMuJoCoAllocatesNothing) { EXPECT_EQ(Allocations(&kMuJoCo
 
 TEST(Allocation, AStepInClosedFormAllocatesNothing) {
   EXPECT_EQ(Allocations(&kClosedForm, 100), 0);
-}
-
-TEST(Allocation, AStepOfATaskOfGymnasiumAllocatesNothing) {
-  GymTaskConfig config;
-  config.num_envs = 40;
-  PendulumV1 pendulum(config);
-  AcrobotV1 acrobot(config);
-  EXPECT_EQ(Allocations(pendulum, 300), 0);  // past a reset
-  EXPECT_EQ(Allocations(acrobot, 600), 0);
 }
 
 }  // namespace

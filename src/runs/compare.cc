@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <set>
 
-#include "agents/task.h"
 #include "agents/training.h"
 #include "base/csv.h"
 #include "base/error.h"
@@ -80,7 +79,7 @@ std::string PoliciesCsv(const std::vector<JudgedPolicy>& policies) {
   CsvTable csv;
   for (const JudgedPolicy& policy : policies) {
     const Evaluation& e = policy.figures;
-    const auto if_upright = [&](double x) { return policy.upright() ? FormatNumber(x) : ""; };
+    const auto if_upright = [&](double x) { return e.successes > 0 ? FormatNumber(x) : ""; };
     csv.Add("policy", policy.name);
     csv.Add("task", policy.task + 1);
     csv.Add("runs", policy.runs);
@@ -99,9 +98,10 @@ std::string PoliciesCsv(const std::vector<JudgedPolicy>& policies) {
   return csv.text();
 }
 
-/// The episodes of the final evaluations of runs that are evaluated on one task.
-std::vector<EnvConfig> FinalEvaluations(const Comparison& comparison, int task) {
-  std::vector<EnvConfig> evaluations;
+/// The episodes of the final evaluations of runs that are evaluated on one task, the double
+/// pendulum.
+std::vector<PendulumEnvConfig> FinalEvaluations(const Comparison& comparison, int task) {
+  std::vector<PendulumEnvConfig> evaluations;
   std::set<std::pair<int64_t, int64_t>> seen;  // seed and step
   int64_t episodes = 0;
   for (const RunGroup& group : comparison.groups) {
@@ -112,7 +112,7 @@ std::vector<EnvConfig> FinalEvaluations(const Comparison& comparison, int task) 
       if (!seen.emplace(config.train.seed, step).second) continue;
       episodes += config.train.eval_episodes;
       if (!evaluations.empty() && episodes > kMostJudged) return evaluations;
-      EnvConfig& env = evaluations.emplace_back(EvaluationEnvironments(config, step));
+      PendulumEnvConfig& env = evaluations.emplace_back(EvaluationEnvironments(config, step));
       // Screened runs: the evaluations in MuJoCo count.
       const bool screened = config.eval_physics == kScreened;
       env.engine = screened ? &kMuJoCo : &FindEngine(config.eval_physics, "--eval-physics");
@@ -124,7 +124,7 @@ std::vector<EnvConfig> FinalEvaluations(const Comparison& comparison, int task) 
 /// The policy, or the controller designed for the plant of the episodes. Throws BadInput if no such
 /// controller exists.
 std::shared_ptr<const Policy> PolicyFor(const LoadedPolicy& loaded, bool redesign,
-                                        const EnvConfig& env) {
+                                        const PendulumEnvConfig& env) {
   const bool same = PlantValues(loaded.plant) == PlantValues(env.plant(0));
   if (!loaded.design_for || !redesign || same) return loaded.policy;
   try {
@@ -148,7 +148,7 @@ void ExpectJoint(const LoadedPolicy& loaded, bool redesign, const Plant& plant) 
 struct Job {
   const LoadedPolicy& loaded;
   std::shared_ptr<const Policy> policy;
-  std::vector<EnvConfig> evaluations;
+  std::vector<PendulumEnvConfig> evaluations;
   JudgedPolicy judged;  // figures still empty
   int64_t episodes = 0;
 };
@@ -157,50 +157,43 @@ struct Job {
 Evaluation Judge(const Job& job, ThreadPool& pool, const Progress& progress) {
   const LoadedPolicy& loaded = job.loaded;
   std::vector<EvaluationEpisode> episodes;
-  for (EnvConfig env : job.evaluations) {
+  for (PendulumEnvConfig env : job.evaluations) {
     env.pool = &pool;
     env.memory = loaded.memory();
     env.identified_from.reset();
     if (loaded.identifies()) env.identified_from = loaded.plant;
     const auto done = static_cast<double>(episodes.size());
-    const auto more = EvaluateEpisodes(*job.policy, *MakeEnv(env), &pool, [&](double part, double) {
+    PendulumEnv pendulums(env);
+    const auto more = EvaluateEpisodes(*job.policy, pendulums, &pool, [&](double part, double) {
       progress(done + part, static_cast<double>(job.episodes));
     });
     episodes.insert(episodes.end(), more.begin(), more.end());
   }
-  return Summarize(episodes, job.judged.spec.evaluation);
+  return Summarize(episodes, PendulumSpec(job.evaluations.front()).evaluation);
 }
 
-/// The policies to evaluate on each task; adds a note for the others.
+/// The policies to evaluate on each task. Throws BadInput if a task is an environment that only
+/// Python steps.
 std::vector<Job> JobsOf(const std::vector<LoadedPolicy>& policies, bool redesign,
-                        Comparison& comparison) {
+                        const Comparison& comparison) {
+  for (const RunGroup& group : comparison.groups) {
+    if (policies.empty() || !group.runs.front().config.is_foreign()) continue;
+    throw BadInput(Concat(policies.front().name, ": expected no policies with ", group.label,
+                          ", runs of ", group.runs.front().config.Spec().task));
+  }
   const std::vector<std::string> titles = TitlesOf(policies);
   const int tasks = static_cast<int>(comparison.task_texts.size());
   std::vector<Job> jobs;
   for (size_t index = 0; index < policies.size(); ++index) {
     const LoadedPolicy& loaded = policies[index];
-    std::vector<std::string> others;  // tasks that the policy does not fit
     for (int task = 0; task < tasks; ++task) {
       Job job{loaded, nullptr, FinalEvaluations(comparison, task), {}};
-      const EnvConfig& first = job.evaluations.front();
-      if (first.task != loaded.task) {
-        others.push_back(first.task);
-        continue;
-      }
+      const PendulumEnvConfig& first = job.evaluations.front();
       ExpectJoint(loaded, redesign, first.plant(0));
       job.policy = PolicyFor(loaded, redesign, first);
-      job.judged = {loaded.name, titles[index], task, std::ssize(job.evaluations), SpecOf(first),
-                    {}};
-      for (const EnvConfig& env : job.evaluations) job.episodes += env.num_envs;
+      job.judged = {loaded.name, titles[index], task, std::ssize(job.evaluations), {}};
+      for (const PendulumEnvConfig& env : job.evaluations) job.episodes += env.num_envs;
       jobs.push_back(std::move(job));
-    }
-    if (std::ssize(others) == tasks) {
-      throw BadInput(Concat(loaded.name, ": expected a policy of ", others.front(),
-                            ", the task of the runs, got one of ", loaded.task));
-    }
-    if (!others.empty()) {
-      comparison.notes.push_back(Concat(loaded.name, ": not evaluated on ", others.front(),
-                                        ", because it is a policy of ", loaded.task));
     }
   }
   return jobs;

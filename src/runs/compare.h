@@ -27,11 +27,7 @@ struct JudgedPolicy {
   std::string name, title;  // name as on the command line; short title for figures
   int task = 0;             // as RunGroup::task
   int64_t runs = 0;         // number of runs whose final evaluations give the episodes
-  EnvSpec spec;
   Evaluation figures;
-
-  /// Whether the policy has figures about being upright.
-  bool upright() const { return !spec.evaluation.by_return() && figures.successes > 0; }
 };
 
 /// A group of runs compared with a policy on the same task.
@@ -65,8 +61,8 @@ Comparison Compare(const CompareRequest& request);
 
 /// Evaluates policies on each task of the groups, over the episodes of the runs' final evaluations,
 /// and adds them to the comparison. With `redesign`, controllers are designed for the plant of
-/// these episodes. Adds a note for each task on which a policy is not evaluated. `progress` counts
-/// episodes. Throws BadInput, before any episode, if a policy fits none of the tasks.
+/// these episodes. `progress` counts episodes. Throws BadInput, before any episode, if a policy has
+/// its motor at another joint than the runs, or if runs are not of the double pendulum.
 void AddPolicies(const std::vector<LoadedPolicy>& policies, bool redesign, ThreadPool& pool,
                  const Progress& progress, Comparison& comparison);
 

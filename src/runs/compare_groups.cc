@@ -53,7 +53,7 @@ std::string LabelOf(const RunRecord& run) {
 /// in which engine it evaluates, do not belong to it.
 bool IsTask(const std::string& name) {
   constexpr std::array<std::string_view, 3> kBeginnings{"plant.", "disturbance.", "randomize."};
-  return name == kModelContent || name == "train.eval_episodes" || name == "task.task" ||
+  return name == kModelContent || name == "train.eval_episodes" || name == "task.environment" ||
          std::ranges::any_of(
              kBeginnings, [&](std::string_view beginning) { return name.starts_with(beginning); });
 }

@@ -29,6 +29,7 @@ LoadedPolicy SwingUpNamed(const std::string& name) {
   LoadedPolicy loaded;
   try {
     loaded = LoadPolicy(name);
+    ExpectPendulum(loaded);
   } catch (const Error& error) {
     throw Error(error.exit_code(), Concat("--swing-up: ", error.what()));
   }
@@ -94,6 +95,7 @@ std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
                            [&](const auto& flag) { return HasSection(name, SectionOf(flag)); });
     }
     policies.push_back(GetPolicy(one));
+    ExpectPendulum(policies.back());
     std::error_code none;
     const auto file = fs::canonical(policies.back().path, none);
     if (!seen.insert(none ? fs::path(name) : file).second) {

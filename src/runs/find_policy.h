@@ -27,9 +27,9 @@ struct PolicyArguments {
 /// controller.
 LoadedPolicy GetPolicy(const PolicyArguments& a);
 
-/// Gets the policies of these names, each a PolicyArguments::name. Each controller gets those
-/// settings in `controllers` that it has. Throws BadInput if none of the policies has a given
-/// setting.
+/// Gets policies of the double pendulum by these names, each a PolicyArguments::name. Each
+/// controller gets those settings in `controllers` that it has. Throws BadInput if none of the
+/// policies has a given setting.
 std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
                                       const PolicyArguments& controllers);
 

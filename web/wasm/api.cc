@@ -152,10 +152,7 @@ UPSWING_EXPORT(policy_open) Controller* PolicyOpen(const std::byte* file, size_t
   return Guarded([&]() -> Controller* {
     const Tensors tensors = ReadSafetensors({file, file + size}, "the file");
     auto controller = std::make_unique<Controller>(PolicyIn(tensors));
-    if (!HasPlant(controller->loaded.task)) {
-      throw BadInput(
-          Concat("expected a policy of the double pendulum, got one of ", controller->loaded.task));
-    }
+    ExpectPendulum(controller->loaded);
     if (!controller->loaded.mjcf.empty()) {
       throw BadInput("expected a policy of the built-in model, got one of another MJCF model");
     }
