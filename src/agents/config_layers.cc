@@ -87,30 +87,7 @@ ChosenAgent ChooseAgent(const toml::table& table, const std::string& where,
   return {agent.name, place, std::move(settings), algorithm};
 }
 
-/// Defaults of trainings on a foreign task: as usual for each algorithm, over the network and the
-/// settings of the named agent, which are tuned for the tasks of the program.
-std::string_view ForeignDefaults(std::string_view algorithm) {
-  if (algorithm == "dqn") {
-    return "[train]\nenvs = 1\neval_episodes = 10\n"
-           "[agent]\nmirror = false\nreward_scale = 1.0\nreward_centering = 0.0\n"
-           "updates_per_step = 0.25\nlearning_starts = 1000\nlearning_rate = 1e-3\n"
-           "tau = 0.01\n";
-  }
-  if (algorithm == "sac") {
-    return "[train]\nenvs = 1\neval_episodes = 10\n"
-           "[agent]\nmirror = false\nreward_scale = 1.0\nreward_centering = 0.0\n"
-           "updates_per_step = 1.0\nlearning_starts = 1000\nlearning_rate = 3e-4\n"
-           "learning_rate_end = 3e-4\nalpha = 1.0\nalpha_rate = 3e-4\nactor_rate = 1.0\n"
-           "actor_period = 1\nn_step = 1\nprioritized = false\ntwin = true\ntau = 0.005\n"
-           "entropy_reward = true\ntarget_entropy = -1.0\nsmoothness = 0.0\n";
-  }
-  return "[train]\nenvs = 8\neval_episodes = 10\n"
-         "[agent]\nmirror = false\nreward_scale = 1.0\nnormalize = false\nhorizon = 256\n"
-         "epochs = 10\nbatch = 64\nlearning_rate = 3e-4\nlearning_rate_end = 0.0\n"
-         "kl_target = 0.0\nentropy_bonus = 0.0\nentropy_bonus_end = 0.0\n";
-}
-
-/// Applies the settings of a named agent to a foreign task: its network and its learning.
+/// Applies to a foreign task the network and the learning of a named agent, then the defaults.
 void ApplyToForeign(const Options& options, const ChosenAgent& agent) {
   toml::table learner;
   for (const char* section : {"network", "agent"}) {
@@ -118,8 +95,9 @@ void ApplyToForeign(const Options& options, const ChosenAgent& agent) {
       learner.insert(section, *settings);
   }
   ApplyTable(options, learner, agent.place, false);
-  const std::string place = Concat("defaults of ", agent.algorithm);
-  ApplyTable(options, ParseToml(ForeignDefaults(agent.algorithm), place), place, false);
+  for (const NamedAgent& defaults : GymnasiumDefaults()) {
+    if (defaults.name == agent.algorithm) ApplyToml(options, defaults.toml, "defaults");
+  }
 }
 
 /// Completes settings by the environment of a foreign task: its discrete actions, and a learning

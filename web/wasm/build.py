@@ -71,12 +71,17 @@ def own_sources():
     return sources + sorted(HERE.glob("*.cc"))
 
 
+CONFIGS = {"AGENT_ENTRIES": ROOT / "configs", "GYMNASIUM_ENTRIES": ROOT / "configs/gymnasium"}
+
+
 def named_agents():
-    """The C++ source that CMake generates from configs/*.toml."""
-    entries = "".join(f'    {{"{path.stem}", R"toml({path.read_text(encoding="utf-8")})toml"}},\n'
-                      for path in sorted((ROOT / "configs").glob("*.toml")))
-    template = (ROOT / "src/agents/named_agents.cc.in").read_text(encoding="utf-8")
-    return template.replace("@AGENT_ENTRIES@", entries)
+    """What CMake makes of the settings in CONFIGS."""
+    text = (ROOT / "src/agents/named_agents.cc.in").read_text(encoding="utf-8")
+    for name, folder in CONFIGS.items():
+        entries = "".join(f'    {{"{path.stem}", R"toml({path.read_text(encoding="utf-8")})toml"}},\n'
+                          for path in sorted(folder.glob("*.toml")))
+        text = text.replace(f"@{name}@", entries)
+    return text
 
 
 def project_version():
@@ -118,7 +123,8 @@ def sources_hash():
     """SHA-256 of the sources, headers, named agents, pinned versions, and this file with its flags."""
     text = hashlib.sha256()
     for path in [*included([*own_sources(), ROOT / "src/agents/named_agents.cc.in"]),
-                 *sorted((ROOT / "configs").glob("*.toml")), Path(__file__).resolve()]:
+                 *(path for folder in CONFIGS.values() for path in sorted(folder.glob("*.toml"))),
+                 Path(__file__).resolve()]:
         data = path.read_bytes()
         text.update(f"{path.relative_to(ROOT)} {len(data)}\n".encode() + data)
     text.update(" ".join(map(str, (project_version(), ZIG.name, HIGHWAY.name))).encode())
