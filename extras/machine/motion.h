@@ -5,7 +5,7 @@
 
 #include "extras/machine/log.h"
 #include "extras/machine/twin.h"
-#include "pendulum/manipulator.h"
+#include "pendulum/equations.h"
 
 /// A twin's motion under the torques of a log.
 namespace upswing {

@@ -3,7 +3,7 @@
 #include <array>
 #include <cstddef>
 
-#include "pendulum/manipulator.h"
+#include "pendulum/equations.h"
 
 /// The double pendulum of the benchmark RealAIGym (docs/howto/realaigym.md): its parameters, and
 /// the constants of its equations of motion. Its inertias are about the joints, unlike those of

@@ -1,6 +1,6 @@
 #include "control/linearize.h"
 
-#include "pendulum/manipulator.h"
+#include "pendulum/equations.h"
 
 namespace upswing {
 

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "control/riccati.h"
-#include "pendulum/manipulator.h"
+#include "pendulum/equations.h"
 
 /// The double pendulum as a linear system about upright at rest: x = [q1 - π, q2, w1, w2], rad and
 /// rad/s; u the torque of the motor, N·m, without a limit.

@@ -6,7 +6,7 @@
 
 #include "control/controller.h"
 #include "control/settings.h"
-#include "pendulum/manipulator.h"
+#include "pendulum/equations.h"
 
 /// Swing-up laws, each a formula. They ignore the motor's limit; control/hybrid.h catches the
 /// pendulum with LQR once they have brought it near upright.

@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "pendulum/manipulator.h"
+#include "pendulum/equations.h"
 
 namespace upswing {
 

@@ -1,10 +1,10 @@
-// Symbols as in pendulum/manipulator.h; Q1 and Q2 are a push's torques at both joints (N·m).
+// Symbols as in pendulum/equations.h; Q1 and Q2 are the torques of a push at both joints (N·m).
 #include "web/wasm/step.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "pendulum/manipulator.h"
+#include "pendulum/equations.h"
 
 namespace upswing {
 namespace {

@@ -1,4 +1,4 @@
-#include "pendulum/manipulator.h"
+#include "pendulum/equations.h"
 
 #include <gtest/gtest.h>
 
