@@ -9,7 +9,7 @@
 #include "agents/loaded_policy.h"
 #include "base/error.h"
 #include "base/text.h"
-#include "pendulum/double_pendulum.h"
+#include "pendulum/plant.h"
 #include "runs/find_policy.h"
 
 using namespace upswing;

@@ -9,6 +9,7 @@
 #include "base/rng.h"
 #include "base/text.h"
 #include "extras/deploy/c_header.h"
+#include "pendulum/observation.h"
 
 namespace upswing {
 namespace {

@@ -8,6 +8,7 @@
 #include "extras/deploy/export.h"
 #include "extras/deploy/exported_policy.h"
 #include "os/streams.h"
+#include "pendulum/observation.h"
 
 namespace upswing {
 namespace {

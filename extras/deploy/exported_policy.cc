@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/text.h"
+#include "pendulum/observation.h"
 
 namespace upswing {
 namespace {
@@ -19,7 +20,7 @@ void CheckTorques(std::span<const double> torques, const std::string& where) {
   }
 }
 
-/// The inputs of the double pendulum's observation (Observe of pendulum/double_pendulum.h).
+/// The inputs of the double pendulum's observation (Observe of pendulum/task.h).
 std::vector<NamedInput> PendulumInputs(int memory) {
   const auto over = [](double scale, const char* unit) {
     return Concat(" over ", FormatNumber(scale), ' ', unit);

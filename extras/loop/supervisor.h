@@ -5,7 +5,7 @@
 
 #include "base/options.h"
 #include "extras/machine/log.h"
-#include "pendulum/double_pendulum.h"
+#include "pendulum/plant.h"
 
 /// The supervisor of a control loop: it decides in each cycle who drives the motors. It has no
 /// clock, no link and no thread of its own.

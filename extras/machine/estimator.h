@@ -6,7 +6,7 @@
 #include "extras/machine/motion.h"
 #include "extras/machine/simulated_machine.h"
 #include "extras/machine/twin.h"
-#include "pendulum/double_pendulum.h"
+#include "pendulum/plant.h"
 
 /// Estimates of a machine's state from the angles that its encoders report.
 namespace upswing {

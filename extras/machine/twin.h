@@ -7,7 +7,7 @@
 #include "base/options.h"
 #include "base/rng.h"
 #include "extras/machine/log.h"
-#include "pendulum/double_pendulum.h"
+#include "pendulum/plant.h"
 
 /// The twin: a model of a real machine with motors, sensors and control loop, identified from the
 /// machine's logs.

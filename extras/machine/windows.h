@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "extras/machine/log.h"
-#include "pendulum/double_pendulum.h"
+#include "pendulum/plant.h"
 
 /// Short pieces of logs, over which a model predicts the motion from a start state.
 namespace upswing {

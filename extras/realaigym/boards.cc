@@ -14,6 +14,7 @@
 #include "base/json.h"
 #include "base/text.h"
 #include "pendulum/identification.h"
+#include "pendulum/observation.h"
 #include "report/figure.h"
 #include "runs/find_policy.h"
 #include "runs/plant_file.h"

@@ -7,6 +7,7 @@
 
 #include "agents/loaded_policy.h"
 #include "pendulum/identification.h"
+#include "pendulum/observation.h"
 
 namespace upswing {
 namespace {

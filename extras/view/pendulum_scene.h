@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "mujoco/model.h"
-#include "pendulum/double_pendulum.h"
+#include "pendulum/plant.h"
 
 namespace upswing {
 

@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 #include "base/text.h"
-#include "pendulum/double_pendulum.h"
+#include "pendulum/observation.h"
 #include "python/src/bindings.h"
 
 namespace upswing {

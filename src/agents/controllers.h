@@ -6,7 +6,7 @@
 
 #include "base/policy.h"
 #include "control/settings.h"
-#include "pendulum/double_pendulum.h"
+#include "pendulum/plant.h"
 
 /// Controllers that are designed from the equations of motion. Commands that take a policy file
 /// also take the name of a controller.

@@ -5,6 +5,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "nn/network_policy.h"
+#include "pendulum/observation.h"
 
 namespace upswing {
 namespace {

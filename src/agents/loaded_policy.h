@@ -7,7 +7,7 @@
 #include "agents/config.h"
 #include "base/policy.h"
 #include "base/tensors.h"
-#include "pendulum/double_pendulum.h"
+#include "pendulum/plant.h"
 
 namespace upswing {
 

@@ -16,7 +16,7 @@
 #include "mujoco/model.h"
 #include "nn/network_policy.h"
 #include "os/machine.h"
-#include "pendulum/double_pendulum.h"
+#include "pendulum/observation.h"
 #include "pendulum/upright_modes.h"
 #include "runs/config_files.h"
 #include "runs/find_policy.h"

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/text.h"
+#include "pendulum/observation.h"
 
 namespace upswing {
 namespace {

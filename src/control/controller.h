@@ -9,12 +9,12 @@
 
 #include "base/policy.h"
 #include "control/pendulum_model.h"
-#include "pendulum/double_pendulum.h"
+#include "pendulum/task.h"
 
 namespace upswing {
 
 /// The deviation from upright [q1 - π, q2, w1, w2], angles in [-π, π], of a state or of an
-/// observation of pendulum/double_pendulum.h.
+/// observation of pendulum/task.h.
 StateVector UprightDeviation(const StateVector& x);
 StateVector UprightDeviation(std::span<const float> obs);
 

@@ -3,7 +3,7 @@
 #include "control/controller.h"
 #include "control/riccati.h"
 #include "control/settings.h"
-#include "pendulum/double_pendulum.h"
+#include "pendulum/plant.h"
 
 /// The linear-quadratic regulator about upright: Anderson, Moore, "Optimal Control: Linear
 /// Quadratic Methods" (1990); Tedrake, "Underactuated Robotics", chapter 8. It is the best

@@ -5,7 +5,7 @@
 
 #include "control/linearize.h"
 #include "pendulum/closed_form.h"
-#include "pendulum/double_pendulum.h"
+#include "pendulum/plant.h"
 
 /// The double pendulum for trajectory optimisation: a step and its derivatives.
 namespace upswing {

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "control/trajectory.h"
-#include "pendulum/double_pendulum.h"
+#include "pendulum/task.h"
 
 namespace upswing {
 

@@ -1,6 +1,6 @@
 #include "control/settings.h"
 
-#include "pendulum/double_pendulum.h"
+#include "pendulum/plant.h"
 
 namespace upswing {
 

@@ -11,7 +11,7 @@
 #include "base/options.h"
 #include "base/rng.h"
 #include "control/riccati.h"
-#include "pendulum/double_pendulum.h"
+#include "pendulum/plant.h"
 
 /// Helpers that the tests of controllers share.
 namespace upswing {

@@ -16,6 +16,7 @@
 #include "mujoco/engines.h"
 #include "mujoco/model.h"
 #include "os/file.h"
+#include "pendulum/mjcf.h"
 #include "pendulum/pendulum_env.h"
 #include "pendulum/testing.h"
 

@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "mujoco/model.h"
+#include "pendulum/mjcf.h"
 
 namespace upswing {
 namespace {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "mujoco/testing.h"
+#include "pendulum/observation.h"
 #include "pendulum/pendulum_env.h"
 
 namespace upswing {

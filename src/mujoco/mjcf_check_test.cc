@@ -10,7 +10,8 @@
 
 #include "base/error.h"
 #include "mujoco/model.h"
-#include "pendulum/double_pendulum.h"
+#include "pendulum/mjcf.h"
+#include "pendulum/plant.h"
 
 namespace upswing {
 namespace {

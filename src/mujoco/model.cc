@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "mujoco/mjcf_check.h"
+#include "pendulum/mjcf.h"
 
 namespace upswing {
 namespace {

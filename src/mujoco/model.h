@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "pendulum/double_pendulum.h"
+#include "pendulum/plant.h"
 
 /// Owning handles of MuJoCo objects, and access to the plant's numbers in a compiled model.
 namespace upswing {

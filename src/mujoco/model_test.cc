@@ -11,6 +11,7 @@
 #include "base/text.h"
 #include "base/thread_pool.h"
 #include "pendulum/closed_form.h"
+#include "pendulum/mjcf.h"
 
 namespace upswing {
 namespace {

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "mujoco/testing.h"
+#include "pendulum/mjcf.h"
 
 namespace upswing {
 namespace {

@@ -294,7 +294,7 @@ HWY_INLINE hn::Mask<D> IsSound(const State& x) {
                  hn::And(hn::Le(hn::Abs(x.w.one), largest), hn::Le(hn::Abs(x.w.two), largest)));
 }
 
-/// Observe, RewardTerms and Inverted of double_pendulum.h for one vector of environments from `i`.
+/// Observe, RewardTerms and Inverted of task.h for one vector of environments from `i`.
 HWY_INLINE void JudgeVector(const ClosedFormBatch& batch, const RewardWeights& weights, size_t i,
                             Verdict& verdict) {
   const State x = LoadState(batch, i);

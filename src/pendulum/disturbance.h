@@ -9,7 +9,7 @@
 #include "base/archive.h"
 #include "base/options.h"
 #include "base/rng.h"
-#include "pendulum/double_pendulum.h"
+#include "pendulum/plant.h"
 #include "pendulum/sensors.h"
 
 namespace upswing {

@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "pendulum/double_pendulum.h"
+#include "pendulum/plant.h"
 
 /// The equations of motion of a double pendulum, in one form for every plant and every caller:
 ///   M(q) q̈ = τ - c(q, q̇) - g(q) - d q̇ - f atan(100 q̇)

@@ -6,7 +6,7 @@
 
 #include "base/archive.h"
 #include "pendulum/closed_form.h"
-#include "pendulum/double_pendulum.h"
+#include "pendulum/plant.h"
 #include "pendulum/upright_modes.h"
 
 /// Identification of an unknown plant while it moves, from measured angles and velocities and the
@@ -28,7 +28,8 @@ inline constexpr std::array<double Manipulator::*, kConstants> kIdentified{
 ///   1  energy, 0 hanging at rest and 1 upright
 ///   2  ζ / (1 + |ζ|) of the faster and of the slower mode, see Falling
 ///   1  Falling::torque, within ±1
-static_assert(kIdentifiedSize == kConstants + 6);
+inline constexpr int kIdentifiedSize = kConstants + 6;
+inline constexpr double kConstantScale = 0.5;  // divisor of the constants' deviations
 extern const std::array<float, kIdentifiedSize> kIdentifiedMirrorSigns;
 
 /// The estimated plants of N environments.

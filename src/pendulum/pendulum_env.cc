@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "base/text.h"
+#include "pendulum/observation.h"
 
 namespace upswing {
 namespace {

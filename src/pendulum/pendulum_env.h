@@ -11,10 +11,10 @@
 #include "base/env.h"
 #include "base/rng.h"
 #include "pendulum/disturbance.h"
-#include "pendulum/double_pendulum.h"
 #include "pendulum/identification.h"
 #include "pendulum/physics.h"
 #include "pendulum/randomization.h"
+#include "pendulum/task.h"
 
 namespace upswing {
 

@@ -7,7 +7,7 @@
 #include "base/options.h"
 #include "base/rng.h"
 #include "pendulum/disturbance.h"
-#include "pendulum/double_pendulum.h"
+#include "pendulum/plant.h"
 
 namespace upswing {
 

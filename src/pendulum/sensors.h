@@ -5,7 +5,7 @@
 
 #include "base/archive.h"
 #include "base/options.h"
-#include "pendulum/double_pendulum.h"
+#include "pendulum/plant.h"
 
 /// Sensor models: encoders of both joints, velocities computed from them, and latency.
 ///

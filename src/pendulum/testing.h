@@ -6,7 +6,7 @@
 
 #include "base/options.h"
 #include "base/rng.h"
-#include "pendulum/double_pendulum.h"
+#include "pendulum/plant.h"
 
 /// Helpers that the tests of the double pendulum share.
 namespace upswing {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "agents/config.h"
-#include "pendulum/double_pendulum.h"
+#include "pendulum/plant.h"
 
 /// A machine's plant in a file: a TOML table [plant] with the settings of Plant, and perhaps a
 /// table [disturbance] with the settings of Disturbance. A twin also has a table [covariance].

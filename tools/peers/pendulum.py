@@ -1,6 +1,6 @@
 """The double pendulum and its task over MuJoCo's Python package, as a Gymnasium environment.
 
-It has the model, observation, reward, torques and episodes of src/pendulum/double_pendulum.cc and
+It has the model, observation, reward, torques and episodes of src/pendulum/task.cc and
 src/pendulum/pendulum_env.cc with the built-in plant; check_task.py compares it with the program.
 
 Symbols: q1, q2 joint angles (rad; 0 hanging, q2 relative to link 1), w1, w2 their velocities

@@ -1,6 +1,6 @@
 import { core } from './core';
 
-/// The double pendulum and its task as formulas: those of src/pendulum/double_pendulum.cc, in the core. Its
+/// The double pendulum and its task as formulas: those of src/pendulum/task.cc, in the core. Its
 /// constants, which a test compares with the program's, are needed before there is a core.
 ///
 /// Symbols: q1, q2 joint angles (rad; both 0 hanging, q2 relative to link 1), w1, w2 their velocities

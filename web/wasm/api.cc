@@ -11,6 +11,8 @@
 #include "nn/gaussian.h"
 #include "nn/network_policy.h"
 #include "pendulum/identification.h"
+#include "pendulum/mjcf.h"
+#include "pendulum/observation.h"
 #include "pendulum/sensors.h"
 #include "rl/softmax.h"
 #include "web/wasm/learner.h"

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "pendulum/double_pendulum.h"
+#include "pendulum/plant.h"
 
 namespace upswing {
 

@@ -1,4 +1,4 @@
-/* A network for the double pendulum: pendulum/double_pendulum.h in C. */
+/* A network for the double pendulum: pendulum/task.h in C. */
 #include "network.c"
 
 /* The observation of these angles and velocities. */

@@ -1,4 +1,4 @@
-#include "pendulum/double_pendulum.h"
+#include "pendulum/task.h"
 
 #include <gtest/gtest.h>
 

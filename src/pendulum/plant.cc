@@ -1,0 +1,114 @@
+#include "pendulum/plant.h"
+
+#include <cmath>
+#include <numbers>
+
+namespace upswing {
+
+void Plant::Describe(Options& o) {
+  constexpr Range kMass{0.01, 100}, kLength{0.1, 10}, kDamping{0, 100};
+  o.Section("plant");
+  o.Add(&mass1, "mass1", kMass, "kg", "mass of link 1");
+  o.Add(&mass2, "mass2", kMass, "kg", "mass of link 2");
+  o.Add(&length1, "length1", kLength, "m", "length of link 1");
+  o.Add(&length2, "length2", kLength, "m", "length of link 2");
+  o.Add(&damping1, "damping1", kDamping, "N·m·s/rad", "damping of joint 1");
+  o.Add(&damping2, "damping2", kDamping, "N·m·s/rad", "damping of joint 2");
+  o.Add(&gravity, "gravity", {0.01, 100}, "m/s²", "downward gravity");
+  o.Add(&torque_limit, "torque_limit", {0.01, 1000}, "N·m", "largest torque of the motor");
+  Option& joint = o.Add(&actuated_joint, "actuated_joint", {1, 2}, "",
+                        "joint that the motor drives; 1: pendubot, 2: acrobot");
+  joint.step = 1;
+  joint.implied = true;
+  o.Add(&rotor_inertia, "rotor_inertia", {0, 1}, "kg·m²", "rotor inertia of each joint's motor")
+      .implied = true;
+  o.Add(&gear_ratio, "gear_ratio", {0, 1000}, "", "gear ratio: rotor turns per joint turn")
+      .implied = true;
+  o.Add(&coulomb1, "coulomb1", {0, 10}, "N·m",
+        "dry friction of joint 1: c in c·atan(100 w), w the joint's velocity")
+      .implied = true;
+  o.Add(&coulomb2, "coulomb2", {0, 10}, "N·m",
+        "dry friction of joint 2: c in c·atan(100 w), w the joint's velocity")
+      .implied = true;
+  constexpr Range kCenter{0, 10}, kInertia{0, 10000};
+  o.Add(&center1, "center1", kCenter, "m",
+        "distance from joint 1 to the centre of mass of link 1; 0: half of length1")
+      .implied = true;
+  o.Add(&center2, "center2", kCenter, "m",
+        "distance from joint 2 to the centre of mass of link 2; 0: half of length2")
+      .implied = true;
+  o.Add(&inertia1, "inertia1", kInertia, "kg·m²",
+        "moment of inertia of link 1 about its centre of mass; 0: that of a solid capsule")
+      .implied = true;
+  o.Add(&inertia2, "inertia2", kInertia, "kg·m²",
+        "moment of inertia of link 2 about its centre of mass; 0: that of a solid capsule")
+      .implied = true;
+  o.Add(&armature, "armature", {0, 10}, "kg·m²", "armature of each joint, without rotors").implied =
+      true;
+  o.Alias("mass", {"mass1", "mass2"});
+  o.Alias("length", {"length1", "length2"});
+  o.Alias("damping", {"damping1", "damping2"});
+}
+
+std::vector<std::pair<std::string, double>> PlantValues(const Plant& plant) {
+  std::vector<std::pair<std::string, double>> values;
+  const Options options = OptionsOf(plant);
+  const Plant usual;
+  const Options defaults = OptionsOf(usual);
+  for (size_t i = 0; i < options.all().size(); ++i) {
+    const Option& option = options.all()[i];
+    if (option.implied && option.number() == defaults.all()[i].number()) continue;
+    values.emplace_back(option.name, option.number());
+  }
+  return values;
+}
+
+CapsuleInertia::CapsuleInertia(double m, double r, double l) {
+  // The mass splits by volume between the cylinder and the two half spheres.
+  const double cylinder = std::numbers::pi * r * r * l;
+  const double sphere = 4.0 / 3.0 * std::numbers::pi * r * r * r;
+  const double mc = m * cylinder / (cylinder + sphere);
+  const double ms = m - mc;
+  across = mc * (3 * r * r + l * l) / 12 + ms * (2 * r * r / 5 + l * l / 4 + 3 * l * r / 8);
+  along = mc * r * r / 2 + ms * 2 * r * r / 5;
+}
+
+std::array<Link, 2> LinksOf(const Plant& p) {
+  const auto link = [](double m, double l, double c, double I) {
+    return Link{m, l, c > 0 ? c : l / 2, I > 0 ? I : CapsuleInertia(m, kCapsuleRadius, l).across};
+  };
+  return {link(p.mass1, p.length1, p.center1, p.inertia1),
+          link(p.mass2, p.length2, p.center2, p.inertia2)};
+}
+
+double Armature1(const Plant& plant) {
+  return plant.armature + plant.gear_ratio * plant.gear_ratio * plant.rotor_inertia;
+}
+
+PendulumState StateBetween(const PendulumState& a, const PendulumState& b, double h, double share) {
+  const double s = share, s2 = s * s, s3 = s2 * s;
+  const auto angle = [&](double q0, double w0, double q1, double w1) {
+    return (2 * s3 - 3 * s2 + 1) * q0 + (s3 - 2 * s2 + s) * h * w0 + (3 * s2 - 2 * s3) * q1 +
+           (s3 - s2) * h * w1;
+  };
+  const auto velocity = [&](double q0, double w0, double q1, double w1) {
+    return 6 * (s2 - s) * (q0 - q1) / h + (3 * s2 - 4 * s + 1) * w0 + (3 * s2 - 2 * s) * w1;
+  };
+  return {angle(a.q1, a.w1, b.q1, b.w1), angle(a.q2, a.w2, b.q2, b.w2),
+          velocity(a.q1, a.w1, b.q1, b.w1), velocity(a.q2, a.w2, b.q2, b.w2)};
+}
+
+double MotorAngle(const Plant& plant, const PendulumState& s) {
+  return plant.actuated_joint == 1 ? s.q1 : s.q2;
+}
+
+double Wrapped(double angle) {
+  constexpr double kTurn = 2 * std::numbers::pi;
+  return angle - kTurn * std::nearbyint(angle / kTurn);
+}
+
+std::array<double, 2> Lean(const PendulumState& s) {
+  return {Wrapped(s.q1 - std::numbers::pi), Wrapped(s.q1 + s.q2 - std::numbers::pi)};
+}
+
+}  // namespace upswing

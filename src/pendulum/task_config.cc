@@ -1,0 +1,16 @@
+#include "pendulum/task.h"
+
+namespace upswing {
+
+void RewardWeights::Describe(Options& o) {
+  constexpr Range kWeight{0, 1000};
+  auto& [energy, height, balance, velocity, torque] = weight;
+  o.Section("reward");
+  o.Add(&energy, "energy_weight", kWeight, "", "reward weight of the energy term");
+  o.Add(&height, "height_weight", kWeight, "", "reward weight of the height term");
+  o.Add(&balance, "balance_weight", kWeight, "", "reward weight of the balance term");
+  o.Add(&velocity, "velocity_weight", kWeight, "", "reward weight of the velocity penalty");
+  o.Add(&torque, "torque_weight", kWeight, "", "reward weight of the torque penalty");
+}
+
+}  // namespace upswing
