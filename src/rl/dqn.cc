@@ -1,29 +1,12 @@
-// Deep Q-Network (Mnih et al., 2015). Symbols: s observation, a action, r reward, γ discount,
-// θ online and θ⁻ target parameters, y target, B batch size, A number of actions, D observation
-// size, N environments.
+// Deep Q-Network (Mnih et al., 2015). Symbols: see rl/dqn.h.
 #include "rl/dqn.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "base/argmax.h"
-#include "base/error.h"
-#include "base/text.h"
-#include "nn/network_policy.h"
-#include "rl/representation.h"
-#include "rl/torque_levels.h"
 
 namespace upswing {
-namespace {
-
-/// The actions of an agent for this task. Throws BadInput if the task has several torques.
-std::vector<double> TorquesOf(const DqnConfig& config, const EnvSpec& spec) {
-  if (spec.action_size() == 1) return ActionTable(spec, config.levels);
-  throw BadInput(
-      Concat("dqn: expected a task with one torque, got ", spec.action_size(), " in ", spec.task));
-}
-
-}  // namespace
 
 void TdTargets(Matrix<const float> select, Matrix<const float> evaluate,
                std::span<const float> reward, std::span<const float> discount, std::span<float> y) {
@@ -39,27 +22,6 @@ float HuberLoss(float delta) {
 
 float HuberGradient(float delta) { return std::clamp(delta, -1.0F, 1.0F); }
 
-Dqn::Dqn(const DqnConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool)
-    : OffPolicyAgent(config, spec, ActionSpace::Discrete(TorquesOf(config, spec).size()), seed,
-                     pool),
-      config_(config),
-      D_(spec.obs_size),
-      B_(static_cast<int>(config.batch)),
-      torques_(TorquesOf(config, spec)),
-      online_(config.Shape(D_, static_cast<int>(torques_.size())), B_,
-              Rng(seed, "initial parameters")),
-      theta_target_(online_.theta().begin(), online_.theta().end()),
-      theta_policy_(theta_target_),
-      q_(static_cast<size_t>(B_) * torques_.size()),
-      q_select_(q_.size()),
-      q_target_(q_.size()),
-      dq_(q_.size()),
-      mirrored_(static_cast<size_t>(B_) * D_),
-      y_(B_),
-      q_taken_(y_.size()),
-      act_activations_(online_.network().MakeActivations(spec.num_envs, false)),
-      act_q_(static_cast<size_t>(spec.num_envs) * torques_.size()) {}
-
 double Dqn::epsilon() const {
   const double decayed =
       config_.epsilon_start * std::pow(config_.epsilon_decay, static_cast<double>(episodes_));
@@ -69,32 +31,45 @@ double Dqn::epsilon() const {
 void Dqn::Act(Matrix<const float> obs, Matrix<double> action) {
   const Matrix<float> q(act_q_, obs.rows(), static_cast<int>(torques_.size()));
   online_.network().ForwardPreferences(online_.theta(), obs, {0, obs.rows()}, act_activations_, q);
-  Remember(obs);
+  std::ranges::copy(obs.values(), act_obs_.begin());
 
-  // Act ε-greedily.
+  // Act ε-greedily: a random action with probability ε, else argmax_a Q(s, a; θ).
   for (int env = 0; env < obs.rows(); ++env) {
     const bool random = explore_rng_.Uniform() < epsilon();
-    const int chosen =
+    const int a =
         random ? static_cast<int>(explore_rng_.Below(torques_.size())) : ArgMax(q.row(env));
-    act_action_[env] = static_cast<float>(chosen);
-    action(env, 0) = torques_[chosen];
+    act_action_[env] = static_cast<float>(a);
+    action(env, 0) = torques_[a];
+  }
+}
+
+void Dqn::Observe(const StepResult& result) {
+  const int N = static_cast<int>(act_action_.size());
+  const Matrix<const float> s(act_obs_.data(), N, D_), s_next(result.next_obs.data(), N, D_);
+  for (int env = 0; env < N; ++env) {
+    ExpectFinite(result, env);
+    const double r = config_.reward_scale * result.reward[env];
+    // Only a terminal s' has no value. An episode that runs out of time bootstraps from s'.
+    const double discount = result.terminated[env] != 0 ? 0 : config_.gamma;
+    Store(env, {s.row(env), s_next.row(env), {&act_action_[env], 1}, r, discount},
+          result.done(env));
+  }
+}
+
+void Dqn::Learn() {
+  while (UpdateIsDue()) {
+    update_threads_.Run([&] { Update(Sample()); });
+    UpdatePriorities();
   }
 }
 
 void Dqn::Update(const Minibatch& batch) {
-  // Compute the gradient of the mean Huber loss.
+  // Compute the gradient of L = mean w Huber(Q(s, a; θ) - y); w = 1 without priorities.
   online_.Prepare(pool_);
   ForSlices(pool_, B_, [&](RowRange rows) { BackwardRows(batch, rows); });
-  double loss = 0, q = 0, td = 0, errors = 0;
-  for (int i = 0; i < B_; ++i) {
-    loss += batch.weight[i] * HuberLoss(td_error_[i]);
-    q += q_taken_[i];
-    td += std::abs(td_error_[i]);
-    errors += double{batch.weight[i]} * HuberGradient(td_error_[i]);
-  }
-  CountErrors(loss / B_, q / B_, td / B_);
+  CountMinibatch(batch);
 
-  // Move θ against the gradient, and θ⁻ towards θ.
+  // Move θ against the gradient with Adam, and θ⁻ by θ⁻ ← θ⁻ + τ (θ - θ⁻), or copy θ once a period.
   const bool polyak = config_.target_period == 0;
   norm_sum_ += online_.Step({batch.obs.data(), B_, D_}, learning_rate(), config_.max_gradient_norm,
                             theta_target_, polyak ? config_.tau : 0.0, pool_);
@@ -102,32 +77,9 @@ void Dqn::Update(const Minibatch& batch) {
   if (!polyak && updates_ % config_.target_period == 0) {
     std::ranges::copy(online_.theta(), theta_target_.begin());
   }
+
   if (config_.policy_tau < 1) AveragePolicy();
-  if (config_.reward_centering > 0) ShiftValues(CenteringShift(batch, errors));
-}
-
-void Dqn::ShiftValues(float shift) {
-  for (const std::span<float> theta : {online_.mutable_theta(), std::span<float>(theta_target_),
-                                       std::span<float>(theta_policy_)}) {
-    online_.network().ShiftOutputs(shift, theta);
-  }
-}
-
-void Dqn::AveragePolicy() {
-  const auto tau = static_cast<float>(AveragingTau(config_.policy_tau));
-  const std::span<const float> theta = online_.theta();
-  for (size_t i = 0; i < theta.size(); ++i) {
-    theta_policy_[i] += tau * (theta[i] - theta_policy_[i]);
-  }
-}
-
-void Dqn::ForwardMirrored(Matrix<const float> s, RowRange rows, Matrix<float> q) {
-  const Matrix<float> mirrored(mirrored_, B_, D_);
-  for (int i = rows.first; i < rows.first + rows.count; ++i) {
-    for (int k = 0; k < D_; ++k) mirrored(i, k) = mirror_signs_[k] * s(i, k);
-  }
-  online_.Forward(theta_target_, mirrored, rows, q);
-  for (int i = rows.first; i < rows.first + rows.count; ++i) std::ranges::reverse(q.row(i));
+  if (config_.reward_centering > 0) CenterValues(batch);
 }
 
 void Dqn::BackwardRows(const Minibatch& batch, RowRange rows) {
@@ -136,8 +88,7 @@ void Dqn::BackwardRows(const Minibatch& batch, RowRange rows) {
   const Matrix<float> q(q_, B_, A), q_target(q_target_, B_, A), dq(dq_, B_, A);
   const Matrix<float> q_select(config_.double_q || config_.mirror ? q_select_ : q_target_, B_, A);
 
-  // y = r + γⁿ Q(s', a*; θ⁻), or with mirror y = r + γⁿ Q(σs', σa*; θ⁻). θ selects a* in Double
-  // DQN, θ⁻ otherwise.
+  // y = r + γⁿ Q(s', a*; θ⁻). θ selects a* in Double DQN, θ⁻ otherwise.
   online_.Forward(config_.double_q ? online_.theta() : theta_target_, s_next, rows, q_select);
   if (config_.mirror) {
     ForwardMirrored(s_next, rows, q_target);
@@ -157,33 +108,6 @@ void Dqn::BackwardRows(const Minibatch& batch, RowRange rows) {
     dq(i, a) = batch.weight[i] * HuberGradient(td_error_[i]) / static_cast<float>(B_);
   }
   online_.Backward(dq, rows);
-}
-
-Metrics Dqn::TakeMetrics() {
-  Metrics metrics{{"updates", static_cast<double>(updates_)},
-                  {"epsilon", epsilon()},
-                  {"learning_rate", learning_rate()}};
-  TakeMeans(metrics);
-  AddFeatureMetrics(online_.features(), B_, config_.hidden.back(), metrics);
-  return metrics;
-}
-
-std::unique_ptr<Policy> Dqn::ExportPolicy(PolicyInfo info) const {
-  info.gamma = config_.gamma;
-  info.reward_scale = config_.reward_scale;
-  NetworkPolicyParts parts{ActionRule::kLevels, online_.network().shape()};
-  const std::span<const float> theta = config_.policy_tau < 1 ? theta_policy_ : online_.theta();
-  parts.parameters.assign(theta.begin(), theta.end());
-  parts.torques = torques_;
-  return std::make_unique<NetworkPolicy>(std::move(parts), std::move(info));
-}
-
-void Dqn::State(const Archive& archive) {
-  online_.State(archive);
-  archive.Array("theta_target", std::span(theta_target_));
-  if (config_.policy_tau < 1) archive.Array("theta_policy", std::span(theta_policy_));
-  SharedState(archive);
-  archive.Check(online_.steps() == updates_, "adam/steps", "one for each update");
 }
 
 }  // namespace upswing

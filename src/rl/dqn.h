@@ -13,16 +13,13 @@
 /// Deep Q-Network (Mnih et al., 2015) and its extensions, each a flag.
 ///
 /// Symbols: s observation, a action, r reward, γ discount, θ online parameters, θ⁻ target
-/// parameters, y target, B batch size, A number of actions, D observation size.
+/// parameters, y target, B batch size, A number of actions, D observation size, N environments.
 namespace upswing {
 
 /// TD targets y (B) = r + discount · evaluate(s', a*) with a* = argmax_a select(s', a):
 /// - DQN: select = evaluate = Q(s', ·; θ⁻), so that y = r + γ max_a Q(s', a; θ⁻) (Mnih et al.,
 ///   2015).
 /// - Double DQN: select = Q(s', ·; θ), evaluate = Q(s', ·; θ⁻) (van Hasselt et al., 2016, Eq 4).
-/// - Either of them with mirror symmetry: evaluate = Q(σs', σ·; θ⁻), where σ is the mirror. The
-///   true values are equal, and their errors nearly independent, as in Double Q-learning (van
-///   Hasselt, 2010).
 ///
 /// All Q-values are (B × A), reward and discount (B). The discount is γⁿ, or 0 after a termination.
 void TdTargets(Matrix<const float> select, Matrix<const float> evaluate,
@@ -41,6 +38,11 @@ class Dqn : public OffPolicyAgent {
   Dqn(const DqnConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool);
 
   void Act(Matrix<const float> obs, Matrix<double> action) override;
+  void Observe(const StepResult& result) override;
+  void Learn() override;
+  /// Makes one gradient step on the given minibatch and adds it to the metrics.
+  void Update(const Minibatch& batch);
+
   Metrics TakeMetrics() override;
   std::unique_ptr<Policy> ExportPolicy(PolicyInfo info) const override;
   void State(const Archive& archive) override;
@@ -48,24 +50,28 @@ class Dqn : public OffPolicyAgent {
   std::span<const float> online() const { return online_.theta(); }
   std::span<const float> target() const { return theta_target_; }
   double epsilon() const;
-  void Update(const Minibatch& batch) override;
 
  private:
   /// Computes the TD errors of some rows of a minibatch and backpropagates them to the activations.
   void BackwardRows(const Minibatch& batch, RowRange rows);
-  /// Computes Q(σs, σ·; θ⁻) (B × A) for some rows. Reversing the columns mirrors the torques,
-  /// because they ascend and are symmetric about 0.
+  /// Adds the minibatch of the last BackwardRows to the metrics.
+  void CountMinibatch(const Minibatch& batch);
+
+  // What the post does not have, in dqn_extensions.cc.
+  /// Computes Q(σs, σ·; θ⁻) (B × A) for some rows of s (B × D), where σ is the mirror. The true
+  /// values equal Q(s, ·), and the errors are nearly independent, as in Double Q-learning (van
+  /// Hasselt, 2010).
   void ForwardMirrored(Matrix<const float> s, RowRange rows, Matrix<float> q);
-  /// Adds `shift` to the values of all three sets of parameters.
-  void ShiftValues(float shift);
+  /// Reward centering: shifts the values of all three sets of parameters; see CenteringShift.
+  void CenterValues(const Minibatch& batch);
   /// Moves theta_policy_ towards θ by Polyak averaging.
   void AveragePolicy();
 
   DqnConfig config_;
   int D_, B_;
-  std::vector<double> torques_;  // (A)
+  std::vector<double> torques_;  // (A) N·m
 
-  TrainedNetwork online_;
+  TrainedNetwork online_;                             // θ, its gradient and Adam
   AlignedVector<float> theta_target_, theta_policy_;  // θ⁻; evaluated average of θ (policy_tau)
   // Buffers of an update, B rows.
   AlignedVector<float> q_, q_select_, q_target_, dq_;  // (B × A)

@@ -17,30 +17,27 @@ NStep::NStep(int num_envs, int n, double gamma, int obs_size, ActionSpace action
       action_(count_.size() * n_ * action_size_),
       reward_(count_.size() * n_) {}
 
-void NStep::Push(int env, std::span<const float> obs, std::span<const float> action, double reward,
-                 std::span<const float> next_obs, bool terminated, bool truncated,
-                 const std::function<void(const Transition&)>& emit) {
+void NStep::Push(int env, const Transition& step, bool done, Replay& replay) {
   const auto e = static_cast<size_t>(env);
   const auto waiting_obs = std::span(obs_).subspan(e * n_ * obs_size_, n_ * obs_size_);
   const auto waiting_action = std::span(action_).subspan(e * n_ * action_size_, n_ * action_size_);
   const auto waiting_reward = std::span(reward_).subspan(e * n_, n_);
 
   const auto last = static_cast<size_t>(count_[e]++);
-  std::ranges::copy(obs, waiting_obs.begin() + static_cast<ptrdiff_t>(last * obs_size_));
-  std::ranges::copy(action, waiting_action.begin() + static_cast<ptrdiff_t>(last * action_size_));
-  waiting_reward[last] = reward;
+  std::ranges::copy(step.obs, waiting_obs.begin() + static_cast<ptrdiff_t>(last * obs_size_));
+  std::ranges::copy(step.action,
+                    waiting_action.begin() + static_cast<ptrdiff_t>(last * action_size_));
+  waiting_reward[last] = step.reward;
 
-  // A full window emits its oldest step. The end of an episode emits all waiting steps.
-  const bool done = terminated || truncated;
+  // A full window adds its oldest step. The end of an episode adds all waiting steps.
   auto k = static_cast<size_t>(count_[e]);
   size_t first = 0;
   for (; k == n_ || (done && k > 0); --k, ++first) {
     double sum = 0;
     for (size_t i = k; i-- > 0;) sum = waiting_reward[first + i] + gamma_ * sum;
-    const double discount = terminated ? 0.0 : std::pow(gamma_, static_cast<double>(k));
-    emit({waiting_obs.subspan(first * obs_size_, obs_size_), next_obs,
-          waiting_action.subspan(first * action_size_, action_size_), static_cast<float>(sum),
-          static_cast<float>(discount)});
+    const double discount = step.discount == 0 ? 0.0 : std::pow(gamma_, static_cast<double>(k));
+    replay.Add({waiting_obs.subspan(first * obs_size_, obs_size_), step.next_obs,
+                waiting_action.subspan(first * action_size_, action_size_), sum, discount});
   }
 
   // Move the steps that still wait to the front.

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <functional>
-#include <span>
 #include <vector>
 
 #include "base/archive.h"
@@ -16,10 +14,9 @@ class NStep {
  public:
   NStep(int num_envs, int n, double gamma, int obs_size, ActionSpace actions);
 
-  /// Adds one step of environment `env` and calls `emit` for every transition that is now complete.
-  void Push(int env, std::span<const float> obs, std::span<const float> action, double reward,
-            std::span<const float> next_obs, bool terminated, bool truncated,
-            const std::function<void(const Transition&)>& emit);
+  /// Adds one step of environment `env`, whose discount is γ, or 0 after a termination. Adds every
+  /// transition that is now complete to `replay`. `done` ends the episode.
+  void Push(int env, const Transition& step, bool done, Replay& replay);
 
   /// Number of steps, over all environments, that are not yet part of a transition.
   int64_t waiting() const;

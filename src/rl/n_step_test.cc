@@ -9,23 +9,29 @@ namespace {
 
 const ActionSpace kNine = ActionSpace::Discrete(9);
 
-/// A copy of an emitted transition.
+/// A copy of a transition.
 struct Emitted {
   float obs, next_obs;
   float action;
-  float reward, discount;
+  double reward, discount;
   bool operator==(const Emitted&) const = default;
 };
 
 /// Pushes step i of an environment: observation 10·env + i, action i, reward 2^i, next i + 1.
+/// `gamma` is the discount of a step.
 void PushStep(NStep& n_step, int env, int i, bool terminated, bool truncated,
-              std::vector<Emitted>& out) {
+              std::vector<Emitted>& out, double gamma = 0.5) {
   const float obs = static_cast<float>(10 * env + i);
   const float next = obs + 1, action = static_cast<float>(i);
-  n_step.Push(env, std::span(&obs, 1), std::span(&action, 1), static_cast<double>(1 << i),
-              std::span(&next, 1), terminated, truncated, [&](const Transition& t) {
-                out.push_back({t.obs[0], t.next_obs[0], t.action[0], t.reward, t.discount});
-              });
+  Replay replay(10, 1, kNine);
+  n_step.Push(env,
+              {std::span(&obs, 1), std::span(&next, 1), std::span(&action, 1),
+               static_cast<double>(1 << i), terminated ? 0 : gamma},
+              terminated || truncated, replay);
+  for (int64_t k = 0; k < replay.size(); ++k) {
+    const Transition t = replay.at(k);
+    out.push_back({t.obs[0], t.next_obs[0], t.action[0], t.reward, t.discount});
+  }
 }
 
 TEST(NStep, OneStepPassesThrough) {
@@ -34,7 +40,7 @@ TEST(NStep, OneStepPassesThrough) {
   PushStep(n_step, 0, 0, false, false, out);
   PushStep(n_step, 0, 1, false, true, out);
   PushStep(n_step, 0, 2, true, false, out);
-  EXPECT_EQ(out, (std::vector<Emitted>{{0, 1, 0, 1, 0.5F}, {1, 2, 1, 2, 0.5F}, {2, 3, 2, 4, 0}}));
+  EXPECT_EQ(out, (std::vector<Emitted>{{0, 1, 0, 1, 0.5}, {1, 2, 1, 2, 0.5}, {2, 3, 2, 4, 0}}));
 }
 
 TEST(NStep, ThreeStepsAndTheShorterRestAtATruncation) {
@@ -44,12 +50,11 @@ TEST(NStep, ThreeStepsAndTheShorterRestAtATruncation) {
   NStep n_step(1, 3, 0.5, 1, kNine);
   std::vector<Emitted> out;
   for (int i = 0; i < 3; ++i) PushStep(n_step, 0, i, false, false, out);
-  EXPECT_EQ(out, (std::vector<Emitted>{{0, 3, 0, 3, 0.125F}}));
+  EXPECT_EQ(out, (std::vector<Emitted>{{0, 3, 0, 3, 0.125}}));
   PushStep(n_step, 0, 3, false, true, out);
-  EXPECT_EQ(
-      out,
-      (std::vector<Emitted>{
-          {0, 3, 0, 3, 0.125F}, {1, 4, 1, 6, 0.125F}, {2, 4, 2, 8, 0.25F}, {3, 4, 3, 8, 0.5F}}));
+  EXPECT_EQ(out,
+            (std::vector<Emitted>{
+                {0, 3, 0, 3, 0.125}, {1, 4, 1, 6, 0.125}, {2, 4, 2, 8, 0.25}, {3, 4, 3, 8, 0.5}}));
 }
 
 TEST(NStep, ATerminationBootstrapsFromNothing) {
@@ -71,18 +76,18 @@ TEST(NStep, EpisodesAndEnvironmentsDoNotMix) {
   PushStep(n_step, 0, 2, false, false, out);  // a new episode waits for its second step
   EXPECT_EQ(out.size(), 2U);
   PushStep(n_step, 1, 1, false, false, out);
-  EXPECT_EQ(out.back(), (Emitted{10, 12, 0, 2, 0.25F}));
+  EXPECT_EQ(out.back(), (Emitted{10, 12, 0, 2, 0.25}));
 }
 
 TEST(NStep, LoadedStateContinuesAsTheSavedOne) {
   NStep saved(2, 3, 0.9, 1, kNine), loaded(2, 3, 0.9, 1, kNine);
   std::vector<Emitted> a, b;
-  for (int i = 0; i < 4; ++i) PushStep(saved, i % 2, i, false, false, a);
+  for (int i = 0; i < 4; ++i) PushStep(saved, i % 2, i, false, false, a, 0.9);
   SaveAndLoad([&](const Archive& archive) { saved.State(archive); },
               [&](const Archive& archive) { loaded.State(archive); });
   a.clear();
-  PushStep(saved, 1, 5, false, true, a);
-  PushStep(loaded, 1, 5, false, true, b);
+  PushStep(saved, 1, 5, false, true, a, 0.9);
+  PushStep(loaded, 1, 5, false, true, b, 0.9);
   EXPECT_EQ(a, b);
   EXPECT_EQ(a.size(), 3U);
 }

@@ -13,20 +13,18 @@ namespace upswing {
 OffPolicyAgent::OffPolicyAgent(const OffPolicyConfig& config, const EnvSpec& spec,
                                const ActionSpace& actions, uint64_t seed, ThreadPool& pool)
     : pool_(pool),
+      update_threads_(&pool),
       explore_rng_(seed, "exploration"),
+      act_obs_(static_cast<size_t>(spec.num_envs) * spec.obs_size),
       act_action_(static_cast<size_t>(spec.num_envs) * actions.size),
       mirror_signs_(spec.mirror_signs),
       td_error_(config.batch),
       settings_(config),
-      update_threads_(&pool),
-      obs_size_(spec.obs_size),
-      action_size_(actions.size),
       action_space_(actions),
       sample_rng_(seed, "replay sampling"),
       replay_(config.replay, spec.obs_size, actions, config.prioritized),
       n_step_(spec.num_envs, static_cast<int>(config.n_step), config.gamma, spec.obs_size, actions),
-      batch_(static_cast<int>(config.batch), spec.obs_size, actions.size),
-      act_obs_(static_cast<size_t>(spec.num_envs) * obs_size_) {
+      batch_(static_cast<int>(config.batch), spec.obs_size, actions.size) {
   if (config.mirror && mirror_signs_.empty()) {
     throw BadInput(Concat("mirror: expected a task with mirror symmetry, got ", spec.task));
   }
@@ -46,26 +44,10 @@ double OffPolicyAgent::AveragingTau(double tau) const {
   return initial > 0 ? std::min(tau, tau * learning_rate() / initial) : tau;
 }
 
-void OffPolicyAgent::Remember(Matrix<const float> obs) {
-  std::ranges::copy(obs.values(), act_obs_.begin());
-}
-
-double OffPolicyAgent::RewardOf(const StepResult& result, size_t env) {
-  return settings_.reward_scale * result.reward[env];
-}
-
-void OffPolicyAgent::Observe(const StepResult& result) {
-  const size_t D = obs_size_, A = action_size_;
-  const size_t envs = result.reward.size();
-  for (size_t env = 0; env < envs; ++env) {
-    ExpectFinite(result, env);
-    n_step_.Push(static_cast<int>(env), std::span(act_obs_).subspan(env * D, D),
-                 std::span(act_action_).subspan(env * A, A), RewardOf(result, env),
-                 std::span(result.next_obs).subspan(env * D, D), result.terminated[env] != 0,
-                 result.truncated[env] != 0, [&](const Transition& t) { replay_.Add(t); });
-    if (result.done(env)) ++episodes_;
-  }
-  steps_ += static_cast<int64_t>(envs);
+void OffPolicyAgent::Store(int env, const Transition& step, bool done) {
+  n_step_.Push(env, step, done, replay_);
+  ++steps_;
+  if (done) ++episodes_;
 }
 
 int64_t OffPolicyAgent::updates_due() const {
@@ -74,23 +56,18 @@ int64_t OffPolicyAgent::updates_due() const {
   return static_cast<int64_t>(static_cast<double>(learning_steps) * settings_.updates_per_step);
 }
 
-void OffPolicyAgent::Learn() {
-  while (updates_ < updates_due()) {
-    update_threads_.Run([&] {
-      SampleBatch();
-      Update(batch_);
-    });
-    if (settings_.prioritized) replay_.Prioritize(batch_, td_error_, settings_.priority_exponent);
-  }
-}
-
-void OffPolicyAgent::SampleBatch() {
+const Minibatch& OffPolicyAgent::Sample() {
   if (settings_.prioritized) {
     replay_.SamplePrioritized(sample_rng_, importance_exponent(), pool_, batch_);
   } else {
     replay_.Sample(sample_rng_, batch_);
   }
   if (settings_.mirror) MirrorHalf(sample_rng_, mirror_signs_, action_space_, batch_);
+  return batch_;
+}
+
+void OffPolicyAgent::UpdatePriorities() {
+  if (settings_.prioritized) replay_.Prioritize(batch_, td_error_, settings_.priority_exponent);
 }
 
 float OffPolicyAgent::CenteringShift(const Minibatch& batch, double errors) const {

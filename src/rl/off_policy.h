@@ -12,14 +12,12 @@
 
 namespace upswing {
 
-/// An agent that learns from a replay memory: the common part of DQN and SAC. A derived agent acts
-/// and makes a gradient step from a minibatch.
+/// An agent that learns from a replay memory: the common part of DQN and SAC. A derived agent acts,
+/// observes and learns with these parts.
 ///
 /// Letters: N environments, D observation size, A numbers of an action, B batch size.
 class OffPolicyAgent : public Agent {
  public:
-  void Observe(const StepResult& result) override;
-  void Learn() override;
   int64_t steps() const override { return steps_; }
   int64_t updates() const override { return updates_; }
 
@@ -27,19 +25,22 @@ class OffPolicyAgent : public Agent {
   double learning_rate() const;
   /// β of prioritised replay. It rises to 1 over learning_rate_steps (Schaul et al., 2016).
   double importance_exponent() const;
-  /// Makes one gradient step on the given minibatch and adds it to the metrics. Sets td_error_ and
-  /// increments updates_.
-  virtual void Update(const Minibatch& batch) = 0;
 
  protected:
   /// Throws BadInput if the config mirrors minibatches but the task has no mirror symmetry.
   OffPolicyAgent(const OffPolicyConfig& config, const EnvSpec& spec, const ActionSpace& actions,
                  uint64_t seed, ThreadPool& pool);
 
-  /// The reward of environment `env` for learning: the step's reward times reward_scale.
-  virtual double RewardOf(const StepResult& result, size_t env);
-  /// Keeps the observations (N × D) for which the agent is about to act.
-  void Remember(Matrix<const float> obs);
+  /// Adds a step of environment `env` to the replay memory, joined with the steps that follow if
+  /// n_step is above 1. The step's discount is γ, or 0 after a termination. `done` ends the
+  /// episode.
+  void Store(int env, const Transition& step, bool done);
+  /// Whether an update is due: updates_per_step for each step after learning_starts.
+  bool UpdateIsDue() const { return updates_ < updates_due(); }
+  /// Draws a minibatch: uniformly, or by priority if prioritized. Mirrors half of it if `mirror`.
+  const Minibatch& Sample();
+  /// Sets the priorities of the last Sample from td_error_, if prioritized.
+  void UpdatePriorities();
   /// Polyak rate of the evaluated policy: `tau` times the ratio of the current to the initial
   /// learning rate. As learning slows, the average covers more updates (Polyak and Juditsky, 1992).
   double AveragingTau(double tau) const;
@@ -60,27 +61,24 @@ class OffPolicyAgent : public Agent {
   void SharedState(const Archive& archive);
 
   ThreadPool& pool_;
+  ThreadTuner update_threads_;
   Rng explore_rng_;
-  std::vector<float> act_action_;    // (N × A) of the last Act
+  std::vector<float> act_obs_;       // (N × D) s of the last Act
+  std::vector<float> act_action_;    // (N × A) a of the last Act
   std::vector<float> mirror_signs_;  // (D) signs of the observations; empty: no mirror symmetry
-  std::vector<float> td_error_;      // (B) of the last Update: Q(s, a) - y, or its size
+  std::vector<float> td_error_;      // (B) of the last update: Q(s, a) - y, or its size
   int64_t steps_ = 0, episodes_ = 0, updates_ = 0;
   double norm_sum_ = 0;  // sum of the gradients' norms since TakeMeans
 
  private:
   int64_t updates_due() const;
-  /// Draws a minibatch from the replay memory.
-  void SampleBatch();
 
   OffPolicyConfig settings_;
-  ThreadTuner update_threads_;
-  size_t obs_size_, action_size_;
   ActionSpace action_space_;
   Rng sample_rng_;
   Replay replay_;
   NStep n_step_;
   Minibatch batch_;
-  std::vector<float> act_obs_;                    // (N × D) of the last Act
   double loss_sum_ = 0, q_sum_ = 0, td_sum_ = 0;  // sums since TakeMeans
   int64_t report_updates_ = 0;
 };

@@ -7,36 +7,22 @@
 
 #include "base/aligned.h"
 #include "base/archive.h"
-#include "base/matrix.h"
 #include "base/rng.h"
 #include "base/thread_pool.h"
 #include "nn/layer.h"
+#include "rl/action_space.h"
 #include "rl/sum_tree.h"
 
+/// Replay memory (Lin, 1992). Letters: B batch size, D observation size, A numbers of an action.
 namespace upswing {
 
-/// Description of an agent's actions: `size` numbers within bounds. A discrete action is one
-/// number, the index of the action.
-struct ActionSpace {
-  int size = 1;  // A
-  Bounds<float> bounds{-1, 1};
-  bool whole = false;  // whether only integers are allowed
-
-  /// The discrete actions 0 … count - 1.
-  static ActionSpace Discrete(size_t count) {
-    return {1, {0, static_cast<float>(count - 1)}, true};
-  }
-  /// Throws BadInput about the tensor `name` unless all `actions` (… × A) are in this space.
-  void Check(const Archive& archive, std::string_view name, std::span<const float> actions) const;
-};
-
-/// A transition over one or more steps. Its target is y = reward + discount · V(next_obs).
+/// A transition (s, a, r, s'), over one or more steps. Its target is y = r + discount · V(s').
 struct Transition {
-  std::span<const float> obs;       // (D)
-  std::span<const float> next_obs;  // (D)
-  std::span<const float> action;    // (A)
-  float reward = 0;                 // Σ γᵏ r over the steps
-  float discount = 0;               // γ to the number of steps; 0 if the last step terminated
+  std::span<const float> obs;       // (D) s
+  std::span<const float> next_obs;  // (D) s'
+  std::span<const float> action;    // (A) a; of a discrete agent its index
+  double reward = 0;                // r, or Σ γᵏ r over n steps
+  double discount = 0;              // γ, or γⁿ over n steps; 0 if s' is terminal
 };
 
 /// A minibatch: row i of each array belongs to one transition.
@@ -51,42 +37,32 @@ struct Minibatch {
   int size() const { return static_cast<int>(reward.size()); }  // B
 };
 
-/// Mirrors a random half of a minibatch. Observations are multiplied by `signs` (D). An action is
-/// reflected at the middle of its bounds, so that its torque changes sign.
-void MirrorHalf(Rng& rng, std::span<const float> signs, const ActionSpace& actions,
-                Minibatch& batch);
-
-/// Replay memory of the newest `capacity` transitions (Lin, 1992). A row of 2 D + A + 2 floats
-/// holds a whole transition, so that sampling it touches one place in memory. A million transitions
-/// with D = 8 and A = 1 take 76 MB. Memory is allocated as it fills.
-///
-/// Sampling is uniform, or by priorities (proportional prioritisation; Schaul et al., 2016).
+/// The newest `capacity` transitions. A row of 2 D + A + 2 floats holds a whole transition, so that
+/// sampling it touches one place in memory. Memory is allocated as it fills.
 class Replay {
  public:
   Replay(int64_t capacity, int obs_size, ActionSpace actions, bool prioritized = false);
 
   int64_t size() const { return static_cast<int64_t>(rows_.size() / row_size()); }
   int64_t capacity() const { return capacity_; }
+  /// The transition at a place below size().
+  Transition at(int64_t index) const;
 
   /// Adds a transition. A full memory drops its oldest transition.
   void Add(const Transition& transition);
-
   /// Fills the minibatch with transitions drawn uniformly, with replacement. Needs size() > 0.
   void Sample(Rng& rng, Minibatch& batch) const;
 
+  // Prioritised replay, in replay_extensions.cc.
   /// Draws transition i with P(i) = p_i / Σ p, one from each of B equal parts of the sum. Its
   /// weight is (N · P(i))^-β with N = size(), divided by the largest such weight in the minibatch
-  /// (Section 3.4). `beta` is β.
+  /// (Schaul et al., 2016, Section 3.4). `beta` is β.
   void SamplePrioritized(Rng& rng, double beta, ThreadPool& pool, Minibatch& batch) const;
-
   /// Sets the priorities of the minibatch's transitions to p = (|TD error| + 1e-6)^α, the paper's
   /// p^α (Section 3.3); `alpha` is α. A new transition gets the largest priority so far.
   void Prioritize(const Minibatch& batch, std::span<const float> td_error, double alpha);
-  /// Priority p of the transition at a place below size(). Only for prioritised replay.
+  /// Priority p of the transition at a place below size().
   double priority(int64_t index) const { return priorities_->at(index); }
-
-  /// The transition at a place below size().
-  Transition at(int64_t index) const;
 
   /// Saves or loads the memory.
   void State(const Archive& archive);
@@ -98,12 +74,17 @@ class Replay {
   void Gather(RowRange rows, Minibatch& batch) const;
 
   int64_t capacity_;
-  size_t obs_size_;
+  size_t obs_size_;  // D
   ActionSpace actions_;
   int64_t next_ = 0;         // place of the next transition
-  std::vector<float> rows_;  // (size × row_size): obs, next_obs, action, reward, discount
+  std::vector<float> rows_;  // (size × row_size) s, s', a, r, discount
   std::optional<SumTree> priorities_;
   double largest_priority_ = 1;  // largest priority so far
 };
+
+/// Mirrors a random half of a minibatch. Observations are multiplied by `signs` (D). An action is
+/// reflected at the middle of its bounds, so that its torque changes sign.
+void MirrorHalf(Rng& rng, std::span<const float> signs, const ActionSpace& actions,
+                Minibatch& batch);
 
 }  // namespace upswing

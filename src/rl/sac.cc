@@ -56,7 +56,7 @@ void Sac::Act(Matrix<const float> obs, Matrix<double> action) {
   ForSlices(pool_, obs.rows(), [&](RowRange rows) {
     actor_.network().Forward(actor_.theta(), obs, rows, act_activations_, outputs);
   });
-  Remember(obs);
+  std::ranges::copy(obs.values(), act_obs_.begin());
   const bool random = steps_ < config_.learning_starts;
   for (int env = 0; env < obs.rows(); ++env) {
     for (int k = 0; k < A_; ++k) {
@@ -71,17 +71,36 @@ void Sac::Act(Matrix<const float> obs, Matrix<double> action) {
   }
 }
 
-double Sac::RewardOf(const StepResult& result, size_t env) {
-  double reward = OffPolicyAgent::RewardOf(result, env);
-  if (config_.smoothness == 0) return reward;
+double Sac::RoughnessOf(const StepResult& result, size_t env) {
+  double roughness = 0;
   const auto A = static_cast<size_t>(A_);
   for (size_t i = env * A; i < (env + 1) * A; ++i) {
     const double change = double{mean_[i]} - last_mean_[i];
-    if (begins_[env] == 0) reward -= config_.smoothness * change * change;
+    if (begins_[env] == 0) roughness += config_.smoothness * change * change;
     last_mean_[i] = mean_[i];
   }
   begins_[env] = result.done(env) ? 1 : 0;
-  return reward;
+  return roughness;
+}
+
+void Sac::Observe(const StepResult& result) {
+  const int N = static_cast<int>(begins_.size());
+  const Matrix<const float> s(act_obs_.data(), N, D_), s_next(result.next_obs.data(), N, D_);
+  const Matrix<const float> a(act_action_.data(), N, A_);
+  for (int env = 0; env < N; ++env) {
+    ExpectFinite(result, env);
+    double r = config_.reward_scale * result.reward[env];
+    if (config_.smoothness > 0) r -= RoughnessOf(result, env);
+    const double discount = result.terminated[env] != 0 ? 0 : config_.gamma;
+    Store(env, {s.row(env), s_next.row(env), a.row(env), r, discount}, result.done(env));
+  }
+}
+
+void Sac::Learn() {
+  while (UpdateIsDue()) {
+    update_threads_.Run([&] { Update(Sample()); });
+    UpdatePriorities();
+  }
 }
 
 Metrics Sac::TakeMetrics() {

@@ -45,6 +45,8 @@ class Sac : public OffPolicyAgent {
   Sac(const SacConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool);
 
   void Act(Matrix<const float> obs, Matrix<double> action) override;
+  void Observe(const StepResult& result) override;
+  void Learn() override;
   Metrics TakeMetrics() override;
   std::unique_ptr<Policy> ExportPolicy(PolicyInfo info) const override;
   void State(const Archive& archive) override;
@@ -54,7 +56,7 @@ class Sac : public OffPolicyAgent {
   std::span<const float> critic(size_t i) const { return critics_.at(i).network.theta(); }
   /// Makes one update on the given minibatch: a step of the critics, and every actor_period updates
   /// a step of actor and temperature.
-  void Update(const Minibatch& batch) override;
+  void Update(const Minibatch& batch);
 
  private:
   struct Critic {
@@ -70,8 +72,9 @@ class Sac : public OffPolicyAgent {
     AlignedVector<float> mean, log_std, epsilon, deviation, action, log_prob;
   };
 
-  /// The reward for learning, minus the penalty on changes of the mean action (smoothness).
-  double RewardOf(const StepResult& result, size_t env) override;
+  /// Penalty on the change of the mean action of environment `env` (smoothness), in units of the
+  /// reward for learning.
+  double RoughnessOf(const StepResult& result, size_t env);
   /// Samples a ~ π(s) for some rows. Writes samples_, log_prob_ and the rows (s, a) of `inputs` (B
   /// × (D + A)).
   void SampleRows(Matrix<const float> obs, RowRange rows, Matrix<float> inputs);
