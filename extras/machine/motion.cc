@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pendulum/runge_kutta.h"
+
 namespace upswing {
 namespace {
 
@@ -97,19 +99,10 @@ int MotionSteps(double seconds) {
 PendulumState StepMotion(const Manipulator& body, const Drive& drive, const PendulumState& now,
                          double time, double h, int& cursor, Joints& acceleration) {
   const Joints u1 = drive.At(time + h / 2, cursor), u2 = drive.At(time + h, cursor);
-  const Joints& k1 = acceleration;
-  const auto& [q1, q2, w1, w2] = now;
-  const PendulumState b{q1 + h / 2 * w1, q2 + h / 2 * w2, w1 + h / 2 * k1[0], w2 + h / 2 * k1[1]};
-  const Joints k2 = body.Acceleration(b, u1);
-  const PendulumState c{q1 + h / 2 * b.w1, q2 + h / 2 * b.w2, w1 + h / 2 * k2[0],
-                        w2 + h / 2 * k2[1]};
-  const Joints k3 = body.Acceleration(c, u1);
-  const PendulumState d{q1 + h * c.w1, q2 + h * c.w2, w1 + h * k3[0], w2 + h * k3[1]};
-  const Joints k4 = body.Acceleration(d, u2);
-  const PendulumState next{q1 + h / 6 * (w1 + 2 * b.w1 + 2 * c.w1 + d.w1),
-                           q2 + h / 6 * (w2 + 2 * b.w2 + 2 * c.w2 + d.w2),
-                           w1 + h / 6 * (k1[0] + 2 * k2[0] + 2 * k3[0] + k4[0]),
-                           w2 + h / 6 * (k1[1] + 2 * k2[1] + 2 * k3[1] + k4[1])};
+  const PendulumState next =
+      RungeKuttaStep(now, acceleration, h, [&](const PendulumState& s, double share) {
+        return body.Acceleration(s, share < 1 ? u1 : u2);
+      });
   acceleration = body.Acceleration(next, u2);
   return next;
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "pendulum/equations.h"
+#include "pendulum/runge_kutta.h"
 
 namespace upswing {
 namespace {
@@ -37,12 +38,6 @@ struct Forces {
   }
 };
 
-/// The state after h seconds with these velocities and accelerations.
-PendulumState Plus(const PendulumState& s, double h, const std::array<double, 2>& w,
-                   const std::array<double, 2>& a) {
-  return {s.q1 + h * w[0], s.q2 + h * w[1], s.w1 + h * a[0], s.w2 + h * a[1]};
-}
-
 }  // namespace
 
 PendulumState Step(const Plant& plant, const PendulumState& s, double tau, const Push& push) {
@@ -52,22 +47,10 @@ PendulumState Step(const Plant& plant, const PendulumState& s, double tau, const
     const double length = push.link == 1 ? plant.length1 : plant.length2;
     forces.moment = Arm(AngleOf(s, push.link), push.along - length / 2).Torque(push);
   }
-  const auto acceleration = [&](const PendulumState& at) {
+  const auto acceleration = [&](const PendulumState& at, double /*share*/) {
     return manipulator.Acceleration(at, forces.At(at));
   };
-  constexpr double h = kPhysicsTimestep;
-  const auto a1 = acceleration(s);
-  const PendulumState s2 = Plus(s, h / 2, {s.w1, s.w2}, a1);
-  const auto a2 = acceleration(s2);
-  const PendulumState s3 = Plus(s, h / 2, {s2.w1, s2.w2}, a2);
-  const auto a3 = acceleration(s3);
-  const PendulumState s4 = Plus(s, h, {s3.w1, s3.w2}, a3);
-  const auto a4 = acceleration(s4);
-  const auto mean = [](double k1, double k2, double k3, double k4) {
-    return (k1 + 2 * k2 + 2 * k3 + k4) / 6;
-  };
-  return Plus(s, h, {mean(s.w1, s2.w1, s3.w1, s4.w1), mean(s.w2, s2.w2, s3.w2, s4.w2)},
-              {mean(a1[0], a2[0], a3[0], a4[0]), mean(a1[1], a2[1], a3[1], a4[1])});
+  return RungeKuttaStep(s, acceleration(s, 0), kPhysicsTimestep, acceleration);
 }
 
 }  // namespace upswing
