@@ -16,6 +16,19 @@
 
 using namespace upswing;
 
+/// Evaluates policies on rods of their own.
+class RodEvaluator : public Evaluator {
+ public:
+  explicit RodEvaluator(int rods) : rods_(rods) {}
+  Evaluation Evaluate(const Policy& policy, int64_t step) override {
+    PendulumV1 rods(rods_, /*seed=*/1000 + uint64_t(step));
+    return upswing::Evaluate(policy, rods);
+  }
+
+ private:
+  int rods_;
+};
+
 /// Prints a line for each evaluation.
 class Printer : public TrainObserver {
   void OnEvaluation(const TrainState& s, const Evaluation& e) override {
@@ -57,11 +70,8 @@ int main(int argc, char** argv) try {
   PendulumV1 env(int(train.envs), uint64_t(train.seed));
   const auto agent = learner.Make(env.spec(), uint64_t(train.seed), pool);
   Printer printer;
-  const auto evaluate = [&](const Policy& policy, int64_t step) {
-    PendulumV1 rods(int(train.eval_episodes), /*seed=*/1000 + uint64_t(step));
-    return Evaluate(policy, rods);
-  };
-  Trainer trainer({train, evaluate}, *agent, env);
+  RodEvaluator evaluator(int(train.eval_episodes));
+  Trainer trainer(train, *agent, env, evaluator);
   trainer.AddObserver(printer);
   while (trainer.Step()) continue;
   std::printf("%s\n", trainer.state().solved ? "solved" : "not solved");

@@ -1,11 +1,13 @@
 #include "agents/training.h"
 
+#include <optional>
 #include <utility>
 
 #include "agents/config_checks.h"
 #include "agents/loaded_policy.h"
 #include "base/error.h"
 #include "base/text.h"
+#include "nn/network_policy.h"
 
 namespace upswing {
 namespace {
@@ -28,6 +30,43 @@ std::unique_ptr<VectorEnv> MakeTrainingEnv(const Config& config, const Host& hos
   return MakeEnv(env);
 }
 
+/// Evaluates policies from new start states with the reward's standard weights, with the
+/// disturbances of the training. Plants are the training plant, or a new random plant per episode
+/// if training randomizes plants.
+class TrainingEvaluator : public Evaluator {
+ public:
+  /// The settings and the pool must outlive the evaluator.
+  TrainingEvaluator(const Config& config, const Host& host, ThreadPool& pool)
+      : config_(config), make_foreign_(host.make_foreign), pool_(pool) {
+    const bool screened = config.eval_physics == kScreened;
+    engine_ = &FindEngine(host.engines, screened ? kMuJoCoName : config.eval_physics.c_str(),
+                          "--eval-physics");
+  }
+
+  Evaluation Evaluate(const Policy& policy, int64_t step) override {
+    return EvaluateIn(IsScreened(config_) ? kClosedForm : *engine_, policy, step);
+  }
+  std::optional<Evaluation> Confirm(const Policy& policy, int64_t step) override {
+    if (!IsScreened(config_)) return std::nullopt;
+    return EvaluateIn(*engine_, policy, step);
+  }
+
+ private:
+  Evaluation EvaluateIn(const Engine& engine, const Policy& policy, int64_t step) const {
+    EnvConfig config = EvaluationEnvironments(config_, step);
+    config.pool = &pool_;
+    config.engine = &engine;
+    config.make_foreign = make_foreign_;
+    const std::unique_ptr<VectorEnv> env = MakeEnv(config);
+    return upswing::Evaluate(policy, *env, &pool_);
+  }
+
+  const Config& config_;
+  ForeignMaker make_foreign_;
+  ThreadPool& pool_;
+  const Engine* engine_;  // of Evaluate, or of Confirm if evaluations are screened
+};
+
 }  // namespace
 
 bool IsScreened(const Config& config) {
@@ -47,42 +86,16 @@ EnvConfig EvaluationEnvironments(const Config& config, int64_t step) {
 
 Training::Training(Config config, const Host& host)
     : config_(Checked(std::move(config), host)),
-      make_foreign_(host.make_foreign),
       pool_(host.threads, config_.train.threads == 0),
       env_(MakeTrainingEnv(config_, host, pool_)),
       agent_(config_.MakeAgent(env_->spec(), pool_)),
-      trainer_(MakeSetup(host.engines), *agent_, *env_) {}
-
-TrainSetup Training::MakeSetup(const Engines& engines) {
-  const auto judge_in = [this](const Engine& engine) {
-    return [this, &engine](const Policy& policy, int64_t step) {
-      return Evaluate(engine, policy, step);
-    };
-  };
-  const std::string_view name =
-      config_.eval_physics == kScreened ? kMuJoCoName : std::string_view(config_.eval_physics);
-  const auto judge = judge_in(FindEngine(engines, name, "--eval-physics"));
-  TrainSetup setup{.config = config_.train, .evaluate = judge, .policy_info = InfoOf(config_)};
-  if (IsScreened(config_)) {
-    setup.evaluate = judge_in(kClosedForm);
-    setup.confirm = judge;
-  }
-  return setup;
-}
+      evaluator_(std::make_unique<TrainingEvaluator>(config_, host, pool_)),
+      trainer_(config_.train, *agent_, *env_, *evaluator_, InfoOf(config_)) {}
 
 std::unique_ptr<Policy> Training::policy() const {
   PolicyInfo info = InfoOf(config_);
   info.step = state().steps;
   return agent_->ExportPolicy(std::move(info));
-}
-
-Evaluation Training::Evaluate(const Engine& engine, const Policy& policy, int64_t step) {
-  EnvConfig config = EvaluationEnvironments(config_, step);
-  config.pool = &pool_;
-  config.engine = &engine;
-  config.make_foreign = make_foreign_;
-  const std::unique_ptr<VectorEnv> env = MakeEnv(config);
-  return upswing::Evaluate(policy, *env, &pool_);
 }
 
 Tensors Training::Checkpoint() {

@@ -61,17 +61,11 @@ class Training {
   void Load(const Tensors& checkpoint);
 
  private:
-  TrainSetup MakeSetup(const Engines& engines);
-  /// Evaluates a policy from new start states with the reward's standard weights, with the
-  /// disturbances of the training. Plants are the training plant, or a new random plant per episode
-  /// if training randomizes plants.
-  Evaluation Evaluate(const Engine& engine, const Policy& policy, int64_t step);
-
   Config config_;
-  ForeignMaker make_foreign_;
   ThreadPool pool_;
   std::unique_ptr<VectorEnv> env_;
   std::unique_ptr<Agent> agent_;
+  std::unique_ptr<Evaluator> evaluator_;
   Trainer trainer_;
 };
 

@@ -70,6 +70,11 @@ class NetworkPolicy : public Policy {
   int obs_size() const override { return parts_.shape.inputs; }
   int action_size() const override { return parts_.action_size(); }
   const PolicyInfo& info() const override { return info_; }
+  /// Adds the results of its evaluation to the description.
+  void SetResult(double success_rate, double mean_return) {
+    info_.success_rate = success_rate;
+    info_.mean_return = mean_return;
+  }
   size_t num_parameters() const override { return parts_.parameters.size(); }
 
   /// Makes buffers of a forward pass for any number of rows.

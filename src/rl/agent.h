@@ -9,10 +9,12 @@
 #include "base/archive.h"
 #include "base/env.h"
 #include "base/matrix.h"
-#include "base/policy.h"
+#include "base/policy_info.h"
 #include "base/steps.h"
 
 namespace upswing {
+
+class NetworkPolicy;
 
 /// Names and values, in a fixed order.
 using Metrics = std::vector<std::pair<std::string, double>>;
@@ -42,7 +44,7 @@ class Agent {
 
   /// The current policy, without exploration. `info` describes it. The agent adds the meaning of
   /// its values.
-  virtual std::unique_ptr<Policy> ExportPolicy(PolicyInfo info) const = 0;
+  virtual std::unique_ptr<NetworkPolicy> ExportPolicy(PolicyInfo info) const = 0;
 
   /// Saves or loads the whole state of the agent.
   virtual void State(const Archive& archive) = 0;

@@ -16,12 +16,10 @@
 /// parameters, y target, B batch size, A number of actions, D observation size, N environments.
 namespace upswing {
 
-/// TD targets y (B) = r + discount · evaluate(s', a*) with a* = argmax_a select(s', a):
-/// - DQN: select = evaluate = Q(s', ·; θ⁻), so that y = r + γ max_a Q(s', a; θ⁻) (Mnih et al.,
-///   2015).
+/// TD targets y (B) = r + discount · evaluate(s', a*) with a* = argmax_a select(s', a); the
+/// discount (B) is γⁿ, or 0 after a termination; Q-values are (B × A).
+/// - DQN: select = evaluate = Q(s', ·; θ⁻), so that y = r + γ max_a Q(s', a; θ⁻).
 /// - Double DQN: select = Q(s', ·; θ), evaluate = Q(s', ·; θ⁻) (van Hasselt et al., 2016, Eq 4).
-///
-/// All Q-values are (B × A), reward and discount (B). The discount is γⁿ, or 0 after a termination.
 void TdTargets(Matrix<const float> select, Matrix<const float> evaluate,
                std::span<const float> reward, std::span<const float> discount, std::span<float> y);
 
@@ -33,8 +31,8 @@ float HuberGradient(float delta);
 /// A DQN agent for N environments.
 class Dqn : public OffPolicyAgent {
  public:
-  /// Throws BadInput if the task has more than one torque. Also throws BadInput if the config
-  /// mirrors minibatches but the task has no mirror symmetry.
+  /// Throws BadInput if the task has more than one torque, or if the config mirrors minibatches but
+  /// the task has no mirror symmetry.
   Dqn(const DqnConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool);
 
   void Act(Matrix<const float> obs, Matrix<double> action) override;
@@ -43,13 +41,13 @@ class Dqn : public OffPolicyAgent {
   /// Makes one gradient step on the given minibatch and adds it to the metrics.
   void Update(const Minibatch& batch);
 
-  Metrics TakeMetrics() override;
-  std::unique_ptr<Policy> ExportPolicy(PolicyInfo info) const override;
-  void State(const Archive& archive) override;
-
   std::span<const float> online() const { return online_.theta(); }
   std::span<const float> target() const { return theta_target_; }
   double epsilon() const;
+
+  Metrics TakeMetrics() override;
+  std::unique_ptr<NetworkPolicy> ExportPolicy(PolicyInfo info) const override;
+  void State(const Archive& archive) override;
 
  private:
   /// Computes the TD errors of some rows of a minibatch and backpropagates them to the activations.
@@ -57,10 +55,8 @@ class Dqn : public OffPolicyAgent {
   /// Adds the minibatch of the last BackwardRows to the metrics.
   void CountMinibatch(const Minibatch& batch);
 
-  // What the post does not have, in dqn_extensions.cc.
-  /// Computes Q(σs, σ·; θ⁻) (B × A) for some rows of s (B × D), where σ is the mirror. The true
-  /// values equal Q(s, ·), and the errors are nearly independent, as in Double Q-learning (van
-  /// Hasselt, 2010).
+  // Extensions, in dqn_extensions.cc.
+  /// Computes Q(σs, σ·; θ⁻) (B × A) for some rows of s (B × D), where σ is the mirror.
   void ForwardMirrored(Matrix<const float> s, RowRange rows, Matrix<float> q);
   /// Reward centering: shifts the values of all three sets of parameters; see CenteringShift.
   void CenterValues(const Minibatch& batch);

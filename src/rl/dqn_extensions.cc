@@ -1,11 +1,13 @@
-// What the post does not have: mirrored targets, reward centering and an averaged policy. Symbols:
-// see rl/dqn.h.
+// Extensions of DQN: mirrored targets, reward centering and an averaged policy. Symbols: see
+// rl/dqn.h.
 #include <algorithm>
 
 #include "rl/dqn.h"
 
 namespace upswing {
 
+// The true values at σs' equal those at s'. Their errors are nearly independent, as in Double
+// Q-learning (van Hasselt, 2010).
 void Dqn::ForwardMirrored(Matrix<const float> s, RowRange rows, Matrix<float> q) {
   const Matrix<float> mirrored(mirrored_, B_, D_);
   for (int i = rows.first; i < rows.first + rows.count; ++i) {

@@ -61,7 +61,7 @@ Metrics Dqn::TakeMetrics() {
   return metrics;
 }
 
-std::unique_ptr<Policy> Dqn::ExportPolicy(PolicyInfo info) const {
+std::unique_ptr<NetworkPolicy> Dqn::ExportPolicy(PolicyInfo info) const {
   info.gamma = config_.gamma;
   info.reward_scale = config_.reward_scale;
   NetworkPolicyParts parts{ActionRule::kLevels, online_.network().shape()};

@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/testing.h"
 #include "nn/network_policy.h"
+#include "rl/mirror.h"
 #include "rl/testing.h"
 #include "rl/torque_levels.h"
 #include "rl/toy_env.h"

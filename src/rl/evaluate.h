@@ -134,6 +134,20 @@ std::vector<EvaluationEpisode> EvaluateEpisodes(const Policy& policy, VectorEnv&
 /// Summarises the episodes of a task that has this rule.
 Evaluation Summarize(std::span<const EvaluationEpisode> episodes, const EvaluationRule& rule);
 
+/// The evaluations of a training.
+class Evaluator {
+ public:
+  virtual ~Evaluator() = default;
+  /// Evaluates the policy of a step, from new start states at each step.
+  virtual Evaluation Evaluate(const Policy& policy, int64_t step) = 0;
+  /// A stricter and slower evaluation, whose result replaces that of Evaluate; nothing: there is
+  /// none. Before the task counts as solved, it judges the second passed policy in a row.
+  /// Afterwards it judges each policy that would become the best.
+  virtual std::optional<Evaluation> Confirm(const Policy& /*policy*/, int64_t /*step*/) {
+    return std::nullopt;
+  }
+};
+
 /// Runs EvaluateEpisodes, then Summarize.
 Evaluation Evaluate(const Policy& policy, VectorEnv& env, ThreadPool* pool = nullptr,
                     const Progress& progress = {});

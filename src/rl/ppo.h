@@ -36,7 +36,7 @@ class Ppo : public Agent {
   void Observe(const StepResult& result) override;
   void Learn() override;
   Metrics TakeMetrics() override;
-  std::unique_ptr<Policy> ExportPolicy(PolicyInfo info) const override;
+  std::unique_ptr<NetworkPolicy> ExportPolicy(PolicyInfo info) const override;
   void State(const Archive& archive) override;
 
   int64_t steps() const override { return steps_; }

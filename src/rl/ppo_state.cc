@@ -77,7 +77,7 @@ void Ppo::BeginSums() {
   reported_ = false;
 }
 
-std::unique_ptr<Policy> Ppo::ExportPolicy(PolicyInfo info) const {
+std::unique_ptr<NetworkPolicy> Ppo::ExportPolicy(PolicyInfo info) const {
   info.gamma = config_.gamma;
   info.reward_scale = config_.reward_scale;
   NetworkPolicyParts parts;

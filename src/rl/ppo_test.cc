@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/testing.h"
+#include "nn/network_policy.h"
 #include "rl/testing.h"
 #include "rl/toy_env.h"
 

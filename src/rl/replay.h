@@ -37,8 +37,8 @@ struct Minibatch {
   int size() const { return static_cast<int>(reward.size()); }  // B
 };
 
-/// The newest `capacity` transitions. A row of 2 D + A + 2 floats holds a whole transition, so that
-/// sampling it touches one place in memory. Memory is allocated as it fills.
+/// The newest `capacity` transitions, each in a row, so that sampling it touches one place in
+/// memory.
 class Replay {
  public:
   Replay(int64_t capacity, int obs_size, ActionSpace actions, bool prioritized = false);
@@ -53,13 +53,13 @@ class Replay {
   /// Fills the minibatch with transitions drawn uniformly, with replacement. Needs size() > 0.
   void Sample(Rng& rng, Minibatch& batch) const;
 
-  // Prioritised replay, in replay_extensions.cc.
+  // Prioritised replay (Schaul et al., 2016), in prioritized_replay.cc.
   /// Draws transition i with P(i) = p_i / Σ p, one from each of B equal parts of the sum. Its
-  /// weight is (N · P(i))^-β with N = size(), divided by the largest such weight in the minibatch
-  /// (Schaul et al., 2016, Section 3.4). `beta` is β.
+  /// weight is (N · P(i))^-β with N = size(), over the largest such weight in the minibatch
+  /// (Section 3.4).
   void SamplePrioritized(Rng& rng, double beta, ThreadPool& pool, Minibatch& batch) const;
-  /// Sets the priorities of the minibatch's transitions to p = (|TD error| + 1e-6)^α, the paper's
-  /// p^α (Section 3.3); `alpha` is α. A new transition gets the largest priority so far.
+  /// Sets the priorities of the minibatch's transitions to p = (|TD error| + 1e-6)^α (Section 3.3).
+  /// A new transition gets the largest priority so far.
   void Prioritize(const Minibatch& batch, std::span<const float> td_error, double alpha);
   /// Priority p of the transition at a place below size().
   double priority(int64_t index) const { return priorities_->at(index); }
@@ -81,10 +81,5 @@ class Replay {
   std::optional<SumTree> priorities_;
   double largest_priority_ = 1;  // largest priority so far
 };
-
-/// Mirrors a random half of a minibatch. Observations are multiplied by `signs` (D). An action is
-/// reflected at the middle of its bounds, so that its torque changes sign.
-void MirrorHalf(Rng& rng, std::span<const float> signs, const ActionSpace& actions,
-                Minibatch& batch);
 
 }  // namespace upswing

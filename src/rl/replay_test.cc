@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/testing.h"
+#include "rl/mirror.h"
 
 namespace upswing {
 namespace {

@@ -116,7 +116,7 @@ Metrics Sac::TakeMetrics() {
   return metrics;
 }
 
-std::unique_ptr<Policy> Sac::ExportPolicy(PolicyInfo info) const {
+std::unique_ptr<NetworkPolicy> Sac::ExportPolicy(PolicyInfo info) const {
   info.gamma = config_.gamma;
   info.reward_scale = config_.reward_scale;
   NetworkPolicyParts parts{ActionRule::kSquashedGaussian, actor_.network().shape(), theta_policy_};

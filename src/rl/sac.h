@@ -48,7 +48,7 @@ class Sac : public OffPolicyAgent {
   void Observe(const StepResult& result) override;
   void Learn() override;
   Metrics TakeMetrics() override;
-  std::unique_ptr<Policy> ExportPolicy(PolicyInfo info) const override;
+  std::unique_ptr<NetworkPolicy> ExportPolicy(PolicyInfo info) const override;
   void State(const Archive& archive) override;
 
   double alpha() const;

@@ -11,7 +11,7 @@ namespace upswing {
 namespace {
 
 /// Small trainings on the toy environment with scripted evaluations.
-class TrainerTest : public ::testing::Test, protected TrainObserver {
+class TrainerTest : public ::testing::Test, protected TrainObserver, protected Evaluator {
  protected:
   TrainerTest() {
     config_.steps = 600;
@@ -30,37 +30,36 @@ class TrainerTest : public ::testing::Test, protected TrainObserver {
     ToyEnv env{4};
     Dqn agent;
     Trainer trainer;
-    Parts(const DqnConfig& dqn, TrainSetup setup, TrainObserver& observer)
-        : agent(dqn, env.spec(), 1, pool), trainer(std::move(setup), agent, env) {
+    Parts(const DqnConfig& dqn, const TrainConfig& config, Evaluator& evaluator,
+          TrainObserver& observer)
+        : agent(dqn, env.spec(), 1, pool), trainer(config, agent, env, evaluator) {
       trainer.AddObserver(observer);
     }
   };
 
-  Parts Make() {
-    TrainSetup setup{.config = config_};
-    setup.evaluate = [this](const Policy&, int64_t) {
-      Evaluation e;
-      e.episodes = 4;
-      e.successes = static_cast<size_t>(evaluations_) < scripted_.size()
-                        ? scripted_[static_cast<size_t>(evaluations_)]
-                        : 0;
-      ++evaluations_;
-      e.reward_sum.mean = evaluations_;
-      e.passed = e.successes == 4;
-      return e;
-    };
-    if (!confirmations_.empty()) {
-      setup.confirm = [this](const Policy&, int64_t step) {
-        Evaluation e;
-        e.episodes = 4;
-        e.successes = confirmations_.at(confirmed_.size());
-        e.reward_sum.mean = 0.5;  // less than in any other evaluation
-        e.passed = e.successes == 4;
-        confirmed_.push_back(step);
-        return e;
-      };
-    }
-    return {dqn_, std::move(setup), *this};
+  Parts Make() { return {dqn_, config_, *this, *this}; }
+
+  Evaluation Evaluate(const Policy& /*policy*/, int64_t /*step*/) override {
+    Evaluation e;
+    e.episodes = 4;
+    e.successes = static_cast<size_t>(evaluations_) < scripted_.size()
+                      ? scripted_[static_cast<size_t>(evaluations_)]
+                      : 0;
+    ++evaluations_;
+    e.reward_sum.mean = evaluations_;
+    e.passed = e.successes == 4;
+    return e;
+  }
+
+  std::optional<Evaluation> Confirm(const Policy& /*policy*/, int64_t step) override {
+    if (confirmations_.empty()) return std::nullopt;
+    Evaluation e;
+    e.episodes = 4;
+    e.successes = confirmations_.at(confirmed_.size());
+    e.reward_sum.mean = 0.5;  // less than in any other evaluation
+    e.passed = e.successes == 4;
+    confirmed_.push_back(step);
+    return e;
   }
 
   /// Trains to the end and returns the final state.

@@ -1,11 +1,11 @@
 #include "runs/training_run.h"
 
 #include <algorithm>
-#include <chrono>
 #include <ctime>
 #include <utility>
 
 #include "base/error.h"
+#include "base/stopwatch.h"
 #include "base/text.h"
 #include "os/file.h"
 #include "os/machine.h"
@@ -21,11 +21,8 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Wall time and processor time of this process since the construction.
-class WorkClock {
+class WorkClock : public Stopwatch {
  public:
-  double seconds() const {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
-  }
   /// Share of the time in which `threads` threads worked, about 0 to 1.
   double busy(int threads) const {
     const double at_work = static_cast<double>(std::clock() - cpu_begin_) / CLOCKS_PER_SEC;
@@ -33,7 +30,6 @@ class WorkClock {
   }
 
  private:
-  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
   std::clock_t cpu_begin_ = std::clock();
 };
 
