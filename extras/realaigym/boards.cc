@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -12,8 +11,8 @@
 #include "agents/controllers.h"
 #include "base/error.h"
 #include "base/json.h"
+#include "base/stopwatch.h"
 #include "base/text.h"
-#include "pendulum/identification.h"
 #include "pendulum/observation.h"
 #include "report/figure.h"
 #include "runs/find_policy.h"
@@ -37,9 +36,9 @@ class PolicyController : public BoardController {
         obs_(count * size_),
         before_(size_),
         action_(count),
-        memory_(loaded.policy->Start(static_cast<int>(count))) {
-    if (loaded.identifies()) identifier_.emplace(loaded.plant, static_cast<int>(count));
-  }
+        memory_(loaded.policy->Start(static_cast<int>(count))),
+        builder_(static_cast<int>(count), loaded.memory(),
+                 loaded.identifies() ? std::optional(loaded.plant) : std::nullopt) {}
 
   void Act(int step, const BoardMeasurement& measured, size_t count, Lanes& torque) override {
     if (step % kPolicyPeriod != 0) return;
@@ -55,19 +54,12 @@ class PolicyController : public BoardController {
 
  private:
   void Observe(int step, const BoardMeasurement& m, size_t lane) {
-    // Observe as PendulumEnv does, with the policy's plant.
+    const int env = static_cast<int>(lane);
     const auto row = std::span(obs_).subspan(lane * size_, size_);
-    std::ranges::copy(row, before_.begin());
     const PendulumState measured{m.q1[lane], m.q2[lane], m.w1[lane], m.w2[lane]};
-    std::ranges::copy(upswing::Observe(loaded_.plant, measured), row.begin());
-    if (identifier_) {
-      const int env = static_cast<int>(lane);
-      if (step == 0) identifier_->Begin(env, measured);
-      if (step > 0) identifier_->Update(env, action_[lane], measured);
-      identifier_->Observe(env, measured, row.subspan(kObservationSize, kIdentifiedSize));
-    }
-    const auto steps = static_cast<int>(loaded_.memory());
-    if (steps > 0 && step > 0) Remember(before_, action_[lane], steps, row);
+    if (step == 0) return builder_.Begin(env, loaded_.plant, measured, row);
+    std::ranges::copy(row, before_.begin());
+    builder_.Next(env, loaded_.plant, {measured, action_[lane]}, before_, action_[lane], row);
   }
 
   const LoadedPolicy& loaded_;
@@ -75,7 +67,7 @@ class PolicyController : public BoardController {
   std::vector<float> obs_, before_;
   std::vector<double> action_;
   std::unique_ptr<Policy::Memory> memory_;
-  std::optional<Identifier> identifier_;
+  ObservationBuilder builder_;
 };
 
 /// The benchmark's own regulator of the linear model, with the weights of its baselines.
@@ -242,7 +234,7 @@ BoardEntry BoardReport::Entry() const {
 
 BoardReport ScoreOnBoard(const Competitor& competitor, uint64_t seed, ThreadPool& pool,
                          const Progress& progress) {
-  const auto begin = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   BoardReport report{competitor, {}, {}, {}, 0};
   const std::array<BoardEpisode, 1> nominal;
   report.nominal =
@@ -254,7 +246,7 @@ BoardReport ScoreOnBoard(const Competitor& competitor, uint64_t seed, ThreadPool
   report.robustness = JudgeRobustness(
       cases,
       SimulateOnBoard(competitor.robot, episodes, competitor.make, &pool, nullptr, progress));
-  report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  report.seconds = watch.seconds();
   return report;
 }
 

@@ -65,7 +65,7 @@ TEST(Disturber, NoiseIsNormalAndIndependentOnAllFour) {
   const PendulumState truth{1, 2, 3, 4};
   double sum[4] = {}, product[4][4] = {}, fourth[4] = {}, lag = 0, last = 0;
   for (int n = 0; n < kCount; ++n) {
-    const PendulumState s = sensors.Measure(0, truth, 0);
+    const PendulumState s = sensors.Measure(0, truth, 0).state;
     const double z[4] = {(s.q1 - 1) / 0.3, (s.q2 - 2) / 0.3, (s.w1 - 3) / 0.3, (s.w2 - 4) / 0.3};
     for (int i = 0; i < 4; ++i) {
       sum[i] += z[i];
@@ -92,10 +92,10 @@ TEST(Disturber, EachEnvironmentHasItsOwnStream) {
   Disturber two({{1, 0}}, 2, {1, 0}, 7, "test");
   Disturber second({{0, 0}, {1, 0}}, 2, {1, 0}, 7, "test"), other({{1, 0}}, 2, {1, 0}, 7, "other");
   (void)two.Measure(0, {}, 0);  // leaves the second environment's stream unchanged
-  const double noise = two.Measure(1, {}, 0).q1;
-  EXPECT_EQ(noise, second.Measure(1, {}, 0).q1);
-  EXPECT_NE(noise, other.Measure(1, {}, 0).q1);
-  EXPECT_NE(noise, Disturber({{1, 0}}, 1, {1, 0}, 7, "test").Measure(0, {}, 0).q1);
+  const double noise = two.Measure(1, {}, 0).state.q1;
+  EXPECT_EQ(noise, second.Measure(1, {}, 0).state.q1);
+  EXPECT_NE(noise, other.Measure(1, {}, 0).state.q1);
+  EXPECT_NE(noise, Disturber({{1, 0}}, 1, {1, 0}, 7, "test").Measure(0, {}, 0).state.q1);
 }
 
 TEST(DisturbedEnv, OnlyMeasurementsHaveNoise) {

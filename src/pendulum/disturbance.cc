@@ -64,18 +64,20 @@ void Disturber::Undo(int env, int64_t step) {
   if (delay > 0) std::swap(applied_[i], Queue(env)[static_cast<size_t>(step % delay)]);
 }
 
-PendulumState Disturber::Measure(int env, PendulumState s, double torque) {
+Measurement Disturber::Measure(int env, const PendulumState& state, double torque) {
   const Disturbance& disturbance = disturbances_[static_cast<size_t>(env)];
-  if (sensors_) s = sensors_->Measure(env, disturbance.sensors, s, torque);
+  Measurement measured{state, torque};
+  if (sensors_) {
+    const SensorModel& model = disturbance.sensors;
+    measured = {sensors_->Measure(env, model, state, torque), sensors_->Torque(env, model),
+                model.velocity_noise()};
+  }
   const double noise = disturbance.sensor_noise;
-  if (noise == 0) return s;
+  if (noise == 0) return measured;
   Rng& rng = rngs_[static_cast<size_t>(env)];
+  PendulumState& s = measured.state;
   for (double* x : {&s.q1, &s.q2, &s.w1, &s.w2}) *x += noise * rng.Normal();
-  return s;
-}
-
-double Disturber::MeasuredTorque(int env, double torque) const {
-  return sensors_ ? sensors_->Torque(env, disturbance(env).sensors) : torque;
+  return measured;
 }
 
 void Disturber::State(const Archive& archive) {

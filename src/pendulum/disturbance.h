@@ -66,12 +66,8 @@ class Disturber {
   void Undo(int env, int64_t step);
 
   /// Takes the true state at a control step and the torque (N·m) of the control period before it, 0
-  /// at the start. Returns the state that the sensors measure, with noise.
-  PendulumState Measure(int env, PendulumState state, double torque);
-
-  /// The mean torque (N·m) over the control period in which the last measured velocities changed.
-  /// `torque` is the torque of the last control period.
-  double MeasuredTorque(int env, double torque) const;
+  /// at the start. Returns what the sensors measure, with noise.
+  Measurement Measure(int env, const PendulumState& state, double torque);
 
   /// Saves or loads the state, but not the disturbances.
   void State(const Archive& archive);

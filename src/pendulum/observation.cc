@@ -14,6 +14,41 @@ void Remember(std::span<const float> before, double torque, int steps, std::span
   std::ranges::copy(older, obs.subspan(first + kMemorySize).begin());
 }
 
+ObservationBuilder::ObservationBuilder(int num_envs, int memory,
+                                       const std::optional<Plant>& identified_from)
+    : memory_(memory) {
+  if (identified_from) identifier_.emplace(*identified_from, num_envs);
+}
+
+void ObservationBuilder::Begin(int env, const Plant& plant, const PendulumState& measured,
+                               std::span<float> obs) {
+  std::ranges::fill(obs, 0.0F);
+  std::ranges::copy(Observe(plant, measured), obs.begin());
+  if (!identifier_) return;
+  identifier_->Begin(env, measured);
+  identifier_->Observe(env, measured, obs.subspan(kObservationSize, kIdentifiedSize));
+}
+
+void ObservationBuilder::Next(int env, const Plant& plant, const Measurement& measured,
+                              std::span<const float> before, double chosen, std::span<float> obs) {
+  std::ranges::copy(Observe(plant, measured.state), obs.begin());
+  Complete(env, measured, before, chosen, obs);
+}
+
+void ObservationBuilder::Complete(int env, const Measurement& measured,
+                                  std::span<const float> before, double chosen,
+                                  std::span<float> obs) {
+  if (identifier_) {
+    identifier_->Update(env, measured.torque, measured.state, measured.velocity_noise);
+    identifier_->Observe(env, measured.state, obs.subspan(kObservationSize, kIdentifiedSize));
+  }
+  if (memory_ > 0) Remember(before, chosen, memory_, obs);
+}
+
+void ObservationBuilder::State(const Archive& archive) {
+  if (identifier_) identifier_->State(archive.In("identification"));
+}
+
 ObservationInfo ObservationInfoOf(int64_t memory, bool identified) {
   ObservationInfo observation{
       {"cos q1", "sin q1", "w1", "cos q2", "sin q2", "w2", "energy", "height"},

@@ -1,13 +1,16 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 
+#include "base/archive.h"
 #include "base/policy_info.h"
 #include "pendulum/identification.h"
+#include "pendulum/sensors.h"
 #include "pendulum/task.h"
 
-/// Observations of the double pendulum with a memory and with an identified plant.
+/// Observations of the double pendulum: of a state, with an identified plant and with a memory.
 namespace upswing {
 
 /// Numbers that an observation may hold for each past control step, latest first: [Δw1, Δw2, tau].
@@ -30,5 +33,33 @@ void Remember(std::span<const float> before, double torque, int steps, std::span
 /// Description, for a policy file, of observations with `memory` past steps and, if `identified`,
 /// an identified plant.
 ObservationInfo ObservationInfoOf(int64_t memory, bool identified = false);
+
+/// Builds the observations (D) of N environments from what their sensors measure:
+///   8             of the measured state, see Observe
+///   13            of the identified plant, if there is one
+///   3 × `memory`  of the past control steps
+class ObservationBuilder {
+ public:
+  /// `identified_from`: the nominal plant where identification starts; none: no identification.
+  ObservationBuilder(int num_envs, int memory, const std::optional<Plant>& identified_from);
+
+  /// Writes the first observation of an episode. `plant` gives its energy and height. Its memory is
+  /// zero.
+  void Begin(int env, const Plant& plant, const PendulumState& measured, std::span<float> obs);
+  /// Writes the observation after a control period. `before` is the observation at which the torque
+  /// `chosen` (N·m) was chosen.
+  void Next(int env, const Plant& plant, const Measurement& measured, std::span<const float> before,
+            double chosen, std::span<float> obs);
+  /// Does the same where the first kObservationSize numbers are written already.
+  void Complete(int env, const Measurement& measured, std::span<const float> before, double chosen,
+                std::span<float> obs);
+
+  /// Saves or loads the identified plants.
+  void State(const Archive& archive);
+
+ private:
+  int memory_;
+  std::optional<Identifier> identifier_;
+};
 
 }  // namespace upswing

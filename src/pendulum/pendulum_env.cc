@@ -57,7 +57,9 @@ PendulumEnv::PendulumEnv(const PendulumEnvConfig& config)
       physics_(config.engine->make(config)),
       episode_steps_(std::max<int64_t>(1, std::llround(config_.episode_seconds / kControlPeriod))),
       disturber_(MakeDisturber(config)),
-      posterior_(config.randomization.MakePosterior()) {
+      posterior_(config.randomization.MakePosterior()),
+      builder_(config.num_envs, config.memory, config.identified_from),
+      exact_(!disturber_ && !config.assumed_plant && !config.identified_from) {
   const auto n = static_cast<size_t>(config_.num_envs);
   step_counts_.resize(n);
   obs_.resize(n * static_cast<size_t>(spec_.obs_size));
@@ -70,9 +72,6 @@ PendulumEnv::PendulumEnv(const PendulumEnvConfig& config)
     rngs_.emplace_back(config_.seed, config_.stream, index);
   }
   plant_seeds_ = plant_rngs_;
-  if (config_.identified_from) {
-    identifier_.emplace(*config_.identified_from, config_.num_envs);
-  }
   for (int i = 0; i < config_.num_envs; ++i) Reset(i);
 }
 
@@ -97,29 +96,17 @@ void PendulumEnv::SetState(int env, const PendulumState& s) {
   physics_->SetState(env, s);
   step_counts_[static_cast<size_t>(env)] = 0;
   if (disturber_) disturber_->Begin(env, s);
-  std::ranges::fill(Row(obs_, env), 0.0F);  // a new episode has no memory
-  const PendulumState measured = Measure(env, 0);
-  std::ranges::copy(Observation(env, measured), Row(obs_, env).begin());
-  if (!identifier_) return;
-  identifier_->Begin(env, measured);
-  identifier_->Observe(env, measured, Row(obs_, env).subspan(kObservationSize, kIdentifiedSize));
+  builder_.Begin(env, ObservedPlant(env), Measure(env, 0).state, Row(obs_, env));
 }
 
-PendulumState PendulumEnv::Measure(int env, double torque) {
-  const PendulumState s = state(env);
-  return disturber_ ? disturber_->Measure(env, s, torque) : s;
+Measurement PendulumEnv::Measure(int env, double torque) {
+  if (disturber_) return disturber_->Measure(env, state(env), torque);
+  return {state(env), torque};
 }
 
-void PendulumEnv::Identify(int env, double torque, const PendulumState& measured) {
-  if (!disturber_) return identifier_->Update(env, torque, measured);
-  identifier_->Update(env, disturber_->MeasuredTorque(env, torque), measured,
-                      disturber_->disturbance(env).sensors.velocity_noise());
-}
-
-std::array<float, kObservationSize> PendulumEnv::Observation(int env,
-                                                             const PendulumState& measured) const {
-  if (config_.identified_from) return Observe(*config_.identified_from, measured);
-  return Observe(config_.assumed_plant ? *config_.assumed_plant : plant(env), measured);
+const Plant& PendulumEnv::ObservedPlant(int env) const {
+  if (config_.identified_from) return *config_.identified_from;
+  return config_.assumed_plant ? *config_.assumed_plant : plant(env);
 }
 
 void PendulumEnv::SpreadRows(std::vector<float>& table) const {
@@ -173,55 +160,74 @@ void PendulumEnv::Hold(int env) {
   held_[static_cast<size_t>(env)] = state(env);
 }
 
-void PendulumEnv::RestoreHeld() {
+void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
+  physics_->Step(Actuate(torque), result);
+  RestoreHeld(result);
+  ObserveSuccessors(torque, result);
+  KeepTime(result);
+  StandIn(result);
+  BeginNextStep(result);
+}
+
+std::span<const double> PendulumEnv::Actuate(std::span<const double> chosen) {
+  return disturber_ ? disturber_->Apply(chosen, step_counts_) : chosen;
+}
+
+void PendulumEnv::RestoreHeld(StepResult& result) {
   for (size_t i = 0; i < held_.size(); ++i) {
     if (!held_[i]) continue;
     physics_->SetState(static_cast<int>(i), *held_[i]);
     if (disturber_) disturber_->Undo(static_cast<int>(i), step_counts_[i]);
+    result.terminated[i] = 0;
   }
 }
 
-void PendulumEnv::StandIn(int env, StepResult& result) const {
-  const auto i = static_cast<size_t>(env);
-  std::ranges::copy(Row(obs_, env), Row(result.next_obs, env).begin());
-  std::ranges::fill(std::span(result.reward_terms).subspan(i * kRewardTerms, kRewardTerms), 0.0);
-  result.reward[i] = 0;
-  result.at_goal[i] = 0;
-  result.torque[i] = 0;
-  result.work[i] = 0;
+void PendulumEnv::ObserveSuccessors(std::span<const double> chosen, StepResult& result) {
+  if (spec_.obs_size > kObservationSize) SpreadRows(result.next_obs);
+  if (exact_ && config_.memory == 0) return;
+  for (int env = 0; env < config_.num_envs; ++env) {
+    if (IsHeld(env)) continue;
+    const auto i = static_cast<size_t>(env);
+    const Measurement measured = Measure(env, result.torque[i]);
+    if (result.terminated[i]) continue;
+    const auto before = Row(obs_, env), next = Row(result.next_obs, env);
+    if (exact_) {
+      builder_.Complete(env, measured, before, chosen[i], next);
+    } else {
+      builder_.Next(env, ObservedPlant(env), measured, before, chosen[i], next);
+    }
+  }
 }
 
-void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
-  physics_->Step(disturber_ ? disturber_->Apply(torque, step_counts_) : torque, result);
-  if (spec_.obs_size > kObservationSize) SpreadRows(result.next_obs);  // the physics packs the rows
-  RestoreHeld();
+void PendulumEnv::KeepTime(StepResult& result) {
   for (int env = 0; env < config_.num_envs; ++env) {
     const auto i = static_cast<size_t>(env);
-    if (!held_.empty() && held_[i]) {
-      StandIn(env, result);
-      result.terminated[i] = result.truncated[i] = 0;
-      continue;
-    }
-    ++step_counts_[i];
-    const auto next_obs = Row(result.next_obs, env);
-    if (disturber_ || config_.assumed_plant || identifier_) {
-      const PendulumState measured = Measure(env, result.torque[i]);
-      std::ranges::copy(Observation(env, measured), next_obs.begin());
-      if (identifier_ && !result.terminated[i]) {
-        Identify(env, result.torque[i], measured);
-        identifier_->Observe(env, measured, next_obs.subspan(kObservationSize, kIdentifiedSize));
-      }
-    }
-    if (config_.memory > 0) Remember(Row(obs_, env), torque[i], config_.memory, next_obs);
-    if (result.terminated[i]) StandIn(env, result);
-    result.truncated[i] = step_counts_[i] >= episode_steps_ && !result.terminated[i] ? 1 : 0;
+    if (!IsHeld(env)) ++step_counts_[i];
+    result.truncated[i] =
+        !IsHeld(env) && !result.terminated[i] && step_counts_[i] >= episode_steps_;
   }
+}
+
+void PendulumEnv::StandIn(StepResult& result) const {
+  for (int env = 0; env < config_.num_envs; ++env) {
+    const auto i = static_cast<size_t>(env);
+    if (!IsHeld(env) && !result.terminated[i]) continue;
+    std::ranges::copy(Row(obs_, env), Row(result.next_obs, env).begin());
+    std::ranges::fill(std::span(result.reward_terms).subspan(i * kRewardTerms, kRewardTerms), 0.0);
+    result.reward[i] = 0;
+    result.at_goal[i] = 0;
+    result.torque[i] = 0;
+    result.work[i] = 0;
+  }
+}
+
+void PendulumEnv::BeginNextStep(const StepResult& result) {
+  held_.clear();
   // The next observation is the successor, or the start of a new episode.
   std::ranges::copy(result.next_obs, obs_.begin());
   for (int env = 0; env < config_.num_envs; ++env) {
     if (result.done(static_cast<size_t>(env))) Reset(env);
   }
-  held_.clear();
 }
 
 void PendulumEnv::State(const Archive& archive) {
@@ -237,7 +243,7 @@ void PendulumEnv::State(const Archive& archive) {
   archive.Array("obs", std::span(obs_));
   archive.Scalar("start_noise", config_.start.noise, {0, 10});
   if (disturber_) disturber_->State(archive.In("disturbance"));
-  if (identifier_) identifier_->State(archive.In("identification"));
+  builder_.State(archive);
   for (size_t i = 0; i < rngs_.size(); ++i) rngs_[i].State(archive.In(Concat("rng.", i)));
 }
 

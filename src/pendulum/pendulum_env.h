@@ -11,7 +11,7 @@
 #include "base/env.h"
 #include "base/rng.h"
 #include "pendulum/disturbance.h"
-#include "pendulum/identification.h"
+#include "pendulum/observation.h"
 #include "pendulum/physics.h"
 #include "pendulum/randomization.h"
 #include "pendulum/task.h"
@@ -102,20 +102,31 @@ class PendulumEnv : public VectorEnv {
   void Reset(int env);
   /// Gives a new episode its own plant and disturbance.
   void Randomize(int env);
-  /// The state that the environment's sensors measure now, with noise drawn from its stream.
-  /// `torque` (N·m) acted in the last control period; 0 at the start.
-  PendulumState Measure(int env, double torque);
-  /// Updates the identified plant with a measured state and the torque (N·m) before it.
-  void Identify(int env, double torque, const PendulumState& measured);
-  /// The observation of a measured state, without memory and identification.
-  std::array<float, kObservationSize> Observation(int env, const PendulumState& measured) const;
-  /// Moves rows of kObservationSize numbers to the beginnings of the wider rows with memory.
-  void SpreadRows(std::vector<float>& table) const;
+
+  // The stages of a step. The torques `chosen` (N) are in N·m.
+  /// Returns the torques (N) that the motors apply now, N·m: the chosen ones, after their delay.
+  std::span<const double> Actuate(std::span<const double> chosen);
+  /// Turns the packed observations of the physics into what sensors, identification and memory make
+  /// of the successors.
+  void ObserveSuccessors(std::span<const double> chosen, StepResult& result);
+  /// Counts the steps of the episodes and truncates those whose time is up.
+  void KeepTime(StepResult& result);
   /// Puts held environments back into their states.
-  void RestoreHeld();
-  /// Replaces the result of a step that blew up or was held back: the successor by the last
+  void RestoreHeld(StepResult& result);
+  /// Replaces the results of steps that blew up or were held back: the successor by the last
   /// observation, the rest by zeros.
-  void StandIn(int env, StepResult& result) const;
+  void StandIn(StepResult& result) const;
+  /// Makes the successors the present observations, and begins new episodes.
+  void BeginNextStep(const StepResult& result);
+
+  /// What the environment's sensors measure now, with noise drawn from its stream. `torque` (N·m)
+  /// acted in the last control period; 0 at the start.
+  Measurement Measure(int env, double torque);
+  /// The plant whose energy and height are in the observations.
+  const Plant& ObservedPlant(int env) const;
+  bool IsHeld(int env) const { return !held_.empty() && held_[static_cast<size_t>(env)]; }
+  /// Moves rows of kObservationSize numbers to the beginnings of wider rows.
+  void SpreadRows(std::vector<float>& table) const;
 
   /// One environment's observation (D) within a table of observations.
   template <typename Table>
@@ -138,7 +149,8 @@ class PendulumEnv : public VectorEnv {
   std::vector<int64_t> step_counts_;  // (N) control steps since the episode began
   std::vector<std::optional<PendulumState>> held_;  // (N) states that the next Step keeps; or empty
   std::vector<float> obs_;                          // (N, D)
-  std::optional<Identifier> identifier_;            // if plants are identified
+  ObservationBuilder builder_;
+  bool exact_;  // whether the physics' observations, of true states and plants, hold
 };
 
 }  // namespace upswing

@@ -39,6 +39,13 @@ struct SensorModel {
   double velocity_noise() const;
 };
 
+/// What sensors measure at a control step.
+struct Measurement {
+  PendulumState state;
+  double torque = 0;  // N·m, mean over the control period in which the measured velocities changed
+  double velocity_noise = 0;  // standard deviation of the error that the sensors add to this change
+};
+
 /// The angle (rad) that an encoder with `counts` per revolution shows, the nearest one; 0: the
 /// angle itself.
 double Quantized(double angle, double counts);
