@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-namespace upswing {
+#include "pendulum/sensors.h"
 
-double Rounded(double number, double quantum) {
-  return quantum > 0 ? std::round(number / quantum) * quantum : number;
-}
+namespace upswing {
 
 SimulatedMachine::SimulatedMachine(const Twin& twin, const PendulumState& start)
     : twin_(twin), body_(BodyOf(twin)), drive_(twin.actuator.delay, twin.actuator.lag) {
@@ -80,10 +78,10 @@ MachineReading SimulatedMachine::Read() const {
   MachineReading reading{{state().q1 + sensors.zero1, state().q2 + sensors.zero2}, {}};
   for (int j = 0; j < 2; ++j) {
     double& angle = reading.angle[j];
-    angle = Rounded(angle, sensors.quantum);
+    angle = Quantized(angle, sensors.quantum);
     angle = std::clamp(angle, -sensors.angle_range, sensors.angle_range);
-    reading.torque[j] = Rounded(torque[j] - twin_.actuator.current_inertia * late.acceleration[j],
-                                sensors.torque_quantum);
+    reading.torque[j] = Quantized(torque[j] - twin_.actuator.current_inertia * late.acceleration[j],
+                                  sensors.torque_quantum);
   }
   return reading;
 }

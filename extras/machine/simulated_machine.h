@@ -12,9 +12,6 @@
 /// The machine that a twin describes: motors, links, encoders and control loop, in time.
 namespace upswing {
 
-/// The nearest multiple of a quantum; 0: the number itself.
-double Rounded(double number, double quantum);
-
 /// What the encoders and drives report.
 struct MachineReading {
   Joints angle;   // rad

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "base/error.h"
 #include "mujoco/testing.h"
@@ -189,9 +190,10 @@ TEST_P(MeasuredEnvs, ObservationsAreOfThePastCountsAndTheRestIsTrue) {
     }
     for (int step = 0; step < 7; ++step) {
       const PendulumState &then = past[past.size() - 2], &before = past[past.size() - 4];
-      const double q1 = Quantized(then.q1, 1000), q2 = Quantized(then.q2, 1000);
-      const auto seen = Observe(env.plant(1), {q1, q2, (q1 - Quantized(before.q1, 1000)) / 0.04,
-                                               (q2 - Quantized(before.q2, 1000)) / 0.04});
+      constexpr double kStep = 2 * std::numbers::pi / 1000;
+      const double q1 = Quantized(then.q1, kStep), q2 = Quantized(then.q2, kStep);
+      const auto seen = Observe(env.plant(1), {q1, q2, (q1 - Quantized(before.q1, kStep)) / 0.04,
+                                               (q2 - Quantized(before.q2, kStep)) / 0.04});
       for (size_t k = 0; k < kObservationSize; ++k) ASSERT_NEAR(env.obs().row(1)[k], seen[k], 1e-6);
       const double torque = 4 * std::sin(step + episode);
       env.Step(std::vector<double>(3, torque), result);

@@ -25,14 +25,14 @@ PendulumState StateAgo(std::span<const double> past, double age) {
 
 /// The encoder readings of the state `age` seconds before the latest control step.
 PendulumState Reading(std::span<const double> past, const SensorModel& model, double age) {
-  const double N = model.encoder_counts, T = model.velocity_window;
+  const double step = model.encoder_step(), T = model.velocity_window;
   PendulumState s = StateAgo(past, age);
-  s.q1 = Quantized(s.q1, N);
-  s.q2 = Quantized(s.q2, N);
+  s.q1 = Quantized(s.q1, step);
+  s.q2 = Quantized(s.q2, step);
   if (T > 0) {
     const PendulumState before = StateAgo(past, age + T);
-    s.w1 = (s.q1 - Quantized(before.q1, N)) / T;
-    s.w2 = (s.q2 - Quantized(before.q2, N)) / T;
+    s.w1 = (s.q1 - Quantized(before.q1, step)) / T;
+    s.w2 = (s.q2 - Quantized(before.q2, step)) / T;
   }
   return s;
 }
@@ -55,15 +55,16 @@ void SensorModel::Describe(Options& o) {
       .implied = true;
 }
 
-double SensorModel::velocity_noise() const {
-  if (encoder_counts == 0 || velocity_window == 0) return 0;
-  return 2 * std::numbers::pi / encoder_counts / velocity_window * std::sqrt(4.0 / 12);
+double SensorModel::encoder_step() const {
+  return encoder_counts == 0 ? 0 : 2 * std::numbers::pi / encoder_counts;
 }
 
-double Quantized(double angle, double counts) {
-  if (counts == 0) return angle;
-  const double count = 2 * std::numbers::pi / counts;  // rad
-  return count * std::round(angle / count);
+double SensorModel::velocity_noise() const {
+  return velocity_window == 0 ? 0 : encoder_step() / velocity_window * std::sqrt(4.0 / 12);
+}
+
+double Quantized(double number, double step) {
+  return step == 0 ? number : step * std::round(number / step);
 }
 
 Sensors::Sensors(int num_envs, const SensorModel& slowest) {

@@ -32,6 +32,8 @@ struct SensorModel {
   bool exact() const {
     return latency == 0 && encoder_counts == 0 && velocity_window == 0 && velocity_filter == 0;
   }
+  /// Step of a measured angle, 2π/N, rad; 0: exact angles.
+  double encoder_step() const;
   /// Mean age of the measured velocities, L + T/2 + τ, s.
   double velocity_age() const { return latency + velocity_window / 2 + velocity_filter; }
   /// Standard deviation (rad/s) that rounding adds to the change between two measured velocities.
@@ -46,9 +48,8 @@ struct Measurement {
   double velocity_noise = 0;  // standard deviation of the error that the sensors add to this change
 };
 
-/// The angle (rad) that an encoder with `counts` per revolution shows, the nearest one; 0: the
-/// angle itself.
-double Quantized(double angle, double counts);
+/// The nearest multiple of `step`, as a digital sensor shows a number; 0: the number itself.
+double Quantized(double number, double step);
 
 /// The sensors of N environments. They keep the states of the last control steps. Between two steps
 /// they take the motion as the cubic that matches angles and velocities (StateBetween). In a

@@ -37,10 +37,10 @@ TEST(SensorModel, SettingsAreChecked) {
 }
 
 TEST(Encoder, AnglesAreRoundedToTheNearestCount) {
-  EXPECT_EQ(Quantized(0.7, 4), 0);
-  EXPECT_EQ(Quantized(0.8, 4), kTurn / 4);
-  EXPECT_EQ(Quantized(-0.8, 4), -kTurn / 4);
-  EXPECT_EQ(Quantized(13.5, 4), 9 * kTurn / 4);  // full turns are counted
+  EXPECT_EQ(Quantized(0.7, kTurn / 4), 0);
+  EXPECT_EQ(Quantized(0.8, kTurn / 4), kTurn / 4);
+  EXPECT_EQ(Quantized(-0.8, kTurn / 4), -kTurn / 4);
+  EXPECT_EQ(Quantized(13.5, kTurn / 4), 9 * kTurn / 4);  // full turns are counted
   EXPECT_EQ(Quantized(0.7, 0), 0.7);
 }
 
