@@ -6,6 +6,8 @@
 #include <cmath>
 #include <string_view>
 
+#include "pendulum/friction.h"
+
 namespace upswing {
 namespace {
 

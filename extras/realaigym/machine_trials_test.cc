@@ -12,6 +12,7 @@
 #include "extras/machine/testing.h"
 #include "extras/realaigym/published_tvlqr.h"
 #include "extras/realaigym/swing_policy.h"
+#include "pendulum/friction.h"
 
 namespace upswing {
 namespace {

@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "extras/machine/identify.h"
+#include "pendulum/friction.h"
 
 namespace upswing {
 namespace {

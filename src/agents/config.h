@@ -10,7 +10,7 @@
 
 #include "agents/foreign_task.h"
 #include "base/options.h"
-#include "pendulum/task.h"
+#include "pendulum/task_config.h"
 #include "rl/dqn_config.h"
 #include "rl/ppo_config.h"
 #include "rl/sac_config.h"

@@ -249,6 +249,12 @@ class Documents(ProgramTest):
         for folder in sorted(folders):
             self.assertIn(f"`{folder}/`", code_map)
 
+    def test_the_reading_path_is_short(self):
+        path = re.findall(r"`(src/\w+/\w+)\.cc`", text_of("CONTRIBUTING.md").split("## The map")[0])
+        self.assertEqual(len(path), 5)
+        lines = [len(text_of(name + ending).splitlines()) for name in path for ending in (".h", ".cc")]
+        self.assertLessEqual(sum(lines), 700)
+
     def test_one_version(self):
         version = re.search(r"project\(upswing VERSION (\S+)", text_of("CMakeLists.txt"))[1]
         self.assertIn(f"\nversion: {version}\n", text_of("CITATION.cff"))

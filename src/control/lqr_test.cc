@@ -13,6 +13,7 @@
 #include "control/riccati.h"
 #include "control/testing.h"
 #include "pendulum/closed_form.h"
+#include "pendulum/observation.h"
 #include "pendulum/testing.h"
 
 namespace upswing {

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "control/trajectory.h"
-#include "pendulum/task.h"
+#include "pendulum/task_config.h"
 
 namespace upswing {
 

@@ -5,7 +5,7 @@
 #include "base/aligned.h"
 #include "base/env.h"
 #include "pendulum/equations.h"
-#include "pendulum/task.h"
+#include "pendulum/task_config.h"
 
 /// The double pendulum in closed form, equivalent to the built-in MJCF and vectorised over
 /// environments: equations of motion, MuJoCo's Runge-Kutta steps, and the task's observation and

@@ -1,18 +1,12 @@
+// The equations of motion. Symbols: see pendulum/equations.h; of a link: m mass (kg), l length (m),
+// c distance of the centre of mass from the joint (m), I moment of inertia about it (kg·m²).
 #include "pendulum/equations.h"
 
 #include <cmath>
 
+#include "pendulum/friction.h"
+
 namespace upswing {
-
-void Manipulator::AddRotors(double inertia, double gear) {
-  // The rotors' kinetic energy I/2 ((gear w1)² + (w1 - gear w2)²) adds (gear² + 1) I to M11, -gear
-  // I to M12 and gear² I to M22.
-  J1 += (gear * gear + gear + 1) * inertia;
-  J2 -= gear * inertia;
-  a += (gear * gear + gear) * inertia;
-}
-
-double DryFriction(double f, double w) { return f * std::atan(kFrictionSlope * w); }
 
 ManipulatorTerms Manipulator::At(const PendulumState& s) const {
   const auto& [q1, q2, w1, w2] = s;

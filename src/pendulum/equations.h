@@ -5,10 +5,14 @@
 #include "pendulum/plant.h"
 
 /// The equations of motion of a double pendulum, in one form for every plant and every caller:
-///   M(q) q̈ = τ - c(q, q̇) - g(q) - d q̇ - f atan(100 q̇)
+///   M(q) q̈ + c(q, q̇) + g(q) + d q̇ + f atan(100 q̇) = τ
 ///   M = [[J1 + J2 + 2 b cos q2, J2 + b cos q2], [·, J2 + a]]
-/// The last term is dry friction, smoothed as in RealAIGym's plant (Wiebe et al., "Open source
-/// dual- purpose acrobot and pendubot platform", IEEE Robotics and Automation Magazine 31 (2024)).
+/// (Murray, Li and Sastry, "A Mathematical Introduction to Robotic Manipulation", 1994, Section
+/// 4.2). The last term is dry friction, smoothed as in RealAIGym's plant (Wiebe et al., "Open
+/// source dual-purpose acrobot and pendubot platform", IEEE Robotics and Automation Magazine 31
+/// (2024)).
+///
+/// closed_form.cc steps many environments at a time by the same equations.
 namespace upswing {
 
 struct MassMatrix {
@@ -46,9 +50,6 @@ struct Manipulator {
   std::array<double, 2> Acceleration(const PendulumState& s,
                                      const std::array<double, 2>& torque) const;
 };
-
-/// Torque (N·m) of the dry friction f (N·m) against a velocity w (rad/s): f atan(100 w).
-double DryFriction(double f, double w);
 
 Manipulator ManipulatorOf(const Plant& plant);
 

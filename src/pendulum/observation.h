@@ -13,6 +13,10 @@
 /// Observations of the double pendulum: of a state, with an identified plant and with a memory.
 namespace upswing {
 
+/// Sign of each observation under the mirror symmetry, which negates angles, velocities and torque.
+/// All numbers of the memory change sign.
+inline constexpr std::array<float, kObservationSize> kMirrorSigns{1, -1, -1, 1, -1, -1, 1, 1};
+
 /// Numbers that an observation may hold for each past control step, latest first: [Δw1, Δw2, tau].
 /// Δw is the change of the velocities over kMemoryVelocity, tau the chosen torque over
 /// kMemoryTorque. The plant's response reveals what the state lacks: masses, lengths, and torques

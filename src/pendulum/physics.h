@@ -10,7 +10,7 @@
 #include "base/archive.h"
 #include "base/env.h"
 #include "base/thread_pool.h"
-#include "pendulum/task.h"
+#include "pendulum/task_config.h"
 
 namespace upswing {
 

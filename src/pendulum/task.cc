@@ -1,7 +1,5 @@
-// The double pendulum as formulas. Symbols: q1, q2 joint angles (rad; 0 hanging, q2 relative to
-// link 1), w1, w2 their velocities (rad/s), m mass (kg), l length (m), g gravity (m/s²), tau torque
-// of the motor (N·m). All constants come from the post "Balancing a Double Pendulum with DQN and
-// MuJoCo".
+// Observation, reward and goal. Symbols: see pendulum/task.h. All constants come from the post
+// "Balancing a Double Pendulum with DQN and MuJoCo".
 #include "pendulum/task.h"
 
 #include <algorithm>
@@ -53,13 +51,10 @@ bool Inverted(const PendulumState& s) {
 
 std::array<float, kObservationSize> Observe(const Plant& plant, const PendulumState& s) {
   const double height = TipHeight(plant, s) / (plant.length1 + plant.length2);
-  const std::array<double, kObservationSize> obs{
-      std::cos(s.q1), std::sin(s.q1),       s.w1 / kMaxVelocity1,       std::cos(s.q2),
-      std::sin(s.q2), s.w2 / kMaxVelocity2, NormalizedEnergy(plant, s), height};
-  std::array<float, kObservationSize> result;
-  std::transform(obs.begin(), obs.end(), result.begin(),
-                 [](double x) { return static_cast<float>(x); });
-  return result;
+  const auto f = [](double x) { return static_cast<float>(x); };
+  return {
+      f(std::cos(s.q1)), f(std::sin(s.q1)),       f(s.w1 / kMaxVelocity1),       f(std::cos(s.q2)),
+      f(std::sin(s.q2)), f(s.w2 / kMaxVelocity2), f(NormalizedEnergy(plant, s)), f(height)};
 }
 
 std::array<double, kRewardTerms> RewardTerms(const Plant& plant, const PendulumState& s,
@@ -67,11 +62,11 @@ std::array<double, kRewardTerms> RewardTerms(const Plant& plant, const PendulumS
   const bool inverted = Inverted(s);
   const double height = TipHeight(plant, s) / (plant.length1 + plant.length2);
   return {
-      std::clamp(NormalizedEnergy(plant, s), 0.0, 1.5),
-      (height + 1) / 2,
-      inverted ? 5.0 : 0.0,
-      inverted ? -0.01 * (s.w1 * s.w1 + s.w2 * s.w2) : 0.0,
-      (inverted ? -0.05 : -0.01) * tau * tau,
+      std::clamp(NormalizedEnergy(plant, s), 0.0, 1.5),      // energy
+      (height + 1) / 2,                                      // height
+      inverted ? 5.0 : 0.0,                                  // balance
+      inverted ? -0.01 * (s.w1 * s.w1 + s.w2 * s.w2) : 0.0,  // velocity
+      (inverted ? -0.05 : -0.01) * tau * tau,                // torque
   };
 }
 

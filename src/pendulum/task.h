@@ -2,20 +2,22 @@
 
 #include <array>
 
-#include "base/options.h"
 #include "pendulum/plant.h"
 
-/// The task of the double pendulum as formulas: observation, reward and goal.
+/// The task of the double pendulum as formulas: observation, reward and goal. MuJoCo trainings call
+/// them; closed_form.cc computes the same for many environments at a time.
 ///
-/// Symbols: q1, q2 joint angles (rad; both 0 hanging, q2 relative to link 1), w1, w2 their
-/// velocities (rad/s), m mass (kg), l length (m), g gravity (m/s²), tau the motor's torque (N·m).
+/// Symbols: q1, q2 joint angles (rad; 0 hanging, q2 relative to link 1), w1, w2 velocities (rad/s);
+/// of a link: m mass (kg), l length (m), c distance of the centre of mass from the joint (m),
+/// I moment of inertia about it (kg·m²); g gravity (m/s²), tau the motor's torque (N·m).
 namespace upswing {
 
 /// The task's name.
 inline constexpr const char* kDoublePendulum = "double-pendulum";
 
-/// Length of an evaluation episode, of its first part that counts for the return, and of its last
-/// part throughout which both links must be inverted (s).
+/// An evaluation episode begins hanging and lasts kEvaluationSeconds. Its return is the sum of the
+/// rewards of the first kReturnSeconds. It succeeds if Inverted holds throughout the last
+/// kHoldSeconds (s).
 inline constexpr double kEvaluationSeconds = 20, kReturnSeconds = 10, kHoldSeconds = 10;
 
 /// The links whose energy the task takes: thin rods, whose inertia is m l²/12. If the plant has own
@@ -48,30 +50,13 @@ inline constexpr double kMaxVelocity2 = 20.0;
 /// Ê = NormalizedEnergy and ĥ = TipHeight over l1 + l2, in [-1, 1].
 std::array<float, kObservationSize> Observe(const Plant& plant, const PendulumState& s);
 
-/// Sign of each observation under the mirror symmetry, which negates angles, velocities and torque.
-/// All numbers of the memory change sign.
-inline constexpr std::array<float, kObservationSize> kMirrorSigns{1, -1, -1, 1, -1, -1, 1, 1};
-
 inline constexpr int kRewardTerms = 5;
 inline constexpr std::array<const char*, kRewardTerms> kRewardTermNames{
     "energy", "height", "balance", "velocity_penalty", "torque_penalty"};
 
 /// The reward's signed terms for being in state s under torque tau (N·m), before weighting; the
-/// reward is their sum:
-///   energy   clip(Ê, 0, 1.5)
-///   height   (ĥ + 1) / 2
-///   balance  5 when inverted
-///   velocity -0.01 (w1² + w2²) when inverted
-///   torque   -0.05 tau² when inverted, -0.01 tau² otherwise
+/// reward is their sum.
 std::array<double, kRewardTerms> RewardTerms(const Plant& plant, const PendulumState& s,
                                              double tau);
-
-/// Weights of the reward's terms; 0 leaves a term out.
-struct RewardWeights {
-  std::array<double, kRewardTerms> weight{1, 1, 1, 1, 1};
-
-  /// Declares each setting in `options`: name, range, unit, help.
-  void Describe(Options& options);
-};
 
 }  // namespace upswing

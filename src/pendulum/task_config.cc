@@ -1,4 +1,4 @@
-#include "pendulum/task.h"
+#include "pendulum/task_config.h"
 
 namespace upswing {
 

@@ -1,5 +1,4 @@
-// The training loop. N environments, A numbers of an action. Steps are control steps over all
-// environments.
+// The training loop of N environments. Steps are control steps, counted over all environments.
 #include "rl/trainer.h"
 
 #include <optional>
