@@ -20,7 +20,13 @@ namespace upswing {
 /// changes sign. So a network that swings up in one direction swings back after a fall past
 /// upright, within the range of a machine's encoders.
 ///
-/// All parameters form one vector, so that they can be searched (search.h).
+/// All parameters form one vector, so that they can be searched (search.h). In order:
+///   n (4)         the gains are K exp(0.3 n). K and P solve the LQR of the plant without friction,
+///                 Q = diag(1, 1, 0.1, 0.1), R = 1, x = (q1 - π, q2, w1, w2)
+///   ln ρ, ln a    s = z² (3 - 2 z), z = a (1 - x' P x / ρ) + ½ clamped to 0 … 1
+///   the rest      network 8 → H → H → 1: for each unit its weights, then its bias
+/// Inputs: sin and cos of q1, of q1 + q2 and of q2, then w1/10, w2/10 [rad/s]. A unit computes
+/// f(x) = x (27 + x²)/(27 + 9 x²), x clamped to ±3. The torque is 4 f(y/2) N·m with the last sum y.
 class SwingNet {
  public:
   /// Number of parameters before the network's: K (4), log ρ, sharpness of the blend.
