@@ -9,8 +9,8 @@
 #SBATCH --open-mode=append
 #SBATCH --signal=B:USR2@120
 
-# Lets the worker write a checkpoint. It ends with 75 if its run is not done. Slurm may send TERM to
-# the worker, too, which a second TERM would end at once.
+# Lets the worker write a checkpoint and end with 75. INT, because Slurm may send TERM to the worker as
+# well, and a second TERM ends it without a checkpoint.
 stop() {
   trap '' TERM USR2
   kill -INT "$worker"
