@@ -31,7 +31,7 @@ CSV = FIGURES / "data"
 # backgrounds.
 AGENTS = {
     "d3qn": "#2f7de0", "dqn": "#8c8c3a", "double-dqn": "#b06ac8", "dueling-dqn": "#2a9d9d", "fast": "#d9662a",
-    "sac": "#1a9b6c", "sac-fast": "#6f9a24", "ppo": "#d0478f", "ppo-discrete": "#b5707f",
+    "sac": "#1a9b6c", "sac-fast": "#6f9a24", "ppo": "#d0478f",
     "d3qn-randomized": "#8a6fe0", "d3qn-adaptive": "#b98200",
     "lqr": "#7f8794", "energy": "#a8764a", "pfl": "#8f8072", "tvlqr": "#5b88ad", "mpc": "#d84a4a", "hybrid": "#2b96b8",
 }

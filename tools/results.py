@@ -296,7 +296,7 @@ class Lab:
 
 PAGE_AGENTS = Path("web/public/agents")
 OVERVIEW_AGENTS = ("d3qn", "dqn", "double-dqn", "dueling-dqn", "fast", "sac", "sac-fast", "ppo",
-                   "ppo-discrete", "d3qn-randomized", "d3qn-adaptive")
+                   "d3qn-randomized", "d3qn-adaptive")
 CONTROLLERS = ("lqr", "energy", "pfl", "tvlqr", "mpc")
 SLOW = {"mpc"}  # plans at each decision, so it gets fewer random plants
 LONG = {"d3qn-randomized", "d3qn-adaptive"}  # train for minutes, so their time is not measured

@@ -83,6 +83,7 @@ Error NoForeignEnvironment(const std::string& task) {
 }
 
 std::string ReplacementOf(std::string_view name) {
+  if (name == "ppo-discrete") return "; use the agent ppo with --actions levels";
   const std::string_view env = name.ends_with("pendulum-v1") ? "Pendulum-v1"
                                : name.starts_with("acrobot") ? "Acrobot-v1"
                                                              : "";

@@ -21,7 +21,8 @@ from pathlib import Path
 
 from testing import run
 
-# Cases: MuJoCo and closed form, random plants with a memory, no extension, and each algorithm.
+# Cases, an agent and its flags: MuJoCo and closed form, random plants with a memory, no extension,
+# and each algorithm.
 CASES = {
     "d3qn": ["--steps", "6000", "--eval-every", "3000", "--eval-episodes", "10"],
     "d3qn-bare": ["--steps", "3000", "--eval-every", "1000", "--eval-episodes", "5"],
@@ -30,7 +31,7 @@ CASES = {
     "dqn": ["--steps", "4000", "--eval-every", "2000", "--eval-episodes", "10"],
     "fast": ["--steps", "20000", "--eval-episodes", "20"],
     "ppo": ["--steps", "20480", "--eval-every", "10240", "--eval-episodes", "10"],
-    "ppo-discrete": ["--steps", "20480", "--eval-every", "10240", "--eval-episodes", "10"],
+    "ppo --actions levels": ["--steps", "20480", "--eval-every", "10240", "--eval-episodes", "10"],
     "sac-fast": ["--steps", "10000", "--eval-every", "5000", "--eval-episodes", "10"],
 }
 SLOW = {"d3qn", "d3qn-bare", "dqn"}  # without vector instructions
@@ -43,7 +44,7 @@ PINNED = {
     ("dqn", "avx512"): ("ebd2fa1039aebeb3", "6cf57e5da6b300cf"),
     ("fast", "avx512"): ("994f52d9405b61f1", "b1c4d3444a78c650"),
     ("ppo", "avx512"): ("ce863a10c4591c03", "b83fd75bcb1f6108"),
-    ("ppo-discrete", "avx512"): ("77bb72242c932e1e", "28ba5f0b80c29322"),
+    ("ppo --actions levels", "avx512"): ("77bb72242c932e1e", "28ba5f0b80c29322"),
     ("sac-fast", "avx512"): ("78cc21007713adca", "e05c8e8d44483c3b"),
     ("d3qn", "avx2"): ("a8f77da6918371ea", "0eadbc2cb91c019f"),
     ("d3qn-bare", "avx2"): ("49a53614a224402d", "7354f565dc255071"),
@@ -52,13 +53,13 @@ PINNED = {
     ("dqn", "avx2"): ("25bb5dc7dd9d3864", "ea359cd2088207cc"),
     ("fast", "avx2"): ("bcbccf5991703e16", "271c0159ad2f62e7"),
     ("ppo", "avx2"): ("ce863a10c4591c03", "ffcafd666cc4a3bd"),
-    ("ppo-discrete", "avx2"): ("2bc534143160ffe1", "ded4fe6412d2b8cd"),
+    ("ppo --actions levels", "avx2"): ("2bc534143160ffe1", "ded4fe6412d2b8cd"),
     ("sac-fast", "avx2"): ("eea8d9483ce97703", "9381935c11a69779"),
     ("d3qn-randomized", "portable"): ("87f0338a06d508c1", "5af7b35d41b99212"),
     ("d3qn-small", "portable"): ("bc4f2a57c6f1d5b5", "82249aba8a26fe3f"),
     ("fast", "portable"): ("1f7334c9666b2312", "c3630aa12653a076"),
     ("ppo", "portable"): ("ebda7e5f8c50a8db", "6f0087929cae8b04"),
-    ("ppo-discrete", "portable"): ("52694e6fd553c6fd", "fed33d50d51c7d08"),
+    ("ppo --actions levels", "portable"): ("52694e6fd553c6fd", "fed33d50d51c7d08"),
     ("sac-fast", "portable"): ("fc3a7ded716622ca", "e81540cb781d91a7"),
 }
 
@@ -95,8 +96,8 @@ def table_digest(folder):
 def fingerprint(agent, vectors):
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "run"
-        result = run("train", "--agent", agent, *CASES[agent], "--threads", "1", "--out", out,
-                     "--no-stop-when-solved", env={**os.environ, "UPSWING_VECTORS": vectors})
+        result = run("train", "--agent", *agent.split(), *CASES[agent], "--threads", "1",
+                     "--out", out, "--no-stop-when-solved", env={**os.environ, "UPSWING_VECTORS": vectors})
         if result.returncode == 2 and "on this processor" in result.stderr:
             return None
         assert result.returncode == 0, result.stderr

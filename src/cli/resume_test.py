@@ -69,8 +69,9 @@ class ResumeTest(ProgramTest):
         for command in (["info", "run"], ["train", "--config", config, "--out", "x"]):
             self.refuse(command, "task: expected double-pendulum or gymnasium, got pendulum-v1; train "
                         'on Gymnasium\'s Pendulum-v1 in Python: upswing.train(env="Pendulum-v1")')
-        self.refuse(["train", "--agent", "sac-pendulum-v1"], "--agent: expected an agent",
-                    'upswing.train(env="Pendulum-v1")')
+        for agent, instead in (("sac-pendulum-v1", 'upswing.train(env="Pendulum-v1")'),
+                               ("ppo-discrete", "use the agent ppo with --actions levels")):
+            self.refuse(["train", "--agent", agent], "--agent: expected an agent", instead)
 
     def test_a_run_that_is_being_trained_is_not_resumed(self):
         process = self.start(*small(steps=ENDLESS, stop_when_solved=False))

@@ -9,6 +9,7 @@ namespace upswing {
 
 std::optional<std::string> TrainCommand(const PolicyInfo& info, const std::string& where) {
   constexpr const char* kWhere = "metadata \"config\"";
+  if (!ReplacementOf(info.agent).empty()) return std::nullopt;  // an agent of version 0.5.0
   try {
     const Config named = BuildConfig("", {{"agent", info.agent, "metadata \"agent\""}});
     if (!MissingSettings(info.config, kWhere, true).empty()) return std::nullopt;

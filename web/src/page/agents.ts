@@ -54,7 +54,6 @@ const TITLES = new Map([
   ['sac', 'SAC: any torque'],
   ['sac-fast', 'SAC: a small network'],
   ['ppo', 'PPO: any torque'],
-  ['ppo-discrete', 'PPO: one of some torques'],
 ]);
 
 /// Descriptions of the page's agents, in plain words.
