@@ -22,7 +22,7 @@ from testing import ROOT, UPSWING, ProgramTest, probe, read_csv, read_tensors, s
 AGENTS = ROOT / "web/public/agents"
 ACTORS = sorted((ROOT / "web/tests/actors").glob("*.safetensors"))
 EXAMPLE = ROOT / "examples/c"
-COUNT = 10_000
+COUNT = 2000
 STRICT = ["-pedantic", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion", "-Wshadow"]
 SANITIZE = ["-fsanitize=undefined,address", "-fno-sanitize-recover=all"]
 # The installed compilers: (command, language options).
@@ -151,7 +151,7 @@ class HeaderTest(ProgramTest):
         return (self.folder / "policy.h").read_text(encoding="ascii")
 
     def check(self, policy, *options):
-        """Asserts equal torques in 10,000 random states, each the beginning of an episode."""
+        """Asserts equal torques in COUNT random states, each the beginning of an episode."""
         self.build(policy, *options)
         states = random_states()
         expected = rows_of(probe(policy, "states", states), COUNT)
