@@ -404,6 +404,7 @@ class Problem {
     std::vector<std::array<std::vector<Drive>, 2>> moved_drives(size());
     std::vector<std::array<std::vector<Model>, 2>> moved_models(size());
     for (int i = 0; i < size(); ++i) {
+      if (values_[i].session >= 0) continue;
       for (const int side : {0, 1}) {
         const VectorXd theta = moved(i, side == 0 ? 1 : -1);
         if (ChangesDrive(values_[i].name)) moved_drives[i][side] = DrivesAt(theta);
@@ -424,8 +425,14 @@ class Problem {
         d.tail(more) = (a.torque - b.torque).reshaped() / (2 * h);
         return d;
       };
+      int common = 0;  // index of the machine's value; those of the sessions follow it
       for (int i = 0; i < size(); ++i) {
-        if (values_[i].session >= 0 && values_[i].session != shot.session) continue;
+        if (values_[i].session >= 0) {
+          // A session's deviation is added to the machine's value.
+          if (values_[i].session == shot.session) J.col(i) = J.col(common);
+          continue;
+        }
+        common = i;
         std::array<Residuals, 2> sides;
         for (const int side : {0, 1}) {
           const auto& own = moved_drives[i][side];

@@ -159,7 +159,7 @@ TEST(Identify, PredictsLeftOutRunsOfTheRealMachine) {
   for (const int left_out : {0, 2}) {
     std::vector<MachineLog> others = logs;
     others.erase(others.begin() + left_out);
-    const Twin twin = Fit(others, first, values, {.windows = {1, 1}}, &pool).twin;
+    const Twin twin = Fit(others, first, values, {.windows = {1, 2}}, &pool).twin;
     const auto add = [&](std::vector<double>& list, const Twin& t) {
       for (const double e : WindowErrors(logs[left_out], t, 1, false)) list.push_back(e);
     };
