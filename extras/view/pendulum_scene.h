@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "mujoco/model.h"
-#include "pendulum/plant.h"
+#include "pendulum/task.h"
 
 namespace upswing {
 
