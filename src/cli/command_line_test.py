@@ -197,7 +197,7 @@ class SettingsTest(ProgramTest):
         command = [UPSWING, *small(hidden=",".join(["4096"] * 8))]
         done = subprocess.run(["sh", "-c", script, "sh", *command], cwd=self.folder, check=False,
                               capture_output=True, encoding="utf-8")
-        self.assert_one_line(done, 2, "expected at most ", "GB of memory", ", got 6.",
+        self.assert_one_line(done, 2, "expected at most ", "memory", ", got 6.",
                              "--hidden")
         self.assertEqual(list(self.folder.iterdir()), [])
 
