@@ -15,7 +15,7 @@ from pathlib import Path
 PORTABLE = {"src/base", "src/nn", "src/pendulum", "src/rl", "src/control", "src/agents"}
 BELOW_RUNS = PORTABLE | {"src/os", "src/mujoco", "src/report"}
 PRODUCT = BELOW_RUNS | {"src/runs", "src/judge"}
-EXTRAS = {"extras/machine", "extras/realaigym", "extras/loop", "extras/deploy", "extras/view"}
+EXTRAS = {"extras/machine", "extras/realaigym", "extras/deploy", "extras/view"}
 
 # Folders that each folder may include, besides itself. The commands of extras match COMMAND and
 # count as a folder of their own.
@@ -34,7 +34,6 @@ LAYERS = {
     "src/cli": PRODUCT,
     "extras/machine": PRODUCT,
     "extras/realaigym": PRODUCT | {"extras/machine"},
-    "extras/loop": PRODUCT | {"extras/machine", "extras/realaigym"},
     "extras/deploy": PRODUCT,
     "extras/view": PRODUCT,
     "commands": PRODUCT | EXTRAS | {"src/cli"},

@@ -70,6 +70,34 @@ class PolicyController : public BoardController {
   ObservationBuilder builder_;
 };
 
+/// Controller made by MachineControllerOf: the first lane of a block.
+class OfOneMachine : public MachineController {
+ public:
+  explicit OfOneMachine(const Competitor& competitor)
+      : period_(competitor.period), controller_(competitor.make(0)) {
+    // A first call touches memory that is not there yet; a second controller takes it.
+    competitor.make(0)->Act(0, measured_, 1, torque_);
+    torque_ = {};
+  }
+
+  int64_t hz() const override { return kBoardHz / period_; }
+
+  double Torque(int64_t step, const PendulumState& state, bool estimated) override {
+    measured_.SetFirst(state, estimated);
+    controller_->Act(static_cast<int>(step) * period_, measured_, 1, torque_);
+    return torque_[0];
+  }
+
+ private:
+  static constexpr int64_t kBoardHz = 500;
+  static_assert(kBoardTimestep * kBoardHz == 1);
+
+  int period_;
+  std::unique_ptr<BoardController> controller_;
+  BoardMeasurement measured_{};
+  Lanes torque_{};
+};
+
 /// The benchmark's own regulator of the linear model, with the weights of its baselines.
 class RegulatorController : public BoardController {
  public:
@@ -140,6 +168,10 @@ Competitor CompetitorOf(const BoardSearch& search, const std::string& name) {
 
 std::unique_ptr<BoardController> ControllerOf(const LoadedPolicy& loaded, size_t count) {
   return std::make_unique<PolicyController>(loaded, count);
+}
+
+std::unique_ptr<MachineController> MachineControllerOf(const Competitor& competitor) {
+  return std::make_unique<OfOneMachine>(competitor);
 }
 
 Competitor GetCompetitor(PolicyArguments a, const std::string& robot,

@@ -7,6 +7,7 @@
 
 #include "agents/loaded_policy.h"
 #include "base/progress.h"
+#include "extras/machine/controller.h"
 #include "extras/machine/twin.h"
 #include "extras/realaigym/search.h"
 #include "runs/find_policy.h"
@@ -23,6 +24,9 @@ struct Competitor {
   std::string plant = {};  // plant of its design; empty: the board's
   int period = 1;          // steps of kBoardTimestep from one action to the next
 };
+
+/// The competitor's controller of one machine.
+std::unique_ptr<MachineController> MachineControllerOf(const Competitor& competitor);
 
 /// Steps of the board in a control period of the task, 20 ms.
 inline constexpr int kPolicyPeriod = static_cast<int>(kControlPeriod / kBoardTimestep + 0.5);

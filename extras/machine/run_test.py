@@ -19,7 +19,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "src/cli"))
 from testing import PATIENCE, ROOT, UPSWING, ProgramTest, read_csv  # noqa: E402
 
-TWIN = ROOT / "extras/loop/testdata/twin.toml"
+TWIN = ROOT / "extras/machine/testdata/twin.toml"
 # Tests run on busy machines: readings may be late, which a real run would not accept.
 PATIENT = ["--twin", TWIN, "--max-age", 1]
 

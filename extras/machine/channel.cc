@@ -1,4 +1,4 @@
-#include "extras/loop/channel.h"
+#include "extras/machine/channel.h"
 
 #include <arpa/inet.h>
 #include <fcntl.h>

@@ -1,4 +1,4 @@
-#include "extras/loop/link.h"
+#include "extras/machine/link.h"
 
 #include <sched.h>
 #include <sys/mman.h>

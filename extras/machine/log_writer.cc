@@ -1,4 +1,4 @@
-#include "extras/loop/log_writer.h"
+#include "extras/machine/log_writer.h"
 
 #include <fmt/format.h>
 #include <sys/file.h>

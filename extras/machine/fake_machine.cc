@@ -1,11 +1,11 @@
-#include "extras/loop/fake_machine.h"
+#include "extras/machine/fake_machine.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 
-#include "extras/loop/link.h"
+#include "extras/machine/link.h"
 
 namespace upswing {
 namespace {

@@ -9,8 +9,9 @@
 #include <new>
 #include <thread>
 
-#include "extras/loop/fake_machine.h"
-#include "extras/loop/testing.h"
+#include "extras/machine/fake_machine.h"
+#include "extras/machine/loop_testing.h"
+#include "extras/realaigym/boards.h"
 #include "nn/network_policy.h"
 #include "os/file.h"
 #include "os/testing.h"
@@ -81,10 +82,10 @@ TEST(ControlLoop, ACycleAllocatesNoMemory) {
       std::filesystem::path(__FILE__).parent_path().parent_path().parent_path() / "docs/figures";
   const std::string searched = (figures / "realaigym-pendubot.safetensors").string();
   for (const Competitor& competitor :
-       {Sine(1), made_of(lqr), made_of(network), GetCompetitor({searched, {}, {}}, "")}) {
+       {made_of(lqr), made_of(network), GetCompetitor({searched, {}, {}}, "")}) {
     const Server server;
     LoopBench bench;
-    bench.competitor = competitor;
+    bench.machine_controller = MachineControllerOf(competitor);
     bench.log_path = FreePath(folder / "log.csv").string();
     // The machine that runs the tests may be busy, and the searched policy is fast.
     bench.limits.age = 1;

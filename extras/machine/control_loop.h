@@ -6,32 +6,30 @@
 #include <memory>
 #include <string>
 
-#include "extras/loop/link.h"
-#include "extras/loop/log_writer.h"
-#include "extras/loop/supervisor.h"
+#include "extras/machine/controller.h"
 #include "extras/machine/estimator.h"
-#include "extras/realaigym/boards.h"
+#include "extras/machine/link.h"
+#include "extras/machine/log_writer.h"
+#include "extras/machine/supervisor.h"
 
 /// The control loop on a machine.
 namespace upswing {
 
-/// A competitor's controller at the rate of the loop. Its own period stays: a policy of 20 ms holds
-/// its torque for several cycles.
+/// A controller at the rate of the loop. It keeps its own period: a policy of 20 ms holds its
+/// torque for several cycles.
 class LoopController {
  public:
-  /// Throws BadInput if the controller's steps do not fit the rate (Hz).
-  LoopController(const Competitor& competitor, int64_t hz);
+  /// Throws BadInput unless the rate `hz` of the loop is a multiple of the controller's.
+  LoopController(std::unique_ptr<MachineController> controller, int64_t hz);
   /// The motor's torque (N·m) in a cycle; number 0 is the first one. `estimated`: whether the
   /// state's velocities come from a model.
   double Act(int64_t cycle, const PendulumState& state, bool estimated);
 
  private:
+  std::unique_ptr<MachineController> controller_;
   int64_t hz_;
-  int64_t held_;       // steps of the board's 2 ms for which a torque is held
-  int64_t step_ = -1;  // last one at which the controller acted
-  std::unique_ptr<BoardController> controller_;
-  BoardMeasurement measured_{};
-  Lanes torque_{};
+  int64_t step_ = -1;  // the controller's last step
+  double torque_ = 0;  // N·m
 };
 
 struct LoopConfig {

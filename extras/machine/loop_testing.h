@@ -3,40 +3,34 @@
 #include <cmath>
 #include <memory>
 #include <string>
+#include <utility>
 
-#include "extras/loop/control_loop.h"
+#include "extras/machine/control_loop.h"
 #include "extras/machine/testing.h"
 
 /// Helpers for tests of control loops.
 namespace upswing {
 
 /// Swings the motor's joint by a sine of the time.
-class SineController : public BoardController {
+class SineController : public MachineController {
  public:
-  explicit SineController(double amplitude) : amplitude_(amplitude) {}
-  void Act(int step, const BoardMeasurement& /*measured*/, size_t /*count*/,
-           Lanes& torque) override {
-    torque[0] = amplitude_ * std::sin(6 * step * kBoardTimestep);
+  explicit SineController(double amplitude, int64_t hz = 50) : amplitude_(amplitude), hz_(hz) {}
+  int64_t hz() const override { return hz_; }
+  double Torque(int64_t step, const PendulumState& /*state*/, bool /*estimated*/) override {
+    return amplitude_ * std::sin(6 * static_cast<double>(step) / static_cast<double>(hz_));
   }
 
  private:
   double amplitude_;  // N·m
+  int64_t hz_;
 };
-
-inline Competitor Sine(double amplitude) {
-  return {"sine",
-          Robot::kPendubot,
-          [amplitude](size_t) { return std::make_unique<SineController>(amplitude); },
-          {},
-          kPolicyPeriod};
-}
 
 /// A loop on a link, cycle by cycle.
 struct LoopBench {
   Twin twin = TestTwin();
   Limits limits;
   LoopConfig config{.seconds = 2};
-  Competitor competitor = Sine(1.5);
+  std::unique_ptr<MachineController> machine_controller = std::make_unique<SineController>(1.5);
   std::unique_ptr<MachineLink> link;
   std::string log_path;
   bool differences = false;  // whether the estimator goes without the twin
@@ -56,7 +50,7 @@ struct LoopBench {
                                                       .angle_range = twin.sensors.angle_range,
                                                       .quantum = twin.sensors.quantum,
                                                       .period = period});
-    controller = std::make_unique<LoopController>(competitor, config.hz);
+    controller = std::make_unique<LoopController>(std::move(machine_controller), config.hz);
     log = std::make_unique<LogWriter>(log_path);
     loop = std::make_unique<ControlLoop>(config, *link, *estimator, *supervisor, *controller, *log);
   }

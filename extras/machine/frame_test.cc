@@ -1,4 +1,4 @@
-#include "extras/loop/frame.h"
+#include "extras/machine/frame.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "extras/loop/supervisor.h"
+#include "extras/machine/supervisor.h"
 
 #include <algorithm>
 #include <array>

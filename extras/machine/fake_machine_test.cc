@@ -1,4 +1,4 @@
-#include "extras/loop/fake_machine.h"
+#include "extras/machine/fake_machine.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <set>
 
 #include "base/error.h"
-#include "extras/loop/testing.h"
+#include "extras/machine/loop_testing.h"
 
 namespace upswing {
 namespace {

@@ -7,9 +7,9 @@
 #include "base/text.h"
 #include "cli/commands.h"
 #include "cli/signals.h"
-#include "extras/loop/fake_machine.h"
-#include "extras/loop/link.h"
-#include "extras/loop/supervisor.h"
+#include "extras/machine/fake_machine.h"
+#include "extras/machine/link.h"
+#include "extras/machine/supervisor.h"
 
 namespace upswing {
 namespace {

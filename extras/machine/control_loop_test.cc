@@ -1,4 +1,4 @@
-#include "extras/loop/control_loop.h"
+#include "extras/machine/control_loop.h"
 
 #include <gtest/gtest.h>
 
@@ -9,9 +9,9 @@
 #include <thread>
 
 #include "base/error.h"
-#include "extras/loop/fake_machine.h"
-#include "extras/loop/testing.h"
 #include "extras/machine/check.h"
+#include "extras/machine/fake_machine.h"
+#include "extras/machine/loop_testing.h"
 #include "os/testing.h"
 
 namespace upswing {
@@ -206,19 +206,18 @@ TEST(ControlLoop, CompensatesTheFrictionOfTheOtherJoint) {
 }
 
 /// Fails in its hundredth cycle, while the motor drives.
-class FailingController : public BoardController {
+class FailingController : public MachineController {
  public:
-  void Act(int step, const BoardMeasurement& /*measured*/, size_t /*count*/,
-           Lanes& torque) override {
+  int64_t hz() const override { return 500; }
+  double Torque(int64_t step, const PendulumState& /*state*/, bool /*estimated*/) override {
     if (step >= 100) throw std::bad_alloc();
-    torque[0] = 1;
+    return 1;
   }
 };
 
 TEST(ControlLoop, AnExceptionSwitchesTheMotorsOff) {
   LoopBench bench;
-  bench.competitor.make = [](size_t) { return std::make_unique<FailingController>(); };
-  bench.competitor.period = 1;
+  bench.machine_controller = std::make_unique<FailingController>();
   bench.link = std::make_unique<FakeLink>(bench.twin, FakeConfig{});
   bench.Make();
   EXPECT_THROW(bench.loop->Run(), std::bad_alloc);
@@ -269,10 +268,18 @@ TEST(Supervisor, TakesTheReadingsOfARealMachineForMotions) {
   EXPECT_GT(rows, 50'000);
 }
 
+/// The torque is the first angle.
+class AngleController : public MachineController {
+ public:
+  int64_t hz() const override { return 50; }
+  double Torque(int64_t /*step*/, const PendulumState& state, bool /*estimated*/) override {
+    return state.q1;
+  }
+};
+
 TEST(LoopController, KeepsThePeriodOfAPolicy) {
-  const Competitor lqr = GetCompetitor({"lqr", {}, {}}, "");
   for (const int64_t hz : {100, 250, 400, 500, 1000}) {
-    LoopController controller(lqr, hz);
+    LoopController controller(std::make_unique<AngleController>(), hz);
     const int64_t held = hz / 50;  // cycles in 20 ms
     double last = 0;
     for (int64_t cycle = 0; cycle < 10 * held; ++cycle) {
@@ -283,15 +290,13 @@ TEST(LoopController, KeepsThePeriodOfAPolicy) {
     }
   }
   // After missed cycles it acts once, and then at its own times again.
-  LoopController late(lqr, 500);
+  LoopController late(std::make_unique<AngleController>(), 500);
   const double first = late.Act(0, {3.1, 0, 0, 0}, true),
                second = late.Act(47, {3.2, 0, 0, 0}, true);
   EXPECT_NE(first, second);
   EXPECT_EQ(late.Act(49, {3.1, 0, 0, 0}, true), second);
   EXPECT_EQ(late.Act(50, {3.1, 0, 0, 0}, true), first);
-  Competitor own = Sine(1);
-  own.period = 1;
-  EXPECT_THROW(LoopController(own, 400), Error);
+  EXPECT_THROW(LoopController(std::make_unique<SineController>(1, 500), 400), Error);
 }
 
 TEST(LogRing, KeepsTheOrderAcrossThreads) {

@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "base/text.h"
-#include "extras/loop/fake_machine.h"
-#include "extras/loop/link.h"
-#include "extras/loop/testing.h"
+#include "extras/machine/fake_machine.h"
+#include "extras/machine/link.h"
+#include "extras/machine/loop_testing.h"
 
 /// A link to a machine with faults of all kinds, for tests of the whole control loop.
 namespace upswing {
@@ -200,14 +200,14 @@ class AdverseLink : public MachineLink {
 };
 
 /// A controller whose torques jump, exceed their limits and are not always finite.
-class WildController : public BoardController {
+class WildController : public MachineController {
  public:
   explicit WildController(Chooser choose) : choose_(std::move(choose)) {}
-  void Act(int /*step*/, const BoardMeasurement& /*measured*/, size_t /*count*/,
-           Lanes& torque) override {
+  int64_t hz() const override { return 500; }
+  double Torque(int64_t /*step*/, const PendulumState& /*state*/, bool /*estimated*/) override {
     constexpr std::array kTorques{-1e300, -5.0, -1.0, 0.0, 2.0, 5.0, 1e300};
     if (choose_(20) == 0) torque_ = kTorques[choose_(kTorques.size())];
-    torque[0] = choose_(5000) == 0 ? std::nan("") : torque_;
+    return choose_(5000) == 0 ? std::nan("") : torque_;
   }
 
  private:
@@ -229,8 +229,7 @@ inline AdverseRun RunAdversely(bool with_twin, uint32_t rarity, int64_t most,
   bench.config.seconds = 0.2 + 0.3 * choose(7);
   bench.differences = !with_twin;
   if (choose(4) > 0) {
-    bench.competitor.make = [&](size_t) { return std::make_unique<WildController>(choose); };
-    bench.competitor.period = 1;
+    bench.machine_controller = std::make_unique<WildController>(choose);
   }
   bench.link = std::make_unique<AdverseLink>(bench.twin, Joints{5, 0.5}, rarity, choose);
   const auto& link = dynamic_cast<const AdverseLink&>(*bench.link);

@@ -7,14 +7,14 @@
 #include <string>
 
 #include "base/rng.h"
-#include "extras/loop/adverse_testing.h"
+#include "extras/machine/adverse_testing.h"
 
 namespace upswing {
 namespace {
 
 TEST(AdverseMachine, GetsOnlyTorquesThatAreSafe) {
   const char* wanted = std::getenv("UPSWING_LOOP_CYCLES");  // 1000000 tries longer
-  const int64_t cycles = wanted == nullptr ? 50'000 : std::atoll(wanted);
+  const int64_t cycles = wanted == nullptr ? 100'000 : std::atoll(wanted);
   std::map<std::string, int> ends;  // by the first words of their reasons
   int64_t done = 0;
   for (uint64_t seed = 1; done < cycles; ++seed) {

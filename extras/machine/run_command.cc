@@ -11,7 +11,8 @@
 #include "base/text.h"
 #include "cli/commands.h"
 #include "cli/signals.h"
-#include "extras/loop/control_loop.h"
+#include "extras/machine/control_loop.h"
+#include "extras/realaigym/boards.h"
 #include "os/streams.h"
 
 namespace upswing {
@@ -77,7 +78,7 @@ int Drive(const RunArguments& a, const Competitor& competitor, const std::option
   const int joint = static_cast<int>(competitor.robot);
   const auto hz = std::llround(a.hz);
   const double period = 1 / a.hz;
-  LoopController controller(competitor, hz);
+  LoopController controller(MachineControllerOf(competitor), hz);
   Estimator estimator = twin && !a.differences
                             ? Estimator(*twin, period)
                             : Estimator(twin ? twin->sensors : a.sensors, period);

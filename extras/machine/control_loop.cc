@@ -1,7 +1,8 @@
-#include "extras/loop/control_loop.h"
+#include "extras/machine/control_loop.h"
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "base/error.h"
 #include "base/text.h"
@@ -9,31 +10,24 @@
 namespace upswing {
 namespace {
 
-constexpr int64_t kBoardHz = 500;     // steps per second of a BoardController
 constexpr double kAnswerShare = 0.5;  // share of a cycle that waits for the answer
-static_assert(kBoardTimestep * kBoardHz == 1);
 
 }  // namespace
 
-LoopController::LoopController(const Competitor& competitor, int64_t hz)
-    : hz_(hz), held_(competitor.period), controller_(competitor.make(0)) {
-  // The first call touches memory that is not there yet; a second controller takes it.
-  competitor.make(0)->Act(0, measured_, 1, torque_);
-  torque_ = {};
-  if (held_ == 1 && hz % kBoardHz != 0) {
-    throw BadInput(Concat("--hz: expected 500 or 1000 for ", Printable(competitor.name),
-                          ", which acts every 2 ms, got ", hz));
+LoopController::LoopController(std::unique_ptr<MachineController> controller, int64_t hz)
+    : controller_(std::move(controller)), hz_(hz) {
+  if (hz % controller_->hz() != 0) {
+    throw BadInput(Concat("--hz: expected a multiple of ", controller_->hz(),
+                          ", the controller's steps per second, got ", hz));
   }
 }
 
 double LoopController::Act(int64_t cycle, const PendulumState& s, bool estimated) {
   // After missed cycles only the last of the missed actions is made up.
-  const int64_t step = cycle * kBoardHz / hz_ / held_ * held_;
-  if (step == step_) return torque_[0];
+  const int64_t step = cycle * controller_->hz() / hz_;
+  if (step != step_) torque_ = controller_->Torque(step, s, estimated);
   step_ = step;
-  measured_.SetFirst(s, estimated);
-  controller_->Act(static_cast<int>(step), measured_, 1, torque_);
-  return torque_[0];
+  return torque_;
 }
 
 double LoopSummary::LatenessOf(double share) const {

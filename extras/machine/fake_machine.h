@@ -8,8 +8,8 @@
 
 #include "base/options.h"
 #include "base/rng.h"
-#include "extras/loop/channel.h"
-#include "extras/loop/frame.h"
+#include "extras/machine/channel.h"
+#include "extras/machine/frame.h"
 #include "extras/machine/simulated_machine.h"
 #include "extras/machine/twin.h"
 

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstdint>
+
+#include "pendulum/task.h"
+
+namespace upswing {
+
+/// A controller of one machine: from the state to the torque of its motor.
+class MachineController {
+ public:
+  virtual ~MachineController() = default;
+  /// Steps per second. A torque is held for a step.
+  virtual int64_t hz() const = 0;
+  /// The motor's torque (N·m) in a step; number 0 is the first one. Steps can be left out.
+  /// `estimated`: whether the state's velocities come from a model.
+  virtual double Torque(int64_t step, const PendulumState& state, bool estimated) = 0;
+};
+
+}  // namespace upswing
