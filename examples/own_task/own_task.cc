@@ -74,7 +74,8 @@ int main(int argc, char** argv) try {
   Trainer trainer(train, *agent, env, evaluator);
   trainer.AddObserver(printer);
   while (trainer.Step()) continue;
-  std::printf("%s\n", trainer.state().solved ? "solved" : "not solved");
+  std::printf("%s after %d steps\n", trainer.state().solved ? "solved" : "not solved",
+              int(trainer.state().steps));
 } catch (const Error& error) {
   std::fprintf(stderr, "own_task: %s\n", error.what());
   return error.exit_code();
