@@ -16,32 +16,6 @@ namespace {
 
 constexpr size_t kLongText = 48;  // longer differences are not shown
 
-/// Name of the setting that holds the model's content.
-constexpr const char* kModelContent = "model";
-
-/// Name (`section.key`) and value of each setting that decides the training, of all algorithms,
-/// plus the model's content. The order is the same for any two runs.
-using Settings = std::vector<std::pair<std::string, std::string>>;
-
-Settings SettingsOf(Config config) {
-  Settings settings;
-  config.model.clear();  // the content of a model counts, not its path
-  Config scratch;
-  const Options own = OptionsOf(config), all = EverySetting(scratch);
-  for (const Option& every : all.all()) {
-    const Option* found = own.Get(every.name);
-    const std::string name = Concat(every.section, ".", every.name);
-    if (found == nullptr || found->decides != Option::Decides::kTraining) {
-      settings.emplace_back(name, "none");
-      continue;
-    }
-    const auto* text = std::get_if<std::string*>(&found->target);
-    settings.emplace_back(name, text != nullptr ? **text : found->text());
-  }
-  settings.emplace_back(kModelContent, ModelContent(config.mjcf));
-  return settings;
-}
-
 /// The label of a run's group.
 std::string LabelOf(const RunRecord& run) {
   return Concat(run.variant.empty() ? run.config.agent : run.variant,
@@ -51,38 +25,40 @@ std::string LabelOf(const RunRecord& run) {
 /// Whether a setting belongs to the task that a policy is evaluated on: model, plant, disturbance,
 /// randomisation, and how many episodes have to succeed. Settings of the training, and of when and
 /// in which engine it evaluates, do not belong to it.
-bool IsTask(const std::string& name) {
-  constexpr std::array<std::string_view, 3> kBeginnings{"plant.", "disturbance.", "randomize."};
-  return name == kModelContent || name == "train.eval_episodes" || name == "task.environment" ||
-         std::ranges::any_of(
-             kBeginnings, [&](std::string_view beginning) { return name.starts_with(beginning); });
+bool IsTask(const Option& option) {
+  constexpr std::array<std::string_view, 3> kSections{"plant", "disturbance", "randomize"};
+  return option.name == "eval_episodes" || option.name == "environment" ||
+         std::ranges::find(kSections, option.section) != kSections.end();
 }
 
 /// Tells whether a setting counts.
-using Wanted = bool (*)(const std::string& name);
+using Wanted = bool (*)(const Option& option);
 
-/// The settings that differ among `others`, such as `hidden [64, 64], head 32`.
+/// The settings that decide the training and differ from some of `others`, such as `hidden [64,
+/// 64], head 32`.
 std::string Differences(
-    const Settings& settings, const std::vector<const Settings*>& others,
-    Wanted wanted = [](const std::string& name) { return name != "train.agent"; }) {
+    const Options& settings, const std::vector<const Options*>& others,
+    Wanted wanted = [](const Option& option) { return option.name != "agent"; }) {
   std::vector<std::string> parts;
-  for (size_t i = 0; i < settings.size(); ++i) {
-    const std::string& name = settings[i].first;
-    const std::string& value = settings[i].second;  // clang 14 captures no structured binding
-    const bool differs = std::ranges::any_of(
-        others, [&](const Settings* other) { return (*other)[i].second != value; });
-    if (!differs || !wanted(name)) continue;
-    const std::string key = name.substr(name.find('.') + 1);
-    parts.push_back(value.size() < kLongText ? Concat(key, " ", value) : key);
+  for (const Option& option : settings.all()) {
+    if (option.decides != Option::Decides::kTraining || !wanted(option)) continue;
+    const bool differs = std::ranges::any_of(others, [&](const Options* other) {
+      const Option* its = other->Get(option.name);
+      return its == nullptr || its->text() != option.text();
+    });
+    if (!differs) continue;
+    const auto* text = std::get_if<std::string*>(&option.target);
+    const std::string value = text != nullptr ? **text : option.text();
+    parts.push_back(value.size() < kLongText ? Concat(option.name, " ", value) : option.name);
   }
   return Join(parts, ", ");
 }
 
 /// Sets how each group (with these `settings`) differs from the others. Groups with the same name
 /// get a second name: their differences from each other, or a number if there are many.
-void TellGroupsApart(std::vector<RunGroup>& groups, const std::vector<Settings>& settings) {
-  std::vector<const Settings*> all;
-  std::map<std::string, std::vector<const Settings*>> namesakes;
+void TellGroupsApart(std::vector<RunGroup>& groups, const std::vector<Options>& settings) {
+  std::vector<const Options*> all;
+  std::map<std::string, std::vector<const Options*>> namesakes;
   for (size_t i = 0; i < groups.size(); ++i) {
     all.push_back(&settings[i]);
     namesakes[groups[i].label].push_back(&settings[i]);
@@ -196,17 +172,17 @@ void NoteTimes(const std::vector<RunRecord>& runs, std::vector<std::string>& not
 }
 
 /// Numbers the tasks that the groups (with these `settings`) are evaluated on, in their order.
-void TellTasksApart(Comparison& comparison, const std::vector<Settings>& settings) {
-  std::vector<const Settings*> tasks;  // of a group on each task
+void TellTasksApart(Comparison& comparison, const std::vector<Options>& settings) {
+  std::vector<const Options*> tasks;  // of a group on each task
   for (size_t i = 0; i < settings.size(); ++i) {
-    const auto same = [&](const Settings* other) {
+    const auto same = [&](const Options* other) {
       return Differences(settings[i], {other}, IsTask).empty();
     };
     const auto at = std::ranges::find_if(tasks, same);
     comparison.groups[i].task = static_cast<int>(at - tasks.begin());
     if (at == tasks.end()) tasks.push_back(&settings[i]);
   }
-  for (const Settings* task : tasks) {
+  for (const Options* task : tasks) {
     comparison.task_texts.push_back(Differences(*task, tasks, IsTask));
   }
 }
@@ -232,21 +208,25 @@ Comparison GroupRuns(const CompareRequest& request) {
   }
   Comparison comparison;
   std::vector<RunGroup>& groups = comparison.groups;
-  std::vector<Settings> settings;  // one per group
   for (const RunRecord& run : found.runs) {
     const auto same = [&](const RunGroup& group) {
       return group.runs.front().settings == run.settings;
     };
     auto at = std::ranges::find_if(groups, same);
-    if (at == groups.end()) {
-      at = groups.insert(at, {LabelOf(run), {}});
-      settings.push_back(SettingsOf(run.config));
-    }
+    if (at == groups.end()) at = groups.insert(at, {LabelOf(run), {}});
     at->runs.push_back(run);
   }
   for (RunGroup& group : groups) {
     std::ranges::sort(group.runs, {}, [](const RunRecord& run) { return run.config.train.seed; });
   }
+  // Of each group: its settings, with the content of its model in place of the path.
+  std::vector<Config> configs;
+  for (const RunGroup& group : groups) {
+    configs.push_back(group.runs.front().config);
+    configs.back().model = ModelContent(configs.back().mjcf);
+  }
+  std::vector<Options> settings;
+  for (Config& config : configs) settings.push_back(OptionsOf(config));
   TellGroupsApart(groups, settings);
   TellTasksApart(comparison, settings);
   comparison.notes = found.notes;
