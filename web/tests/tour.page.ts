@@ -512,7 +512,6 @@ test('with reduced motion, every step waits for a button', async ({ stage: page 
 
 const SIZES = [
   [360, 640],
-  [390, 844],
   [820, 1180],
   [1440, 900],
   [2560, 1300],
