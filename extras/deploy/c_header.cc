@@ -74,14 +74,14 @@ std::string PlantParagraph(const CParts& parts) {
          "\n *\n";
 }
 
-/// What goes in and out of a policy of a foreign task.
+/// Input and output of a foreign task's policy.
 std::string ForeignInputs(const CParts& parts, const std::string& caps) {
   return Concat(" * In: the observation (", caps,
                 "_OBSERVATION_SIZE), as the environment gives it.\n",
                 " * Out: the action, within +-", FormatNumber(parts.limit), ".\n *\n");
 }
 
-/// What goes in and out of a policy of a pendulum. `states` are the lines of its state.
+/// Input and output of a pendulum's policy. `states` are the lines of its state.
 std::string PendulumInputs(const CParts& parts, const std::string& states) {
   return Concat(" * In, in this order; an angle may have made any number of turns:\n", states,
                 " * Out: the torque ", parts.task.motor, ", N m, within +-",
@@ -115,8 +115,8 @@ std::string HeadComment(const CParts& parts, const CHeader& header) {
       foreign ? "observation" : Join(names, ", "), ", &torque);\n *     ",
       foreign ? "act" : "set_motor", "(torque);\n *   }\n *\n",
       foreign ? ForeignInputs(parts, caps) : PendulumInputs(parts, states), PlantParagraph(parts),
-      R"c( * What is not finite, and null pointers, the status tells: the torque is then 0, and what was
- * remembered is forgotten, as after )c",
+      R"c( * The status reports null pointers and numbers that are not finite: the torque is then 0, and the
+ * memory is cleared, as after )c",
       name, "_init.\n *\n",
       Paragraph(Concat("Flash: ", header.constant_bytes,
                        " bytes of constants, 1 to 3 KB of code, and up to 1 KB of samples where "

@@ -44,8 +44,8 @@ fs::path PageFolder() {
                         "the sources builds the page"));
 }
 
-/// Copies what is in `from` into the existing folder `to`. New folders are writable, also where an
-/// installed page is not.
+/// Copies the content of `from` into the existing folder `to`. New folders are writable, also where
+/// an installed page is not.
 void CopyContent(const fs::path& from, const fs::path& to) {
   for (const auto& entry : fs::directory_iterator(from)) {
     const fs::path target = to / entry.path().filename();

@@ -220,7 +220,7 @@ class HeaderTest(ProgramTest):
                                  begins=[0] * 600)
                 self.assertEqual({status for status, _, _ in got}, {0, 1})
 
-    def test_no_number_is_told(self):
+    def test_bad_numbers_set_the_status(self):
         bad = [math.nan, -math.nan, math.inf, -math.inf, 3.4e38, -3.4e38]
         for options in ([], ["-O3", "-ffast-math"]):
             for name in ("fast", "ppo", "d3qn-randomized"):
@@ -445,7 +445,7 @@ class HeaderTest(ProgramTest):
             self.assertIn(agent.encode(), (self.folder / "policy.onnx").read_bytes())
         self.succeed("export", "hostile.safetensors", "--c", "-")
 
-    def test_what_it_says_of_itself(self):
+    def test_it_describes_itself(self):
         printed = self.succeed("export", AGENTS / "fast.safetensors", "--c", "policy.h")
         # Layers 8-48-32, the advantage stream 32-32-9 only, and layer normalisation.
         weights = 8 * 48 + 48 * 32 + 32 * 32 + 32 * 9
@@ -616,7 +616,7 @@ class SwingUpTest(ProgramTest):
         self.assertEqual((code, said), (0, ""))
         self.assertRegex(text, r"^[1-9]\d* ns a call \(sum of torques \S+\)\n$")
 
-    def test_a_failure_is_told(self):
+    def test_a_failure_sets_the_status(self):
         self.build("fast")
         header = (self.folder / "policy.h").read_text(encoding="ascii")
         lazy = header.replace("*torque = policy_choose(outputs);", "*torque = 0.0f;")
@@ -675,7 +675,7 @@ class CortexM4Test(ProgramTest):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("upright from", done.stderr)
 
-    def test_a_damaged_one_is_told(self):
+    def test_a_damaged_one_sets_the_status(self):
         self.succeed("export", AGENTS / "fast.safetensors", "--c", "policy.h")
         header = (self.folder / "policy.h").read_text(encoding="ascii")
         begin = header.index("{", header.index("policy_feature_1_weight["))

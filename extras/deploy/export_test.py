@@ -239,7 +239,7 @@ class PageTest(ProgramTest):
 
 
 class ShippedTest(ProgramTest):
-    def test_the_pages_own_agents_are_what_their_list_says(self):
+    def test_the_pages_own_agents_match_their_list(self):
         folder = ROOT / "web/public/agents"
         entries = json.loads((folder / "agents.json").read_text())["agents"]
         self.assertEqual({path.name for path in folder.iterdir()},
@@ -258,7 +258,7 @@ class ShippedTest(ProgramTest):
                 entry.pop("checkpoints", None)
                 self.assertEqual(json.loads(text)["agents"], [entry])
 
-    def test_the_pages_own_agents_attain_what_they_expect(self):
+    def test_the_pages_own_agents_attain_their_expected_values(self):
         for path in sorted((ROOT / "web/public/agents").glob("*.safetensors")):
             if "-at-" in path.name:
                 continue  # a checkpoint

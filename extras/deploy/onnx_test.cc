@@ -15,7 +15,7 @@ onnx::ModelProto Parse(const OnnxModel& model) {
   return parsed;
 }
 
-TEST(Onnx, HoldsWhatWasAdded) {
+TEST(Onnx, HoldsTheAddedParts) {
   OnnxModel model("graph", "1.2.3", "what it is");
   model.AddInput("x", 2, "in");
   model.AddOutput("y", 3, "out");

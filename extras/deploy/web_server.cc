@@ -115,8 +115,7 @@ void WebServer::Connection::Receive() {
   std::array<char, 4096> buffer;
   const ssize_t size = recv(socket.get(), buffer.data(), buffer.size(), 0);
   is_over = size == 0 || (size < 0 && !IsTemporary(errno));
-  // Reads and drops what follows the last answer: closing with unread data could discard the
-  // answer.
+  // Reads and drops bytes after the last answer: closing with unread data could discard the answer.
   if (state == State::kReceives && size > 0) {
     received.append(buffer.data(), static_cast<size_t>(size));
   }

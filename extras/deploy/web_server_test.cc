@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A page, and next to it a file that nobody may read.
+/// A page, and next to it an unreadable file.
 class Page {
  public:
   Page() {
@@ -122,7 +122,7 @@ TEST(WebFiles, AFolderCanBeReplaced) {
   EXPECT_TRUE(Get(files, "/agents/../index.html").head.starts_with("HTTP/1.1 404 "));
 }
 
-TEST(WebFiles, CompressesForThoseWhoTakeIt) {
+TEST(WebFiles, CompressesForClientsThatAcceptIt) {
   const Page page;
   WebFiles files(page.page);
   files.Compress();
@@ -245,7 +245,7 @@ TEST_F(WebServerTest, AConnectionServesSeveralRequests) {
   EXPECT_TRUE(once.ends_with("404 Not Found\n"));
 }
 
-TEST_F(WebServerTest, RefusesWhatIsNoRequestAndGoesOn) {
+TEST_F(WebServerTest, RefusesOtherBytesThanRequestsAndContinues) {
   const Descriptor silent = Connect();
   EXPECT_TRUE(Exchange("\r\n\r\n").starts_with("HTTP/1.1 400 "));
   EXPECT_TRUE(Exchange("\x16\x03\x01 TLS\r\n\r\n").starts_with("HTTP/1.1 400 "));

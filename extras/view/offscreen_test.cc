@@ -118,7 +118,7 @@ TEST_F(OffscreenTest, TorqueAndGoalAreShown) {
   EXPECT_GT((*goal)[1], 0.6);
 }
 
-TEST_F(OffscreenTest, APictureDependsOnItsArgumentsAlone) {
+TEST_F(OffscreenTest, APictureDependsOnlyOnItsArguments) {
   Artist one({160, 120}), other({96, 200});
   const Pixels first = one.Draw({1, 2}, 1);
   EXPECT_EQ(first.size(), 160U * 120 * 3);

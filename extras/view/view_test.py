@@ -120,7 +120,7 @@ class ViewTest(ProgramTest):
 
 
 class Pictures(ViewTest):
-    def test_what_is_shown_is_what_simulate_writes(self):
+    def test_the_view_shows_the_motion_of_simulate(self):
         shutil.copy(FAST, self.folder / "fast.safetensors")
         for arguments in (["fast.safetensors"], [],
                           ["fast.safetensors", "--set", "mass2=1.2", "--delay", 0.02, "--sensor-noise",
@@ -139,7 +139,7 @@ class Pictures(ViewTest):
         self.assertEqual((self.folder / "a.csv").read_text(encoding="utf-8"),
                          self.succeed("simulate", "fast.safetensors", "--seconds", 1.5))
 
-    def test_pictures_are_those_that_were_stored(self):
+    def test_pictures_equal_the_stored_ones(self):
         drawn, stored = {}, {}
         for name, arguments in (("swing", [FAST, "--seconds", 0.9, "--no-text"]),
                                 ("upright", [FAST, "--seconds", 5, "--no-text"]),
@@ -207,7 +207,7 @@ class Pictures(ViewTest):
         self.assertTrue((self.folder / "link.png").is_symlink())
         self.assertEqual((self.folder / "old.png").read_bytes()[:4], b"\x89PNG")
 
-    def test_what_is_interrupted_leaves_nothing(self):
+    def test_an_interrupted_recording_leaves_nothing(self):
         need("ffmpeg")
         for name in ("a.mp4", "frames/"):  # these begin to write immediately
             arguments = [UPSWING, "view", FAST, "--record", name, "--seconds", "1000", "--width", "64",
@@ -303,7 +303,7 @@ class BadInput(ViewTest):
 
 
 class Launcher(unittest.TestCase):
-    def test_what_is_installed_follows_from_the_arguments(self):
+    def test_the_arguments_decide_what_to_install(self):
         script = ('packages=base picture_packages=egl window_packages=glfw viewer= ; . "$0"; '
                   'view_needs "$@"; echo "$packages ${viewer:-no}"')
         for words, expected in (("run", "base egl glfw yes"), ("", "base egl glfw yes"),

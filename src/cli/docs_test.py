@@ -182,9 +182,9 @@ class Documents(ProgramTest):
         self.assertEqual(results.rendered(shown.replace("|---", "|----", 1)), shown)
 
     def test_plain_english(self):
-        for path in PAGES:
-            for sentence, fault in prose.faults(path.read_text(encoding="utf-8")):
-                with self.subTest(page=path.name, fault=fault):
+        for path in PAGES + prose.sources():
+            for sentence, fault in prose.faults_of(path):
+                with self.subTest(file=path.name, fault=fault):
                     self.fail(sentence)
 
     def test_the_patterns_find_faults(self):
@@ -200,6 +200,9 @@ class Documents(ProgramTest):
                 "It costs so much that nothing is left.",
                 "Units such as those of the plant are kept.",
                 "the same of the second link",
+                "Of interest for who watches.",
+                "A policy whose weights are those that it had.",
+                "Asks anybody alone, and what reads files from them.",
                 "*Everything* has all there is: drag the pendulum with mouse or finger, shove it, pause, "
                 "go step by step or ten times slower, change masses, lengths, dampings, gravity, the "
                 "motor, blur the sensors, delay the torque; compare two agents side by side."):
@@ -209,6 +212,19 @@ class Documents(ProgramTest):
                      "The motor swings the pendulum up.", "| beside_x | 1 |"):
             with self.subTest(text):
                 self.assertEqual(list(prose.faults(text)), [])
+
+    def test_the_patterns_find_faults_in_code(self):
+        files = {"a.cc": '// Says what\n// is wrong.\nx("It goes beside " "the page.\\n");',
+                 "a.ts": "/// For who watches.\nconst x = `a text beside ${y}`;",
+                 "a.py": '"""Begins the work\nanew."""\nx = "a text of nobody"  # alone',
+                 "a.sh": "# made anew\nfail 'asked for so many words'",
+                 "a.html": "<p>Shows what <b>follows</b> here.</p><i title='x' alt=\"nobody\">",
+                 "a_test.cc": "TEST" '(A, SaysWhatIsWrong) { x("a text beside b"); }  // alone'}
+        counts = {}
+        for name, text in files.items():
+            (self.folder / name).write_text(text, encoding="utf-8")
+            counts[name] = len(prose.faults_of(self.folder / name))
+        self.assertEqual(counts, {name: 3 if name == "a.py" else 2 for name in files})
 
     def test_blocks_marked_as_tests_succeed(self):
         launcher = self.folder / "launcher"

@@ -1,5 +1,5 @@
 // Symbols: q1, q2 joint angles (rad; 0 hanging, q2 relative to link 1), w1, w2 their velocities
-// (rad/s), tau torque of the motor (N·m), s and c sine and cosine; the suffix 12 means the sum of
+// (rad/s), tau torque of the motor (N·m), s and c sine and cosine. The suffix 12 means the sum of
 // both angles. equations.h defines the plant's constants J1, J2, b, a, G1, G2, …
 #include "pendulum/closed_form.h"
 

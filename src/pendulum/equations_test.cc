@@ -177,7 +177,7 @@ TEST(Manipulator, IsWhatTheClosedFormSteps) {
   }
 }
 
-TEST(Manipulator, APlantWithoutDryFrictionMovesTheSameBesideOneThatHasIt) {
+TEST(Manipulator, APlantWithoutDryFrictionMovesTheSameNextToOneWithIt) {
   Rng rng(4, "plants");
   for (int trial = 0; trial < 50; ++trial) {
     Plant plant, rough;

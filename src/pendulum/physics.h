@@ -35,7 +35,7 @@ extern const Engine kClosedForm;
 /// The engines that a program includes.
 using Engines = std::span<const Engine* const>;
 
-/// The names of all engines, even those that a program does not include, the default first:
+/// The names of all engines, even of engines that a program does not include, the default first:
 /// "mujoco", "closed-form".
 std::vector<std::string> EngineNames();
 

@@ -177,7 +177,7 @@ TEST(Sensors, RoundingNoiseOfTheVelocities) {
   EXPECT_EQ((SensorModel{0.01, 0, 0.01, 0.01}).velocity_noise(), 0);
 }
 
-TEST(Sensors, ExactOnesBesideOthersMeasureTheSameBits) {
+TEST(Sensors, ExactSensorsNextToOthersMeasureTheSameBits) {
   const SensorModel slow{0.05, 4096, 0.03, 0.01};
   Sensors sensors(2, slow);
   sensors.Begin(0, {});

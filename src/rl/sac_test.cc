@@ -211,7 +211,7 @@ TEST(Sac, LearnsToStayNearZero) {
   }
 }
 
-TEST(Sac, TheActorsStepLeavesTheCriticsAlone) {
+TEST(Sac, TheActorsStepKeepsTheCritics) {
   // Two agents, one with an actor that learns, have the same critics after one update.
   SacConfig config = SmallSac();
   ThreadPool pool(1);

@@ -114,7 +114,7 @@ TEST_F(TrainerTest, ContinuesAfterSolvingIfNotToStop) {
   EXPECT_EQ(evaluations_, 6);
 }
 
-TEST_F(TrainerTest, TellsTheBestPolicyByItsSuccessAndThenItsReturn) {
+TEST_F(TrainerTest, ReportsTheBestPolicyByItsSuccessAndThenItsReturn) {
   scripted_ = {1, 3, 2, 3, 1, 0};  // the scripted return rises by one with each evaluation
   EXPECT_EQ(Run().best_step, 400);
   EXPECT_EQ(best_, (std::vector<int64_t>{100, 200, 400}));
@@ -152,7 +152,7 @@ TEST_F(TrainerTest, OnceSolvedABetterPolicyIsConfirmedToo) {
   EXPECT_EQ(state.best_step, 200);
 }
 
-TEST_F(TrainerTest, TellsMetricsAtTheirIntervalAndEachEpisodeOnce) {
+TEST_F(TrainerTest, ReportsMetricsAtTheirIntervalAndEachEpisodeOnce) {
   const TrainState state = Run();
   EXPECT_EQ(metrics_.size(), 12U);
   EXPECT_EQ(metrics_.front(), 52);  // the first step of four environments that passes 50
