@@ -38,7 +38,7 @@ bool IsForeign(std::string_view task);
 /// The error for work that needs a foreign task's environment.
 Error NoForeignEnvironment(const std::string& task);
 
-/// What replaces a task or agent that version 0.5.0 had, for messages: `; train on …`. Empty for
+/// The replacement of a task or agent of version 0.5.0, for messages: `; train on …`. Empty for
 /// another name.
 std::string ReplacementOf(std::string_view name);
 

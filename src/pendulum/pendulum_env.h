@@ -106,8 +106,7 @@ class PendulumEnv : public VectorEnv {
   // The stages of a step. The torques `chosen` (N) are in N·m.
   /// Returns the torques (N) that the motors apply now, N·m: the chosen ones, after their delay.
   std::span<const double> Actuate(std::span<const double> chosen);
-  /// Turns the packed observations of the physics into what sensors, identification and memory make
-  /// of the successors.
+  /// Applies sensors, identification and memory to the packed observations of the successors.
   void ObserveSuccessors(std::span<const double> chosen, StepResult& result);
   /// Counts the steps of the episodes and truncates those whose time is up.
   void KeepTime(StepResult& result);

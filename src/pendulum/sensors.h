@@ -41,7 +41,7 @@ struct SensorModel {
   double velocity_noise() const;
 };
 
-/// What sensors measure at a control step.
+/// Measurements of a control step.
 struct Measurement {
   PendulumState state;
   double torque = 0;  // N·m, mean over the control period in which the measured velocities changed

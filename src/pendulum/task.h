@@ -7,9 +7,9 @@
 /// The task of the double pendulum as formulas: observation, reward and goal. MuJoCo trainings call
 /// them; closed_form.cc computes the same for many environments at a time.
 ///
-/// Symbols: q1, q2 joint angles (rad; 0 hanging, q2 relative to link 1), w1, w2 velocities (rad/s);
-/// of a link: m mass (kg), l length (m), c distance of the centre of mass from the joint (m),
-/// I moment of inertia about it (kg·m²); g gravity (m/s²), tau the motor's torque (N·m).
+/// Symbols: q1, q2 joint angles (rad; 0 hanging, q2 relative to link 1), w1, w2 velocities (rad/s).
+/// Of a link: m mass (kg), l length (m), c distance of the centre of mass from the joint (m),
+/// I moment of inertia about it (kg·m²). g gravity (m/s²), tau the motor's torque (N·m).
 namespace upswing {
 
 /// The task's name.
