@@ -25,10 +25,10 @@ struct Numbered {
         transition{obs, next_obs, std::span(&action, 1), static_cast<float>(10 * i), 0.5F} {}
 };
 
-const ActionSpace kNine = ActionSpace::Discrete(9);
+const ActionSpace kNineActions = ActionSpace::Discrete(9);
 
 TEST(Replay, KeepsTheNewest) {
-  Replay replay(5, 2, kNine);
+  Replay replay(5, 2, kNineActions);
   for (int i = 0; i < 12; ++i) replay.Add(Numbered(i).transition);
   EXPECT_EQ(replay.size(), 5);
   std::set<float> kept;
@@ -37,7 +37,7 @@ TEST(Replay, KeepsTheNewest) {
 }
 
 TEST(Replay, SamplesWholeTransitionsEvenly) {
-  Replay replay(10, 2, kNine);
+  Replay replay(10, 2, kNineActions);
   for (int i = 0; i < 10; ++i) replay.Add(Numbered(i).transition);
   Rng rng(1, "replay test");
   Minibatch batch(64, 2);
@@ -62,7 +62,7 @@ TEST(Replay, SamplesWholeTransitionsEvenly) {
 TEST(Replay, AMillionTransitionsOfThePendulumFitIn100Megabytes) {
   // A full memory writes all of its numbers to the checkpoint.
   constexpr size_t kRow = (2 * 8 + 3) * sizeof(float);
-  Replay replay(1000, 8, kNine);
+  Replay replay(1000, 8, kNineActions);
   const std::array<float, 8> obs{};
   for (int i = 0; i < 1000; ++i) replay.Add({obs, obs, std::span(obs).first(1), 0, 0});
   Tensors file;
@@ -73,7 +73,7 @@ TEST(Replay, AMillionTransitionsOfThePendulumFitIn100Megabytes) {
 
 TEST(Replay, DrawsByPriorityAndWeighsAsThePaperDoes) {
   ThreadPool pool(2);
-  Replay replay(4, 2, kNine, true);
+  Replay replay(4, 2, kNineActions, true);
   for (int i = 0; i < 4; ++i) replay.Add(Numbered(i).transition);
   // Before any update, all transitions have the same probability and weight 1.
   Rng rng(1, "replay test");
@@ -106,7 +106,7 @@ TEST(Replay, DrawsByPriorityAndWeighsAsThePaperDoes) {
 }
 
 TEST(Replay, ANewTransitionHasTheLargestPrioritySoFar) {
-  Replay replay(3, 2, kNine, true);
+  Replay replay(3, 2, kNineActions, true);
   for (int i = 0; i < 3; ++i) replay.Add(Numbered(i).transition);
   Minibatch batch(3, 2);
   batch.index = {0, 1, 2};
@@ -119,7 +119,7 @@ TEST(Replay, ANewTransitionHasTheLargestPrioritySoFar) {
 
 TEST(Replay, LoadedPrioritiesDrawTheSame) {
   ThreadPool pool(2);
-  Replay saved(5, 2, kNine, true), loaded(5, 2, kNine, true);
+  Replay saved(5, 2, kNineActions, true), loaded(5, 2, kNineActions, true);
   for (int i = 0; i < 7; ++i) saved.Add(Numbered(i).transition);
   Minibatch batch(3, 2), other(3, 2);
   batch.index = {0, 2, 4};
@@ -137,7 +137,7 @@ TEST(Replay, LoadedPrioritiesDrawTheSame) {
 }
 
 TEST(Replay, LoadedStateContinuesAsTheSavedOne) {
-  Replay saved(5, 2, kNine), loaded(5, 2, kNine);
+  Replay saved(5, 2, kNineActions), loaded(5, 2, kNineActions);
   for (int i = 0; i < 7; ++i) saved.Add(Numbered(i).transition);
   SaveAndLoad([&](const Archive& archive) { saved.State(archive); },
               [&](const Archive& archive) { loaded.State(archive); });
@@ -174,7 +174,8 @@ TEST(Replay, KeepsActionsOfSeveralNumbersAndMirrorsThem) {
 }
 
 TEST(Replay, RefusesActionsThatTheAgentDoesNotHave) {
-  Replay saved(5, 2, kNine), loaded(5, 2, ActionSpace::Discrete(3)), torque(5, 2, ActionSpace{1});
+  Replay saved(5, 2, kNineActions), loaded(5, 2, ActionSpace::Discrete(3)),
+      torque(5, 2, ActionSpace{1});
   for (int i = 0; i < 4; ++i) saved.Add(Numbered(i).transition);
   for (Replay* other : {&loaded, &torque}) {
     EXPECT_THROW(SaveAndLoad([&](const Archive& archive) { saved.State(archive); },

@@ -29,7 +29,7 @@ SacConfig SmallSac() {
   return config;
 }
 
-Minibatch RandomBatch(int size) {
+Minibatch RandomMinibatch(int size) {
   Minibatch batch(size, 1);
   Rng rng(1, "batch");
   for (size_t i = 0; i < batch.reward.size(); ++i) {
@@ -89,7 +89,7 @@ TEST(Sac, CenteringFindsTheLevelOfValues) {
     config.alpha = 3;
     ThreadPool pool(1);
     Sac agent(config, ToyEnv::Spec(1), 1, pool);
-    Minibatch batch = RandomBatch(16);
+    Minibatch batch = RandomMinibatch(16);
     std::ranges::fill(batch.reward, 1.0F);
     std::ranges::fill(batch.discount, 0.9F);
     for (int update = 0; update < 300; ++update) agent.Update(batch);
@@ -130,7 +130,7 @@ TEST(Sac, AFixedTemperatureStays) {
   config.alpha = 0.3;
   ThreadPool pool(1);
   Sac agent(config, ToyEnv::Spec(1), 1, pool);
-  for (int i = 0; i < 10; ++i) agent.Update(RandomBatch(16));
+  for (int i = 0; i < 10; ++i) agent.Update(RandomMinibatch(16));
   EXPECT_NEAR(agent.alpha(), 0.3, 1e-6);
 }
 
@@ -172,9 +172,9 @@ TEST(Sac, FindsTheBestActionOfABandit) {
 }
 
 /// A reward of 1 at every step. Episodes are truncated, never terminated.
-class Constant : public ToyEnv {
+class ConstantReward : public ToyEnv {
  public:
-  explicit Constant(int num_envs) : ToyEnv(num_envs) { episode_steps = 3; }
+  explicit ConstantReward(int num_envs) : ToyEnv(num_envs) { episode_steps = 3; }
   void Step(Matrix<const double> action, StepResult& r) override {
     ToyEnv::Step(action, r);
     for (size_t i = 0; i < r.reward.size(); ++i) r.reward[i] = r.reward_terms[i] = 1;
@@ -190,7 +190,7 @@ TEST(Sac, AConstantRewardIsWorthItsSumForEver) {
   config.tau = 0.1;
   ThreadPool pool(1);
   Sac agent(config, ToyEnv::Spec(4), 1, pool);
-  Constant env(4);
+  ConstantReward env(4);
   Walk(agent, env, 1500);
   agent.TakeMetrics();
   Walk(agent, env, 50);
@@ -220,8 +220,8 @@ TEST(Sac, TheActorsStepKeepsTheCritics) {
   config.actor_period = 1000;
   Sac waits(config, ToyEnv::Spec(1), 1, pool);
   const std::vector<float> actor = Copy(learns.actor());
-  learns.Update(RandomBatch(16));
-  waits.Update(RandomBatch(16));
+  learns.Update(RandomMinibatch(16));
+  waits.Update(RandomMinibatch(16));
   for (const size_t i : {0, 1}) EXPECT_EQ(Copy(learns.critic(i)), Copy(waits.critic(i)));
   EXPECT_NE(Copy(learns.actor()), actor);
   EXPECT_EQ(Copy(waits.actor()), actor);
@@ -235,7 +235,7 @@ TEST(Sac, TheExportedPolicyIsTheActorsMeanAndItsCriticsValue) {
   EnvSpec spec = ToyEnv::Spec(1);
   spec.action_limit = {2.5};
   Sac agent(config, spec, 1, pool);
-  for (int i = 0; i < 20; ++i) agent.Update(RandomBatch(16));
+  for (int i = 0; i < 20; ++i) agent.Update(RandomMinibatch(16));
   const Network actor(config.Shape(1, 2)), critic(config.Shape(2, 1));
   auto a = actor.MakeActivations(1, false), c = critic.MakeActivations(1, false);
   const auto policy = agent.ExportPolicy({});
@@ -369,7 +369,7 @@ TEST(Sac, NumbersThatAreNotFiniteAreFailures) {
 
   Sac other(SmallSac(), ToyEnv::Spec(1), 1, pool);
   const std::vector<float> before = Copy(other.critic(0));
-  Minibatch batch = RandomBatch(16);
+  Minibatch batch = RandomMinibatch(16);
   batch.reward[3] = std::numeric_limits<float>::infinity();
   EXPECT_THROW(other.Update(batch), Error);
   EXPECT_EQ(Copy(other.critic(0)), before);

@@ -64,7 +64,7 @@ fs::path WithoutSlash(fs::path path) {
 
 /// Final path of a new run folder: `path` with its links resolved. Throws BadInput if something is
 /// already there, or if the folder cannot be put there in one piece.
-fs::path PlaceOf(const fs::path& path) {
+fs::path FreePlace(const fs::path& path) {
   std::error_code error;
   const bool is_run = fs::exists(path / RunFolder::kConfig, error);
   CheckFree(path, Concat(is_run ? Concat("resume it with --resume ", path.string(), ", or ") : "",
@@ -84,7 +84,7 @@ void RunFolder::Create(const fs::path& given,
                        const std::vector<std::pair<std::string, std::string>>& files,
                        Tensors& checkpoint) {
   const fs::path path = WithoutSlash(given);
-  const fs::path place = PlaceOf(path);
+  const fs::path place = FreePlace(path);
   try {
     if (place.has_parent_path()) MakeFolder(place.parent_path());
     Making folder(place, Making::Kind::kFolder);
