@@ -3,8 +3,8 @@
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 set(UPSWING_LAYERS base nn pendulum rl control os mujoco report agents runs judge)
-set(UPSWING_EXTRAS machine realaigym deploy view)
-set(UPSWING_PROGRAMS upswing upswing-machine upswing-realaigym upswing-deploy upswing-view)
+set(UPSWING_EXTRAS machine realaigym deploy)
+set(UPSWING_PROGRAMS upswing upswing-machine upswing-realaigym upswing-deploy)
 set(UPSWING_PACKAGE ${CMAKE_INSTALL_LIBDIR}/cmake/upswing)
 set(UPSWING_INSTALLED_MUJOCO ${CMAKE_INSTALL_LIBDIR}/upswing/mujoco)
 

@@ -15,4 +15,5 @@ def folder(package):
 program = folder("upswing") / "bin/upswing"
 libraries = [str(folder("mujoco")), *filter(None, [os.environ.get("LD_LIBRARY_PATH")])]
 os.execve(program, [str(program), *sys.argv[1:]],
-          os.environ | {"LD_LIBRARY_PATH": os.pathsep.join(libraries)})
+          {"UPSWING_PYTHON": sys.executable} | os.environ
+          | {"LD_LIBRARY_PATH": os.pathsep.join(libraries)})

@@ -15,7 +15,7 @@ from pathlib import Path
 PORTABLE = {"src/base", "src/nn", "src/pendulum", "src/rl", "src/control", "src/agents"}
 BELOW_RUNS = PORTABLE | {"src/os", "src/mujoco", "src/report"}
 PRODUCT = BELOW_RUNS | {"src/runs", "src/judge"}
-EXTRAS = {"extras/machine", "extras/realaigym", "extras/deploy", "extras/view"}
+EXTRAS = {"extras/machine", "extras/realaigym", "extras/deploy"}
 
 # Folders that each folder may include, besides itself. The commands of extras match COMMAND and
 # count as a folder of their own.
@@ -35,7 +35,6 @@ LAYERS = {
     "extras/machine": PRODUCT,
     "extras/realaigym": PRODUCT | {"extras/machine"},
     "extras/deploy": PRODUCT,
-    "extras/view": PRODUCT,
     "commands": PRODUCT | EXTRAS | {"src/cli"},
     "tools/bench": PRODUCT | EXTRAS | {"src/cli", "examples"},
     "tools/fuzz": PRODUCT | EXTRAS,
@@ -47,9 +46,8 @@ COMMAND = re.compile(r"extras/\w+/(\w+_command|main)\.cc$")
 
 # Files that may include each foreign library.
 ALLOWED_FILES = {
-    "mujoco": re.compile(r"(src/mujoco|extras/view)/"),
-    "GLFW": re.compile(r"extras/view/glfw-inl\.h$"),
-    "zlib.h": re.compile(r"(src/os/gzip|extras/view/png)\.cc$"),
+    "mujoco": re.compile(r"src/mujoco/"),
+    "zlib.h": re.compile(r"src/os/gzip\.cc$"),
     "google": re.compile(r"(src/runs|extras/deploy)/"),
     "nanobind": re.compile(r"python/"),
     "hwy": re.compile(r"(src/(base/simd(_test)?|nn/(linear|product|registers-inl)|"

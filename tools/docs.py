@@ -37,7 +37,7 @@ LAYERS = {
     "control": "Controllers", "os": "Files and processes", "mujoco": "MuJoCo",
     "report": "Statistics and figures", "agents": "Settings and named agents", "runs": "Runs on disk",
     "judge": "Evaluation", "machine": "Logs of machines", "realaigym": "RealAIGym",
-    "loop": "Control of machines", "deploy": "Export", "view": "Films and pictures"}
+    "loop": "Control of machines", "deploy": "Export"}
 
 
 class Stage:

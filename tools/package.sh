@@ -1,7 +1,7 @@
 # shellcheck shell=sh
 # ./upswing package: builds packages for people without a compiler. Read by ./upswing, whose functions it
 # uses, after tools/web.sh, tools/demo.sh and tools/docs.sh.
-: "${root:?}" "${setup:?}" "${packages:?}" "${window_packages:?}" "${bench_packages:?}"
+: "${root:?}" "${setup:?}" "${packages:?}" "${bench_packages:?}"
 
 package_usage() {
   cat <<'END_OF_USAGE'
@@ -55,8 +55,7 @@ package() {
   [ "$setup" = yes ] || bad_input "expected ./upswing package without --no-setup"
   [ "$(uname -m)" = x86_64 ] || bad_input "expected an x86-64 machine, got $(uname -m)"
 
-  packages="$packages $window_packages $deb_packages $bench_packages python3-dev"
-  viewer=yes
+  packages="$packages $deb_packages $bench_packages python3-dev"
   set_up_docs
   # shellcheck disable=SC2046  # a list of words
   set_up release upswing $(extra_programs)

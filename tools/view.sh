@@ -1,31 +1,20 @@
 # shellcheck shell=sh
-# ./upswing view: its own packages. Read by ./upswing, whose functions it uses.
-: "${packages:?}" "${picture_packages:?}" "${window_packages:?}"
+# ./upswing view: a virtual environment with MuJoCo's viewer. Read by ./upswing, whose functions it uses.
+: "${root:?}" "${setup:?}" "${packages:?}"
 
-# view_needs ARGUMENTS: adds to `packages` what these need; sets `viewer` if they open a window.
-view_needs() {
-  pictures=yes window=yes film=no recorded=no
+# set_up_view ARGUMENTS: installs the libraries and Python packages that draw, unless ARGUMENTS ask for help,
+# and names the Python to the program. UPSWING_PYTHON names another one.
+set_up_view() {
+  [ -z "${UPSWING_PYTHON:-}" ] || return 0
   for word; do
-    case $word in
-      -h | --help) pictures=no window=no ;;
-      --headless | --record | --record=*) window=no ;;
-    esac
-    [ "$recorded" = no ] || is_film "$word"
-    recorded=no
-    case $word in
-      --record) recorded=yes ;;
-      --record=*) is_film "$word" ;;
-    esac
+    case $word in -h | --help) return 0 ;; esac
   done
-  [ "$pictures" = no ] || packages="$packages $picture_packages"
-  [ "$film" = no ] || packages="$packages ffmpeg"
-  if [ "$window" = yes ]; then
-    packages="$packages $window_packages"
-    viewer=yes
+  venv=$root/build/view-venv
+  packages="$packages libegl1 libgl1 libgl1-mesa-dri"
+  if [ "$setup" = yes ]; then
+    # shellcheck disable=SC2086  # a list of words
+    (install_packages $packages && lock && make_venv view "$venv" python3 tools/view-requirements.txt) \
+      </dev/null || exit 1
   fi
-}
-
-# Whether ffmpeg writes a file of this name.
-is_film() {
-  case $1 in *.[mM][pP]4 | *.[gG][iI][fF]) film=yes ;; esac
+  [ ! -x "$venv/bin/python" ] || export UPSWING_PYTHON="$venv/bin/python"
 }

@@ -16,8 +16,6 @@
 #include "agents/config_checks.h"
 #include "base/error.h"
 #include "base/text.h"
-#include "extras/view/offscreen.h"
-#include "extras/view/painter.h"
 #include "mujoco/engines.h"
 #include "os/machine.h"
 #include "pendulum/pendulum_env.h"
@@ -135,25 +133,6 @@ class Environments {
     });
   }
 
-  /// Draws an environment's current state and last torque: a new array (height × width × 3), red,
-  /// green, blue, top row first.
-  nb::ndarray<nb::numpy, uint8_t> Draw(int env, int width, int height) {
-    auto pixels = NewArray<uint8_t>({static_cast<size_t>(height), static_cast<size_t>(width), 3});
-    Alone([&] {
-      const PictureSize size{width, height};
-      if (!offscreen_ || offscreen_->size() != size) offscreen_.emplace(size);
-      const Plant& plant = env_.plant(env);
-      if (!scene_ || PlantValues(scene_->plant()) != PlantValues(plant)) {
-        scene_.emplace(plant, config_.mjcf);
-      }
-      scene_->SetCamera(Camera(), static_cast<double>(width) / height);
-      scene_->Update(env_.state(env), {.torque = result_.torque[static_cast<size_t>(env)]});
-      const ScenePanel panel{&*scene_, "", {}};
-      std::ranges::copy(offscreen_->Render({&panel, 1}), pixels.data());
-    });
-    return pixels;
-  }
-
   std::vector<double> State(int env) {
     return Alone([&] {
       const auto [q1, q2, w1, w2] = env_.state(env);
@@ -234,8 +213,6 @@ class Environments {
   std::vector<double> actions_;  // (N) N·m
   StepResult result_;
   std::vector<int> ended_;  // their next step begins an episode
-  std::optional<Offscreen> offscreen_;
-  std::optional<PendulumScene> scene_;  // of the last picture
   std::mutex mutex_;
 };
 
@@ -289,7 +266,6 @@ void BindEnvironments(nb::module_& m) {
         nb::arg("same_step"), nb::call_guard<nb::gil_scoped_release>())
       .def("step", &Environments::Step, nb::arg("action"))
       .def("reset", &Environments::Reset, nb::arg("seeds"), nb::arg("mask"))
-      .def("draw", &Environments::Draw, nb::arg("env"), nb::arg("width"), nb::arg("height"))
       .def("spec", &DescribeTask)
       .def("get_state", &Environments::State, nb::arg("env"))
       .def("set_state", &Environments::SetState, nb::arg("env"), nb::arg("state"))
@@ -306,15 +282,6 @@ void BindEnvironments(nb::module_& m) {
   AddView(c, "terminated", &StepResult::terminated, false);
   AddView(c, "truncated", &StepResult::truncated, false);
   AddView(c, "at_goal", &StepResult::at_goal, false);
-  m.def(
-      "check_picture_size",
-      [](int64_t width, int64_t height) {
-        const auto clamp = [](int64_t n) {
-          return static_cast<int>(std::clamp<int64_t>(n, 0, 1000000));
-        };
-        CheckedSize({clamp(width), clamp(height)});
-      },
-      nb::arg("width"), nb::arg("height"));
 }
 
 }  // namespace upswing

@@ -5,12 +5,15 @@ import csv
 import io
 import os
 import pickle
+import shutil
 import subprocess
+import sys
 import tempfile
 import threading
 import unittest
 import warnings
 from pathlib import Path
+from unittest import mock
 
 import gymnasium as gym
 import numpy as np
@@ -221,7 +224,9 @@ class Rendering(unittest.TestCase):
     def test_gymnasium_finds_nothing_wrong_with_pictures(self):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            check_env(gym.make(ID, render_mode="rgb_array").unwrapped)
+            env = gym.make(ID, render_mode="rgb_array").unwrapped
+            env.metadata = {**env.metadata, "render_modes": ["rgb_array"]}  # others need a display
+            check_env(env)
         self.assertEqual([str(w.message) for w in caught if "Box" not in str(w.message)], [])
 
     def test_many_environments(self):
@@ -235,6 +240,31 @@ class Rendering(unittest.TestCase):
     def test_sizes_that_cannot_be(self):
         with self.assertRaises(upswing.InputError):
             self.draw([0] * 4, width=1)
+
+    def test_a_window_shows_every_step_in_real_time(self):
+        if shutil.which("xvfb-run") is None:
+            if os.environ.get("UPSWING_REQUIRE_PICTURES"):
+                self.fail("xvfb-run is missing")
+            self.skipTest("needs xvfb-run")
+        script = ("import time, gymnasium as gym, upswing\n"
+                  f"env = gym.make({ID!r}, render_mode='human')\n"
+                  "env.reset(seed=0); begin = time.monotonic()\n"
+                  "for _ in range(10): env.step(env.action_space.sample())\n"
+                  "assert env.render() is None\n"
+                  "print(time.monotonic() - begin)\n"
+                  "env.reset(); env.close()")
+        done = subprocess.run(["xvfb-run", "-a", sys.executable, "-c", script], check=False,
+                              capture_output=True, encoding="utf-8")
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertGreater(float(done.stdout), 0.15)
+
+    def test_a_window_needs_a_display(self):
+        env = gym.make(ID, render_mode="human").unwrapped
+        with mock.patch.dict(os.environ):
+            for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+                os.environ.pop(name, None)
+            with self.assertRaisesRegex(upswing.Failure, "render: cannot open a window: DISPLAY"):
+                env.reset()
 
 
 class Copies(unittest.TestCase):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -137,8 +137,73 @@ def seed_of(seed: Any) -> int:
 def picture_size(width: int, height: int) -> tuple[int, int]:
     """Width and height of pictures [pixels]. Raises InputError."""
     size = whole_number("width", width), whole_number("height", height)
-    _upswing.check_picture_size(*size)
+    for name, value in zip(("width", "height"), size):
+        if not 16 <= value <= 8192:
+            raise _upswing.InputError(f"{name}: expected 16 to 8192 pixels, got {value}")
     return size
+
+
+class Pictures:
+    """Draws environments with MuJoCo: as pixels, or in a window. `_view` is imported by the first
+    picture, because training needs none."""
+
+    def __init__(self, core: Core, width: int, height: int) -> None:
+        self._core, self._size = core, picture_size(width, height)
+        self._scenes: dict[int, Any] = {}
+        self._canvas: Any = None
+        self._viewer: Any = None
+
+    def pixels(self, i: int) -> npt.NDArray[np.uint8]:
+        """Pixels (height, width, 3) of environment i. Raises Failure."""
+        scene = self._scene(i)
+        if self._canvas is None:
+            self._canvas = self._drawing(lambda view: view.Canvas(*self._size))
+        pixels: npt.NDArray[np.uint8] = self._canvas.draw(scene)
+        return pixels
+
+    def show(self) -> None:
+        """Shows environment 0 in a window, which opens when it is needed, in real time. Raises
+        Failure."""
+        scene = self._scene(0)
+        if self._viewer is None or self._viewer.scene is not scene:
+            self._close_viewer()
+            self._viewer = self._drawing(lambda view: view.Viewer(scene))
+        self._viewer.draw()
+        self._viewer.wait(self._core.step_seconds)
+
+    def close(self) -> None:
+        if self._canvas is not None:
+            self._canvas.close()
+        self._close_viewer()
+        self._canvas = None
+
+    def _close_viewer(self) -> None:
+        if self._viewer is not None:
+            self._viewer.close()
+        self._viewer = None
+
+    def _scene(self, i: int) -> Any:
+        """Environment i's scene in its present state, another one for each plant."""
+        plant, env = self._core.env.plant(i), self._core.env
+        scene = self._scenes.get(i)
+        if scene is None or scene.plants != [plant]:
+            width, height = self._size
+            scene = self._drawing(lambda view: view.Scene([plant], width / height))
+            self._scenes[i] = scene
+        scene.show(env.get_state(i), env.torque[i])
+        return scene
+
+    @staticmethod
+    def _drawing(make: Callable[[Any], Any]) -> Any:
+        """What `make` returns for the module that draws. Raises Failure if something is missing."""
+        try:
+            from . import _view  # pylint: disable=import-outside-toplevel
+        except ImportError as error:
+            raise _upswing.Failure(f"render: {error}") from error
+        try:
+            return make(_view)
+        except _view.CannotDraw as error:
+            raise _upswing.Failure(f"render: {error}") from error
 
 
 def check_render_mode(mode: str | None, metadata: dict[str, Any]) -> None:

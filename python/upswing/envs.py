@@ -14,7 +14,7 @@ from gymnasium.vector.utils import batch_space
 from typing_extensions import Unpack
 
 from . import _upswing
-from ._environments import Core, check_render_mode, picture_size, seed_of
+from ._environments import Core, Pictures, check_render_mode, seed_of
 from ._types import EnvironmentSettings
 
 
@@ -40,7 +40,7 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
     Args:
         actions: "continuous" or "levels"
         levels: number of torques with actions="levels" (default 9)
-        render_mode: "rgb_array" or None
+        render_mode: "rgb_array" for pictures, "human" for a window in real time, or None
         width, height: size of pictures [pixels]
         **settings: settings of the environment with the defaults of a training, the ones with
             `environment` in `upswing.settings()`: agent, which sets the defaults; physics ("mujoco"
@@ -54,7 +54,7 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
     >>> obs, info = env.reset(seed=1, options={"state": [3.14, 0, 0, 0]})
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}
 
     def __init__(
         self,
@@ -69,10 +69,10 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
         EzPickle.__init__(self, actions=actions, levels=levels, render_mode=render_mode,
                           width=width, height=height, **settings)
         check_render_mode(render_mode, self.metadata)
-        self._size = picture_size(width, height)
         if "threads" in settings:
             raise _upswing.InputError("threads: expected several environments (gym.make_vec)")
         self._core = Core(1, {"threads": 1, **settings}, actions, levels, False)
+        self._pictures = Pictures(self._core, width, height)
         self.observation_space = self._core.observation_space
         self.action_space = self._core.action_space
         self.render_mode = render_mode
@@ -98,6 +98,8 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
         super().reset(seed=None if seed is None else seed_of(seed))
         self._core.begin(self._core.seeds_of(seed, self.np_random), options)
         self._ended = False
+        if self.render_mode == "human":
+            self._pictures.show()
         return self._core.env.obs[0].copy(), {}
 
     def step(
@@ -129,6 +131,8 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
             "at_goal": bool(env.at_goal[0]),
             "reward_terms": dict(zip(core.reward_terms, env.reward_terms[0].tolist())),
         }
+        if self.render_mode == "human":
+            self._pictures.show()
         return env.obs[0].copy(), float(env.reward[0]), terminated, truncated, info
 
     @property
@@ -147,25 +151,26 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
         return self._core.levels
 
     def render(self) -> npt.NDArray[np.uint8] | None:
-        """Draws the current state and the last torque with MuJoCo's renderer.
+        """Draws the current state and the last torque with MuJoCo.
 
         Returns:
-            Pixels (height, width, 3) in red, green, blue; None without a `render_mode`
+            Pixels (height, width, 3) in red, green, blue with render_mode="rgb_array"; None with
+            "human", where `reset` and `step` draw, and without a `render_mode`
 
         Raises:
-            Failure: EGL is missing, which draws without a display (Debian's libegl1 and
-                libgl1-mesa-dri)
+            Failure: something to draw with is missing; the message says what to install
         """
         if self._closed:
             raise gym.error.ClosedEnvironmentError("render: the environment is closed")
         if self.render_mode is None:
-            gym.logger.warn('render: expected render_mode="rgb_array" in gym.make, got None')
+            gym.logger.warn('render: expected a render_mode in gym.make, got None')
             return None
-        return self._core.env.draw(0, *self._size)
+        return self._pictures.pixels(0) if self.render_mode == "rgb_array" else None
 
     def close(self) -> None:
         """Closes the environment; a second call does nothing."""
         self._closed = True
+        self._pictures.close()
 
 
 class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArray[Any]], EzPickle):
@@ -212,11 +217,11 @@ class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArra
                           autoreset_mode=autoreset_mode, copy=copy, render_mode=render_mode,
                           width=width, height=height, **settings)
         check_render_mode(render_mode, self.metadata)
-        self._size = picture_size(width, height)
         mode = _autoreset_mode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": mode}
         self._same_step = mode == AutoresetMode.SAME_STEP
         self._core = Core(num_envs, dict(settings), actions, levels, self._same_step)
+        self._pictures = Pictures(self._core, width, height)
         self.num_envs = self._core.num_envs
         self.render_mode = render_mode
         self._copy = copy
@@ -288,7 +293,10 @@ class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArra
         if self.render_mode is None:
             gym.logger.warn('render: expected render_mode="rgb_array" in gym.make_vec, got None')
             return None
-        return tuple(self._core.env.draw(i, *self._size) for i in range(self.num_envs))
+        return tuple(self._pictures.pixels(i) for i in range(self.num_envs))
+
+    def close_extras(self, **kwargs: Any) -> None:
+        self._pictures.close()
 
     def _final_infos(self, ended: npt.NDArray[np.bool_]) -> dict[str, Any]:
         final = np.full(self.num_envs, None, dtype=object)

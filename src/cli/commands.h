@@ -17,6 +17,7 @@ void AddEval(CommandLine& line);
 void AddSimulate(CommandLine& line);
 void AddMap(CommandLine& line);
 void AddPlot(CommandLine& line);
+void AddView(CommandLine& line);
 void AddInfo(CommandLine& line);
 void AddCompare(CommandLine& line);
 void AddStudy(CommandLine& line);

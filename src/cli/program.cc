@@ -35,7 +35,7 @@ constexpr CommandEntry kTable[] = {
     {"simulate", "Write one rollout of a policy or of given torques as CSV", "upswing"},
     {"map", "Map success over two quantities of plant, sensors or start", "upswing"},
     {"plot", "Draw one episode of a policy as figures", "upswing"},
-    {"view", "Show policies in a window, or record them as a film or pictures", "upswing-view"},
+    {"view", "Show policies in a window, or record them as a film or pictures", "upswing"},
     {"info", "Describe and check a policy or a run, or describe this machine", "upswing"},
     {"compare", "Compare runs over their seeds, with intervals and curves", "upswing"},
     {"study", "Train variants of the settings, each with many seeds", "upswing"},

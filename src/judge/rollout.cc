@@ -64,16 +64,13 @@ Episode::Episode(RolloutConfig config)
   rollout_.disturbance = env_->disturbance(0);
 }
 
-void Episode::Step(bool motor, const std::array<double, 2>& push) {
-  const std::array<double, 2> before =
-      inputs_.empty() ? std::array<double, 2>{} : inputs_.back().push;
-  if (push != before) env_->Push(0, push);
-  inputs_.push_back({motor, push});
+void Episode::Step(const std::array<double, 2>& push) {
+  if (push != push_) env_->Push(0, push);
+  push_ = push;
   const size_t step = rollout_.rows.size();
   double torque = 0;
   if (config_.policy != nullptr) config_.policy->Act(env_->obs(), {&torque, 1, 1}, *memory_);
   if (step < config_.schedule.size()) torque = config_.schedule[step];
-  if (!motor) torque = 0;
   RolloutRow row;
   row.t = static_cast<double>(step) / kStepsPerSecond;
   row.state = env_->state(0);
@@ -86,13 +83,6 @@ void Episode::Step(bool motor, const std::array<double, 2>& push) {
   if (result_.terminated[0] == 0) return;
   throw Failure(
       Concat("the simulation diverged after t = ", FormatNumber(rollout_.rows.back().t), " s"));
-}
-
-void Episode::GoBack(int64_t steps) {
-  std::vector<Input> inputs = inputs_;
-  inputs.resize(static_cast<size_t>(std::clamp<int64_t>(steps, 0, this->steps())));
-  *this = Episode(config_);
-  for (const Input& input : inputs) Step(input.motor, input.push);
 }
 
 PendulumState Episode::StateOfRow(int64_t k) const {

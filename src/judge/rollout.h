@@ -53,12 +53,9 @@ class Episode {
   /// The policy must outlive the episode. Throws BadInput as PendulumEnv does.
   explicit Episode(RolloutConfig config);
 
-  /// Adds a row with the present state, then steps the environment. Without `motor` the torque is 0
-  /// instead of the policy's or schedule's. `push` (N·m) adds a torque to each joint. Throws
-  /// Failure if the state blows up, or if the physics does not support pushes.
-  void Step(bool motor = true, const std::array<double, 2>& push = {});
-  /// Goes back to the state after the first `steps` steps.
-  void GoBack(int64_t steps);
+  /// Adds a row with the present state, then steps the environment. `push` (N·m) adds a torque to
+  /// each joint. Throws Failure if the state blows up, or if the physics does not support pushes.
+  void Step(const std::array<double, 2>& push = {});
 
   const RolloutConfig& config() const { return config_; }
   /// The rollout up to the last step.
@@ -73,11 +70,6 @@ class Episode {
   double TorqueAt(double steps) const;
 
  private:
-  /// Inputs of one step.
-  struct Input {
-    bool motor;
-    std::array<double, 2> push;
-  };
   PendulumState StateOfRow(int64_t k) const;
 
   RolloutConfig config_;
@@ -85,7 +77,7 @@ class Episode {
   StepResult result_;
   std::unique_ptr<Policy::Memory> memory_;
   Rollout rollout_;
-  std::vector<Input> inputs_;  // one per step
+  std::array<double, 2> push_{};  // of the last step, N·m
 };
 
 /// Number of control steps in `seconds`, rounded to the nearest.

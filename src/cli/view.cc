@@ -1,0 +1,263 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "agents/controllers.h"
+#include "base/error.h"
+#include "base/text.h"
+#include "cli/commands.h"
+#include "cli/drawer.h"
+#include "cli/progress.h"
+#include "cli/say.h"
+#include "cli/signals.h"
+#include "judge/rollout.h"
+#include "mujoco/engines.h"
+#include "os/file.h"
+#include "os/streams.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr size_t kMostPolicies = 8;
+constexpr double kForEver = 1e7;  // s, until the window closes or the recording ends
+
+struct ViewArguments {
+  std::vector<std::string> names;
+  PolicyArguments controller;  // settings of the controllers
+  TrialArguments trial;
+  std::string record, size = "960x640";
+  double seconds = -1, fps = -1;  // negative: not given
+  double speed = 1;
+};
+
+/// The policies of the command line, in their order. Throws BadInput.
+std::vector<LoadedPolicy> PoliciesOf(const ViewArguments& a) {
+  if (a.names.size() > kMostPolicies) {
+    throw BadInput(
+        Concat("view: expected at most ", kMostPolicies, " policies, got ", a.names.size()));
+  }
+  std::vector<LoadedPolicy> policies = GetPolicies(a.names, a.controller);
+  for (const LoadedPolicy& loaded : policies) {
+    if (HasPlant(loaded.task)) continue;
+    throw BadInput(Concat(loaded.name, ": expected a policy of ", kDoublePendulum,
+                          ", the only task with a view, got one of ", loaded.task));
+  }
+  return policies;
+}
+
+/// The kind of a recording: mp4, gif, png or folder. Throws BadInput.
+std::string KindOf(const std::string& path) {
+  if (path.ends_with('/')) return "folder";
+  std::string ending = fs::path(path).extension();
+  std::ranges::transform(ending, ending.begin(),
+                         [](char c) { return c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c; });
+  if (ending == ".mp4" || ending == ".gif" || ending == ".png") return ending.substr(1);
+  throw BadInput(
+      Concat("--record: expected FILE.mp4, FILE.gif, FILE.png or FOLDER/, got \"", path, "\""));
+}
+
+/// The recording under construction. Throws BadInput if it cannot have this name.
+std::unique_ptr<Making> MakeRecording(const std::string& path) {
+  if (KindOf(path) == "folder") {
+    const fs::path folder = fs::path(path).parent_path();  // without the trailing slash
+    CheckFree(folder, "choose another --record");
+    return std::make_unique<Making>(folder, Making::Kind::kFolder);
+  }
+  CheckWritable("--record", path);
+  const fs::path file = fs::exists(path) ? fs::canonical(path) : fs::path(path);  // of a link
+  if (fs::exists(file) && !fs::is_regular_file(file)) {
+    throw BadInput(Concat("--record ", path, ": expected a regular file"));
+  }
+  return std::make_unique<Making>(file, Making::Kind::kFile);
+}
+
+/// Sets width and height [pixels]. Throws BadInput.
+void SetSize(const std::string& text, nlohmann::json& job) {
+  const size_t cross = text.find('x');
+  const auto number = [](const std::string& digits) {
+    const std::optional<double> value = ParseNumber(digits);
+    constexpr double kLeast = 16, kMost = 8192;
+    const bool fits = value && *value >= kLeast && *value <= kMost && *value == std::floor(*value);
+    return fits ? static_cast<int>(*value) : 0;
+  };
+  const int width = number(text.substr(0, cross));
+  const int height = cross == std::string::npos ? 0 : number(text.substr(cross + 1));
+  if (width == 0 || height == 0) {
+    throw BadInput(
+        Concat("--size: expected WIDTHxHEIGHT, each 16 to 8192 pixels, such as 960x640, "
+               "got \"",
+               Printable(text), "\""));
+  }
+  job["width"] = width;
+  job["height"] = height;
+}
+
+/// Episodes that the drawing program goes through.
+class Show {
+ public:
+  /// One episode per policy, in their order; `policies` must outlive them.
+  Show(const ViewArguments& a, const std::vector<LoadedPolicy>& policies)
+      : recording_(!a.record.empty()) {
+    const std::vector<std::string> titles = TitlesOf(policies);
+    const auto add = [&](const LoadedPolicy* loaded, const std::string& title) {
+      RolloutConfig config = TrialEpisode(a.trial, loaded);
+      config.title = title;
+      config.seconds = kForEver;
+      episodes_.emplace_back(std::move(config));
+    };
+    for (size_t i = 0; i < policies.size(); ++i) add(&policies[i], titles[i]);
+    if (policies.empty()) add(nullptr, "no policy");
+  }
+
+  /// Adds names and plants.
+  void Describe(nlohmann::json& job) const {
+    for (const Episode& episode : episodes_) {
+      job["names"].push_back(Printable(episode.config().title));
+      nlohmann::json& plant = job["plants"].emplace_back();
+      for (const auto& [name, value] : PlantValues(episode.rollout().plant)) plant[name] = value;
+    }
+  }
+
+  /// Answers a request: a time [control steps], and the torques of the mouse about all joints
+  /// [N·m] from there on; time 0 starts again. The answer is the time, then q1, q2, w1, w2 and the
+  /// motor's torque of each episode.
+  std::string Answer(const std::string& request) {
+    std::vector<double> numbers;
+    for (const std::string_view word : Split(request, ' ')) {
+      numbers.push_back(ParseNumber(word).value_or(0));
+    }
+    double steps = numbers.front();
+    numbers.resize(1 + 2 * episodes_.size());
+    if (steps <= 0) Restart();
+    try {
+      for (size_t i = 0; i < episodes_.size(); ++i) {
+        Advance(episodes_[i], steps, {numbers[1 + 2 * i], numbers[2 + 2 * i]});
+      }
+    } catch (const Error& error) {
+      if (recording_) throw;
+      SayError(OneLine(error.what()));
+      Restart();
+      steps = 0;
+      for (Episode& episode : episodes_) Advance(episode, 0, {});
+    }
+    std::string answer = FormatNumber(steps);
+    for (const Episode& episode : episodes_) {
+      const PendulumState s = episode.StateAt(steps);
+      for (const double number : {s.q1, s.q2, s.w1, s.w2, episode.TorqueAt(steps)}) {
+        answer += ' ' + FormatNumber(number);
+      }
+    }
+    return answer;
+  }
+
+ private:
+  void Restart() {
+    for (Episode& episode : episodes_) episode = Episode(episode.config());
+  }
+
+  /// Computes an episode up to a time, and the torque that acts then.
+  static void Advance(Episode& episode, double steps, std::array<double, 2> push) {
+    if (episode.config().env.engine != &kMuJoCo) push = {};  // cannot be pushed
+    while (static_cast<double>(episode.steps()) <= steps) episode.Step(push);
+  }
+
+  std::vector<Episode> episodes_;
+  bool recording_;
+};
+
+/// Adds what a recording consists of. Frame i shows the time (i · speed / fps); a single picture
+/// the end.
+void DescribeRecording(const ViewArguments& a, const fs::path& path, nlohmann::json& job) {
+  const std::string kind = KindOf(a.record);
+  const double usual = a.trial.is_of_eval() ? kEvaluationSeconds : 10;
+  const double seconds = a.seconds < 0 ? usual : a.seconds;
+  const double fps = a.fps > 0 ? a.fps : kind == "gif" ? 25 : 50;
+  const bool single = kind == "png";
+  job["kind"] = kind;
+  job["path"] = path;
+  job["fps"] = fps;
+  job["first"] = single ? seconds / kControlPeriod : 0;
+  job["stride"] = a.speed / fps / kControlPeriod;
+  job["frames"] = single ? 1 : static_cast<int64_t>(seconds * fps / a.speed + 1e-9) + 1;
+}
+
+int RunView(const ViewArguments& a) {
+  nlohmann::json job;
+  SetSize(a.size, job);
+  if (!a.record.empty()) (void)KindOf(a.record);
+  const std::vector<LoadedPolicy> policies = PoliciesOf(a);
+  Show show(a, policies);
+  show.Describe(job);
+  std::unique_ptr<Making> making;
+  if (a.record.empty()) {
+    job["speed"] = a.speed;
+    job["end"] = a.seconds < 0 ? nlohmann::json() : nlohmann::json(a.seconds / kControlPeriod);
+  } else {
+    making = MakeRecording(a.record);
+    DescribeRecording(a, making->path(), job);
+  }
+
+  InstallSignalHandlers("");
+  Drawer drawer(job.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  while (const auto request = drawer.Next()) drawer.Answer(show.Answer(*request));
+  const int code = drawer.Finish();
+  if (StopSignal() != 0) return 128 + StopSignal();
+  if (code != 0 || !making) return code;
+  making->Publish();
+  fmt::print("{}: {} of {}x{}\n", Printable(a.record),
+             Counted(job["frames"].get<int64_t>(), "picture"), job["width"].get<int>(),
+             job["height"].get<int>());
+  return 0;
+}
+
+/// Adds the options of window and recording.
+void AddPicture(CommandLine& line, ViewArguments& a) {
+  line.Text(
+      "--record", a.record, "FILE",
+      "recording to write instead of opening a window: FILE.mp4, FILE.gif, FILE.png (the last "
+      "frame) or FOLDER/ (each frame as PNG)");
+  Options own;
+  own.Add(&a.seconds, "seconds", {0, 1000}, "s",
+          "length of the recording, or time until the window closes")
+      .usual = "10; 20 with --episode; a window stays open";
+  own.Add(&a.speed, "speed", {0.01, 100}, "",
+          "playback speed; 1: real time; 0.1: ten times slower");
+  own.Add(&a.fps, "fps", {1, 200}, "", "frames per second of a recording").usual =
+      "50; 25 for a GIF";
+  line.Arguments(own);
+  line.Text("--size", a.size, "WIDTHxHEIGHT", "size of a recording [pixels] (default 960x640)");
+}
+
+}  // namespace
+
+void AddView(CommandLine& line) {
+  ViewArguments& a = line.Runs(RunView);
+  AddControllers(line, a.controller);
+  line.Texts(
+      "policies", a.names, "POLICY|RUN...",
+      Concat("policies, shown side by side: policy.safetensors, run folders or controllers (",
+             Join(ControllerNames(), ", "), "); none: the motor is off"));
+  AddPicture(line, a);
+  AddEpisodeOptions(line, a.trial);
+  AddTrialOptions(line, a.trial, "noise, random plants and the start of --episode");
+  line.Footer(
+      "Keys in the window:\n"
+      "  space        pause                backspace  start again\n"
+      "  right        one control step     - =        slower, faster\n"
+      "  F1           MuJoCo's own keys    tab        MuJoCo's settings\n"
+      "A double click selects a link; ctrl and the right mouse button pull it.\n\n"
+      "Python draws, with MuJoCo's viewer: `python3`, or the one that UPSWING_PYTHON names.\n\n"
+      "Examples:\n"
+      "  ./upswing view runs/d3qn-seed1\n"
+      "  ./upswing view runs/d3qn-seed1 lqr --start 3.1,0,0,0\n"
+      "  ./upswing view runs/d3qn-seed1 --set mass2=1.3 --delay 0.02\n"
+      "  ./upswing view runs/d3qn-seed1 --record swing-up.mp4 --seconds 5 --speed 0.5\n"
+      "  ./upswing view --start 3,0,0,0                     no motor: it falls\n");
+}
+
+}  // namespace upswing
