@@ -12,7 +12,7 @@
 #include "extras/deploy/export.h"
 #include "nn/network_policy.h"
 #include "os/file.h"
-#include "os/machine.h"
+#include "os/host.h"
 #include "runs/find_policy.h"
 #include "runs/run_folder.h"
 #include "runs/run_record.h"

@@ -21,7 +21,7 @@
 #include "extras/machine/check.h"
 #include "extras/machine/identify.h"
 #include "os/file.h"
-#include "os/machine.h"
+#include "os/host.h"
 #include "os/streams.h"
 #include "report/figure.h"
 

@@ -26,7 +26,7 @@
 #include "extras/realaigym/hardware.h"
 #include "extras/realaigym/machine_trials.h"
 #include "extras/realaigym/published_tvlqr.h"
-#include "os/machine.h"
+#include "os/host.h"
 #include "os/streams.h"
 #include "report/figure.h"
 #include "runs/find_policy.h"

@@ -17,7 +17,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "mujoco/engines.h"
-#include "os/machine.h"
+#include "os/host.h"
 #include "pendulum/pendulum_env.h"
 #include "python/src/bindings.h"
 #include "rl/ppo_config.h"

@@ -12,7 +12,7 @@
 #include "judge/eval_report.h"
 #include "judge/map_command.h"
 #include "os/file.h"
-#include "os/machine.h"
+#include "os/host.h"
 #include "python/src/bindings.h"
 
 namespace upswing {

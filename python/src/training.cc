@@ -11,7 +11,7 @@
 
 #include "agents/config_checks.h"
 #include "base/safetensors.h"
-#include "os/machine.h"
+#include "os/host.h"
 #include "python/src/bindings.h"
 #include "runs/config_files.h"
 #include "runs/find_policy.h"

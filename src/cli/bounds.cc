@@ -11,7 +11,7 @@
 #include "base/text.h"
 #include "cli/commands.h"
 #include "cli/progress.h"
-#include "os/machine.h"
+#include "os/host.h"
 #include "os/streams.h"
 #include "runs/find_policy.h"
 #include "runs/plant_file.h"

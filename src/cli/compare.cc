@@ -11,7 +11,7 @@
 #include "cli/compare_report.h"
 #include "cli/progress.h"
 #include "os/file.h"
-#include "os/machine.h"
+#include "os/host.h"
 #include "report/figure.h"
 #include "runs/find_policy.h"
 

@@ -11,7 +11,7 @@
 #include "cli/commands.h"
 #include "cli/eval_table.h"
 #include "cli/progress.h"
-#include "os/machine.h"
+#include "os/host.h"
 #include "os/streams.h"
 #include "runs/find_policy.h"
 

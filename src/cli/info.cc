@@ -15,7 +15,7 @@
 #include "control/lqr_catch.h"
 #include "mujoco/model.h"
 #include "nn/network_policy.h"
-#include "os/machine.h"
+#include "os/host.h"
 #include "pendulum/observation.h"
 #include "pendulum/upright_modes.h"
 #include "runs/config_files.h"

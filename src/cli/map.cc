@@ -14,7 +14,7 @@
 #include "cli/progress.h"
 #include "judge/map_command.h"
 #include "os/file.h"
-#include "os/machine.h"
+#include "os/host.h"
 #include "runs/find_policy.h"
 
 namespace upswing {

@@ -10,7 +10,7 @@
 #include "cli/say.h"
 #include "cli/study_work.h"
 #include "os/file.h"
-#include "os/machine.h"
+#include "os/host.h"
 #include "report/figure.h"
 #include "runs/many_runs.h"
 #include "runs/seeds.h"

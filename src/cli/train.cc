@@ -13,7 +13,7 @@
 #include "cli/many_runs_view.h"
 #include "cli/signals.h"
 #include "cli/train_view.h"
-#include "os/machine.h"
+#include "os/host.h"
 #include "os/streams.h"
 #include "runs/config_files.h"
 #include "runs/many_runs.h"

@@ -18,7 +18,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "os/file.h"
-#include "os/machine.h"
+#include "os/host.h"
 #include "os/making.h"
 
 namespace upswing {

@@ -11,7 +11,7 @@
 #include "base/text.h"
 #include "os/child_process.h"
 #include "os/file.h"
-#include "os/machine.h"
+#include "os/host.h"
 #include "runs/config_files.h"
 #include "runs/lease.h"
 #include "runs/run_folder.h"

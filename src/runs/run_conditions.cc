@@ -8,7 +8,7 @@
 #include "base/simd.h"
 #include "base/text.h"
 #include "os/file.h"
-#include "os/machine.h"
+#include "os/host.h"
 #include "runs/run_folder.h"
 
 namespace upswing {

@@ -7,7 +7,7 @@
 #include "base/safetensors.h"
 #include "base/text.h"
 #include "os/file.h"
-#include "os/machine.h"
+#include "os/host.h"
 
 namespace upswing {
 namespace {

@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "mujoco/engines.h"
-#include "os/machine.h"
+#include "os/host.h"
 
 namespace upswing {
 

@@ -8,7 +8,7 @@
 #include "base/stopwatch.h"
 #include "base/text.h"
 #include "os/file.h"
-#include "os/machine.h"
+#include "os/host.h"
 #include "runs/config_files.h"
 #include "runs/run_conditions.h"
 #include "runs/run_rows.h"

@@ -10,7 +10,7 @@
 #include "base/text.h"
 #include "base/thread_pool.h"
 #include "cli/program.h"
-#include "os/machine.h"
+#include "os/host.h"
 #include "os/streams.h"
 #include "tools/bench/bench.h"
 

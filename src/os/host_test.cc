@@ -1,4 +1,4 @@
-#include "os/machine.h"
+#include "os/host.h"
 
 #include <gtest/gtest.h>
 
