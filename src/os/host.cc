@@ -77,7 +77,7 @@ std::string HostName() {
   return Printable(name.data());
 }
 
-std::string ThisHost() {
+std::string HostAndBoot() {
   static const std::string kHost = [] {
     std::string boot;
     try {

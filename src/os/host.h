@@ -9,7 +9,7 @@ namespace upswing {
 std::string HostName();
 
 /// Identifies this machine until its next boot: host name and boot ID.
-std::string ThisHost();
+std::string HostAndBoot();
 
 /// Model of the processor, such as "AMD EPYC 9454P"; "unknown" if the system does not tell.
 std::string CpuModel();

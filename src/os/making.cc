@@ -35,7 +35,7 @@ constexpr int64_t kAbandonedAfter = 3600;  // s
 /// Digits that identify this host in temporary names.
 std::string HostDigits() {
   Checksum host;
-  host.Update(BytesOf(ThisHost()));
+  host.Update(BytesOf(HostAndBoot()));
   return host.Hex().substr(0, kHostDigits);
 }
 

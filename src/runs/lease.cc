@@ -72,7 +72,7 @@ double ServerClock(const Making& file) {
 /// The text of a lease: host, process and holder. If the file could not be locked, "unlocked" comes
 /// first, because no lock then tells whether the process lives.
 std::string TextOf(std::string_view holder, bool locked) {
-  return Concat(locked ? "" : "unlocked ", ThisHost(), " ", getpid(), " ", holder, "\n")
+  return Concat(locked ? "" : "unlocked ", HostAndBoot(), " ", getpid(), " ", holder, "\n")
       .substr(0, kMostText);
 }
 
@@ -85,7 +85,7 @@ std::string ReadText(const Opened& file) {
 /// Whether a lease is lost: its holder has ended, or it has expired.
 bool IsLost(const Opened& file, const std::string& text, double now, std::chrono::seconds lasts) {
   // Try a shared lock, because NFS gives an exclusive lock only to processes that may write.
-  if (text.starts_with(ThisHost() + " ")) {
+  if (text.starts_with(HostAndBoot() + " ")) {
     return flock(file.descriptor.get(), LOCK_SH | LOCK_NB) == 0;
   }
   return now - SecondsOf(file.info.st_mtim) > static_cast<double>(lasts.count());

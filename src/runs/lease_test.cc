@@ -43,7 +43,7 @@ TEST(Lease, OneHolderAtATimeAndNothingIsLeft) {
     ASSERT_TRUE(lease);
     EXPECT_TRUE(lease->held());
     EXPECT_FALSE(Lease::Take(path, "another one"));
-    EXPECT_EQ(ReadOwnFile(path), Concat(ThisHost(), " ", getpid(), " a worker\n"));
+    EXPECT_EQ(ReadOwnFile(path), Concat(HostAndBoot(), " ", getpid(), " a worker\n"));
     EXPECT_EQ(FilesIn(folder.path()), 1U);
   }
   EXPECT_EQ(FilesIn(folder.path()), 0U);

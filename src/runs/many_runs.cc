@@ -156,7 +156,7 @@ class LocalWorkers {
     const auto how = [code](const fs::path& log) {
       return code > 128 ? Concat("ended by signal ", code - 128) : LastLine(log);
     };
-    const std::string holder = Concat(ThisHost(), " ", pid, " ");
+    const std::string holder = Concat(HostAndBoot(), " ", pid, " ");
     for (const SeedRun* run : open_) {
       const auto lease = ReadLease(run->claim());
       if (!lease || !lease->holder.starts_with(holder)) continue;
