@@ -45,7 +45,7 @@ int RunFake(const FakeArguments& a) {
     Rng rng(seed, "loop: machine");
     twin = DrawTwin(twin, rng);
   }
-  FakeMachine machine(twin, ParseStart(a.start), config);
+  FakeMachine machine(twin, ParsePendulumStart(a.start), config);
   Channel channel = Channel::Listen(ParseLink(a.link, /*listens=*/true));
   EnterRealTime();  // as far as it is permitted: firmware answers at once
   InstallSignalHandlers("");

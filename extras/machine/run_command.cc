@@ -74,7 +74,7 @@ void PrintSummary(const LoopSummary& s, const LinkCounts& counts, const Supervis
 
 int Drive(const RunArguments& a, const Competitor& competitor, const std::optional<Twin>& twin,
           const LinkAddress& address) {
-  const PendulumState start = ParseStart(a.start);
+  const PendulumState start = ParsePendulumStart(a.start);
   const int joint = static_cast<int>(competitor.robot);
   const auto hz = std::llround(a.hz);
   const double period = 1 / a.hz;

@@ -308,7 +308,7 @@ Joints Supervisor::Torque(const Joints& controller, const CycleFacts& facts) {
   return torque;
 }
 
-PendulumState ParseStart(const std::string& text) {
+PendulumState ParsePendulumStart(const std::string& text) {
   if (text == "hanging") return {};
   if (text == "upright") return {std::numbers::pi, 0, 0, 0};
   std::vector<double> numbers;

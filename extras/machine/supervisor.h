@@ -132,6 +132,6 @@ class Supervisor {
 
 /// Parses a start state: hanging, upright, or q1,q2,w1,w2 (rad, rad/s). Throws BadInput that begins
 /// with --start.
-PendulumState ParseStart(const std::string& text);
+PendulumState ParsePendulumStart(const std::string& text);
 
 }  // namespace upswing

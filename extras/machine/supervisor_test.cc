@@ -405,12 +405,12 @@ TEST(Supervisor, AJointThatComesToRestIsNoFault) {
 }
 
 TEST(Start, IsParsed) {
-  EXPECT_EQ(ParseStart("hanging").q1, 0);
-  EXPECT_EQ(ParseStart("upright").q1, std::numbers::pi);
-  EXPECT_EQ(ParseStart("1,2,3,-4").w2, -4);
+  EXPECT_EQ(ParsePendulumStart("hanging").q1, 0);
+  EXPECT_EQ(ParsePendulumStart("upright").q1, std::numbers::pi);
+  EXPECT_EQ(ParsePendulumStart("1,2,3,-4").w2, -4);
   for (const char* wrong :
        {"", "1", "1,2,3", "1,2,3,4,5", "1,2,3,x", "nan,0,0,0", "1e9,0,0,0", "1,,2,3,4"}) {
-    EXPECT_THROW(ParseStart(wrong), Error) << wrong;
+    EXPECT_THROW(ParsePendulumStart(wrong), Error) << wrong;
   }
 }
 
