@@ -65,20 +65,20 @@ HWY_INLINE Dynamics LoadDynamics(const ClosedFormBatch& batch, size_t i) {
 }
 
 /// A number for each joint.
-struct Joints {
+struct JointVectors {
   V one, two;
 
-  HWY_INLINE Joints operator+(const Joints& other) const {
+  HWY_INLINE JointVectors operator+(const JointVectors& other) const {
     return {one + other.one, two + other.two};
   }
   /// this + h other
-  HWY_INLINE Joints Plus(double h, const Joints& other) const {
+  HWY_INLINE JointVectors Plus(double h, const JointVectors& other) const {
     return {MulAdd(Constant(h), other.one, one), MulAdd(Constant(h), other.two, two)};
   }
 };
 
 struct State {
-  Joints q, w;  // rad, rad/s
+  JointVectors q, w;  // rad, rad/s
 };
 
 HWY_INLINE State LoadState(const ClosedFormBatch& batch, size_t i) {
@@ -105,7 +105,9 @@ struct Angles {
   HWY_INLINE V c12() const { return NegMulAdd(q1.s, q2.s, q1.c * q2.c); }
 };
 
-HWY_INLINE Angles AnglesOf(const Joints& q) { return {SineCosineOf(q.one), SineCosineOf(q.two)}; }
+HWY_INLINE Angles AnglesOf(const JointVectors& q) {
+  return {SineCosineOf(q.one), SineCosineOf(q.two)};
+}
 
 /// Height of the tip over the pivot, divided by the length of both links.
 HWY_INLINE V HeightOf(const ClosedFormBatch& batch, size_t i, const Angles& angles) {
@@ -115,7 +117,7 @@ HWY_INLINE V HeightOf(const ClosedFormBatch& batch, size_t i, const Angles& angl
 
 /// M(q) q̈ = r = τ - c(q, q̇) - g(q) - d q̇ - f atan(100 q̇), solved for q̈.
 template <bool kFriction>
-HWY_INLINE Joints Acceleration(const Dynamics& p, const State& x, const Angles& angles) {
+HWY_INLINE JointVectors Acceleration(const Dynamics& p, const State& x, const Angles& angles) {
   const auto& [s1, c1] = angles.q1;
   const auto& [s2, c2] = angles.q2;
   const auto& [w1, w2] = x.w;
@@ -153,7 +155,7 @@ HWY_INLINE Joints Acceleration(const Dynamics& p, const State& x, const Angles& 
 template <bool kFriction, size_t K>
 HWY_INLINE void RungeKuttaStep(const Dynamics (&p)[K], double h, State (&x)[K],
                                Angles (&before)[K]) {
-  Joints a1[K], a2[K], middle[K], early[K];
+  JointVectors a1[K], a2[K], middle[K], early[K];
   State stage[K];
   HWY_UNROLL(2)
   for (size_t k = 0; k < K; ++k) {
@@ -168,14 +170,14 @@ HWY_INLINE void RungeKuttaStep(const Dynamics (&p)[K], double h, State (&x)[K],
   }
   HWY_UNROLL(2)
   for (size_t k = 0; k < K; ++k) {
-    const Joints a3 = Acceleration<kFriction>(p[k], stage[k], AnglesOf(stage[k].q));
+    const JointVectors a3 = Acceleration<kFriction>(p[k], stage[k], AnglesOf(stage[k].q));
     stage[k] = {x[k].q.Plus(h, stage[k].w), x[k].w.Plus(h, a3)};
     middle[k] = a2[k] + a3;
     early[k] = a1[k] + middle[k];
   }
   HWY_UNROLL(2)
   for (size_t k = 0; k < K; ++k) {
-    const Joints a4 = Acceleration<kFriction>(p[k], stage[k], AnglesOf(stage[k].q));
+    const JointVectors a4 = Acceleration<kFriction>(p[k], stage[k], AnglesOf(stage[k].q));
     x[k].q = x[k].q.Plus(h, x[k].w).Plus(h * h / 6, early[k]);
     x[k].w = x[k].w.Plus(h / 6, early[k] + middle[k] + a4);
   }
