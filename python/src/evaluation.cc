@@ -10,7 +10,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "judge/eval_report.h"
-#include "judge/map_command.h"
+#include "judge/policy_map.h"
 #include "os/file.h"
 #include "os/host.h"
 #include "python/src/bindings.h"

@@ -12,7 +12,7 @@
 #include "base/thread_pool.h"
 #include "cli/commands.h"
 #include "cli/progress.h"
-#include "judge/map_command.h"
+#include "judge/policy_map.h"
 #include "os/file.h"
 #include "os/host.h"
 #include "runs/find_policy.h"

@@ -1,4 +1,4 @@
-#include "judge/map_command.h"
+#include "judge/policy_map.h"
 
 #include <fmt/format.h>
 
