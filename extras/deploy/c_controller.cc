@@ -12,7 +12,7 @@
 #include "extras/deploy/c_text.h"
 #include "pendulum/closed_form.h"
 
-namespace upswing {
+namespace upswing::deploy {
 namespace {
 
 constexpr int kLawSamples = 16;
@@ -229,4 +229,4 @@ CHeader ControllerHeaderOf(const LoadedPolicy& loaded, const std::string& prefix
   return header;
 }
 
-}  // namespace upswing
+}  // namespace upswing::deploy

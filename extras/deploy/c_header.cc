@@ -6,7 +6,7 @@
 #include "base/text.h"
 #include "extras/deploy/c_text.h"
 
-namespace upswing {
+namespace upswing::deploy {
 namespace {
 
 std::string_view FileNamed(std::string_view name) {
@@ -158,4 +158,4 @@ void WriteHeader(const CParts& parts, CHeader& header) {
   text += Concat('\n', Replaced(code, "POLICY_", caps + "_"), "\n#endif\n");
 }
 
-}  // namespace upswing
+}  // namespace upswing::deploy

@@ -12,7 +12,7 @@
 
 /// C headers: a comment, macros and tables, and a file of extras/deploy/c with the files that it
 /// includes.
-namespace upswing {
+namespace upswing::deploy {
 
 /// A file of extras/deploy/c, embedded by CMake.
 struct CFile {
@@ -60,4 +60,4 @@ CHeader ControllerHeaderOf(const LoadedPolicy& loaded, const std::string& prefix
 /// Writes `text` and the number of constants. `header` already has the sizes in RAM and the prefix.
 void WriteHeader(const CParts& parts, CHeader& header);
 
-}  // namespace upswing
+}  // namespace upswing::deploy

@@ -11,7 +11,7 @@
 #include "extras/deploy/c_header.h"
 #include "pendulum/observation.h"
 
-namespace upswing {
+namespace upswing::deploy {
 namespace {
 
 constexpr int kSamples = 16;
@@ -134,4 +134,4 @@ CSamples DrawSamples(const ExportedPolicy& policy, const std::vector<LayerView>&
   return samples;
 }
 
-}  // namespace upswing
+}  // namespace upswing::deploy

@@ -5,7 +5,7 @@
 
 #include "base/text.h"
 
-namespace upswing {
+namespace upswing::deploy {
 namespace {
 
 constexpr size_t kWidth = 100;
@@ -73,4 +73,4 @@ std::string Paragraph(std::string_view text) {
   return " * " + Wrapped(words, " * ", 3);
 }
 
-}  // namespace upswing
+}  // namespace upswing::deploy

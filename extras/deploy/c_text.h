@@ -5,7 +5,7 @@
 #include <vector>
 
 /// Helpers that write C source code.
-namespace upswing {
+namespace upswing::deploy {
 
 /// `text`, which may come from an untrusted file, made safe for a comment: it cannot end the
 /// comment or the line, or begin a trigraph.
@@ -28,4 +28,4 @@ std::string Wrapped(const std::vector<std::string>& words, const std::string& in
 /// A comment paragraph: `text` on lines of at most 100 characters, each after " * ".
 std::string Paragraph(std::string_view text);
 
-}  // namespace upswing
+}  // namespace upswing::deploy

@@ -8,7 +8,7 @@
 
 #include "base/rng.h"
 
-namespace upswing {
+namespace upswing::deploy {
 namespace {
 
 TEST(CText, NothingEndsAComment) {
@@ -46,4 +46,4 @@ TEST(CText, WrapsBetweenWords) {
 }
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::deploy

@@ -16,7 +16,7 @@
 #include "os/command.h"
 #include "os/file.h"
 
-namespace upswing {
+namespace upswing::deploy {
 namespace {
 
 namespace fs = std::filesystem;
@@ -151,4 +151,4 @@ void AddDemo(CommandLine& line) {
       "  ./upswing demo --dist site && python3 -m http.server -d site\n");
 }
 
-}  // namespace upswing
+}  // namespace upswing::deploy

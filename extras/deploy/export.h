@@ -9,7 +9,7 @@
 #include "agents/loaded_policy.h"
 
 /// The exports of `export` for programs in other languages.
-namespace upswing {
+namespace upswing::deploy {
 
 /// Copies policies (files or run folders) into a page's folder of agents as ID.safetensors. Adds
 /// them to its agents.json, replacing entries with the same ID. `id` names a single policy; empty:
@@ -50,4 +50,4 @@ CHeader CHeaderOf(const LoadedPolicy& loaded, const std::string& prefix);
 /// prefix comes from the policy's agent.
 std::string CPrefixOf(const std::string& file, const LoadedPolicy& loaded);
 
-}  // namespace upswing
+}  // namespace upswing::deploy

@@ -10,7 +10,7 @@
 #include "os/streams.h"
 #include "pendulum/observation.h"
 
-namespace upswing {
+namespace upswing::deploy {
 namespace {
 
 constexpr size_t kMostParameters = 2'000'000;  // about 23 MB of header
@@ -225,4 +225,4 @@ std::string CPrefixOf(const std::string& file, const LoadedPolicy& loaded) {
   return prefix.empty() ? "policy" : prefix;
 }
 
-}  // namespace upswing
+}  // namespace upswing::deploy

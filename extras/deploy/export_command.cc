@@ -14,7 +14,7 @@
 #include "os/streams.h"
 #include "runs/find_policy.h"
 
-namespace upswing {
+namespace upswing::deploy {
 namespace {
 
 namespace fs = std::filesystem;
@@ -29,9 +29,8 @@ struct ExportArguments {
 /// Throws BadInput unless exactly one output is given.
 void CheckOne(const ExportArguments& a) {
   std::vector<std::string> given;
-  for (const auto& [flag, value] : {std::pair("--page", &a.page),
-                                    {"--onnx", &a.onnx},
-                                    {"--c", &a.c}}) {
+  for (const auto& [flag, value] :
+       {std::pair("--page", &a.page), {"--onnx", &a.onnx}, {"--c", &a.c}}) {
     if (!value->empty()) given.emplace_back(flag);
   }
   if (given.size() == 1) return;
@@ -150,4 +149,4 @@ void AddExport(CommandLine& line) {
       "`./upswing demo runs/d3qn-seed1` adds a policy to the page and serves the page.\n");
 }
 
-}  // namespace upswing
+}  // namespace upswing::deploy

@@ -7,7 +7,7 @@
 #include "nn/gaussian.h"
 #include "nn/linear.h"
 
-namespace upswing {
+namespace upswing::deploy {
 namespace {
 
 using nlohmann::ordered_json;
@@ -200,4 +200,4 @@ std::string OnnxModelOf(const LoadedPolicy& loaded) {
   return model.Bytes();
 }
 
-}  // namespace upswing
+}  // namespace upswing::deploy

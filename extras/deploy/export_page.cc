@@ -20,7 +20,7 @@
 #include "runs/this_host.h"
 #include "runs/train_command.h"
 
-namespace upswing {
+namespace upswing::deploy {
 namespace {
 
 namespace fs = std::filesystem;
@@ -280,4 +280,4 @@ std::vector<std::string> ExportToPage(const std::vector<fs::path>& paths, const 
   return names;
 }
 
-}  // namespace upswing
+}  // namespace upswing::deploy

@@ -9,7 +9,7 @@
 #include "base/text.h"
 #include "pendulum/observation.h"
 
-namespace upswing {
+namespace upswing::deploy {
 namespace {
 
 /// Throws BadInput unless these torques are within the range of float.
@@ -107,4 +107,4 @@ ExportedPolicy ViewForExport(const LoadedPolicy& loaded) {
   return exported;
 }
 
-}  // namespace upswing
+}  // namespace upswing::deploy

@@ -10,7 +10,7 @@
 
 /// A learned policy as the exports to ONNX and C need it: its layers, and descriptions of its
 /// inputs and outputs.
-namespace upswing {
+namespace upswing::deploy {
 
 /// ε of layer normalisation, equal to that of LayerNormForward.
 inline constexpr float kLayerNormEpsilon = 1e-5F;
@@ -65,4 +65,4 @@ double LargestSize(std::span<const double> values);
 /// not learned, or if its torques exceed float.
 ExportedPolicy ViewForExport(const LoadedPolicy& loaded);
 
-}  // namespace upswing
+}  // namespace upswing::deploy

@@ -7,7 +7,7 @@
 
 #include "base/text.h"
 
-namespace upswing {
+namespace upswing::deploy {
 namespace {
 
 constexpr std::array<std::pair<int, const char*>, 10> kReasons{
@@ -180,4 +180,4 @@ HttpReply MakeHttpError(const HttpRequest& request, int status) {
       text);
 }
 
-}  // namespace upswing
+}  // namespace upswing::deploy

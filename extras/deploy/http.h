@@ -5,7 +5,7 @@
 #include <string_view>
 
 /// The part of HTTP/1.1 (RFC 9112) that serves files to a browser on this machine.
-namespace upswing {
+namespace upswing::deploy {
 
 /// Limit for the request line and all header fields together, bytes.
 inline constexpr size_t kMostRequestBytes = 16384;
@@ -40,4 +40,4 @@ HttpReply MakeHttpReply(const HttpRequest& request, int status, std::string_view
 /// An answer without a file: the status as a line of text.
 HttpReply MakeHttpError(const HttpRequest& request, int status);
 
-}  // namespace upswing
+}  // namespace upswing::deploy

@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace upswing {
+namespace upswing::deploy {
 namespace {
 
 const std::string kHost = "\r\nHost: localhost:4173";
@@ -129,4 +129,4 @@ TEST(Http, AnswersHaveTheSizeOfTheirBody) {
 }
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::deploy

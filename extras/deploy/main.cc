@@ -1,6 +1,6 @@
 #include "cli/program.h"
 
-namespace upswing {
+namespace upswing::deploy {
 
 // Each has a file *_command.cc.
 void AddExport(CommandLine& line);
@@ -11,9 +11,9 @@ namespace {
 constexpr Command kCommands[] = {{"export", AddExport}, {"demo", AddDemo}};
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::deploy
 
 // An exception during the report of another one ends the program.
 int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
-  return upswing::MainProgram(argc, argv, upswing::kCommands);
+  return upswing::MainProgram(argc, argv, upswing::deploy::kCommands);
 }

@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 
-namespace upswing {
+namespace upswing::deploy {
 namespace {
 
 constexpr int64_t kOpset = 17;     // first opset with LayerNormalization
@@ -105,4 +105,4 @@ std::string OnnxModel::Bytes() const {
   return proto_->model.SerializeAsString();
 }
 
-}  // namespace upswing
+}  // namespace upswing::deploy

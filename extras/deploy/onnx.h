@@ -8,7 +8,7 @@
 #include <variant>
 #include <vector>
 
-namespace upswing {
+namespace upswing::deploy {
 
 /// A model in the ONNX format (https://onnx.ai) with operators of opset 17, built node by node.
 /// Inputs and outputs are float matrices (batch × size) with any number of rows. Texts must be
@@ -43,4 +43,4 @@ class OnnxModel {
   std::unique_ptr<Proto> proto_;
 };
 
-}  // namespace upswing
+}  // namespace upswing::deploy

@@ -6,7 +6,7 @@
 #include <array>
 #include <cstring>
 
-namespace upswing {
+namespace upswing::deploy {
 namespace {
 
 onnx::ModelProto Parse(const OnnxModel& model) {
@@ -69,4 +69,4 @@ TEST(Onnx, IsTheSameEveryTime) {
 }
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::deploy

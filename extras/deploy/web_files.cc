@@ -11,7 +11,7 @@
 #include "os/file.h"
 #include "os/gzip.h"
 
-namespace upswing {
+namespace upswing::deploy {
 namespace {
 
 namespace fs = std::filesystem;
@@ -125,4 +125,4 @@ HttpReply WebFiles::Answer(const HttpRequest& request) {
   }
 }
 
-}  // namespace upswing
+}  // namespace upswing::deploy

@@ -7,7 +7,7 @@
 
 #include "extras/deploy/http.h"
 
-namespace upswing {
+namespace upswing::deploy {
 
 /// The files of a page, as answers to requests. Nothing outside its folders can be read.
 class WebFiles {
@@ -43,4 +43,4 @@ class WebFiles {
   std::map<std::filesystem::path, Compressed> compressed_;
 };
 
-}  // namespace upswing
+}  // namespace upswing::deploy

@@ -13,7 +13,7 @@
 #include "base/error.h"
 #include "base/text.h"
 
-namespace upswing {
+namespace upswing::deploy {
 namespace {
 
 constexpr size_t kMostConnections = 64;  // further ones wait in the system's queue
@@ -161,4 +161,4 @@ bool WebServer::Connection::Send() {
   return true;
 }
 
-}  // namespace upswing
+}  // namespace upswing::deploy

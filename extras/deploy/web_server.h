@@ -8,7 +8,7 @@
 #include "extras/deploy/web_files.h"
 #include "os/making.h"
 
-namespace upswing {
+namespace upswing::deploy {
 
 /// A server of files for browsers on this machine: it listens on 127.0.0.1 only. Own code, because
 /// cpp-httplib (0.11 to 0.53) has no limit for the time of a request, and Debian 12's none for the
@@ -66,4 +66,4 @@ class WebServer {
   std::vector<Connection> connections_;
 };
 
-}  // namespace upswing
+}  // namespace upswing::deploy

@@ -17,7 +17,7 @@
 #include "os/gzip.h"
 #include "os/testing.h"
 
-namespace upswing {
+namespace upswing::deploy {
 namespace {
 
 namespace fs = std::filesystem;
@@ -314,4 +314,4 @@ TEST_F(WebServerTest, ListensOnThisMachineOnly) {
 }
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::deploy

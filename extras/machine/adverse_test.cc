@@ -9,7 +9,7 @@
 #include "base/rng.h"
 #include "extras/machine/adverse_testing.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 TEST(AdverseMachine, GetsOnlyTorquesThatAreSafe) {
@@ -33,4 +33,4 @@ TEST(AdverseMachine, GetsOnlyTorquesThatAreSafe) {
 }
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -17,7 +17,7 @@
 #include "extras/machine/loop_testing.h"
 
 /// A link to a machine with faults of all kinds, for tests of the whole control loop.
-namespace upswing {
+namespace upswing::machine {
 
 /// Returns a number from 0 to n - 1: a random one, or one from the input of a fuzzer.
 using Chooser = std::function<uint32_t(uint32_t n)>;
@@ -252,4 +252,4 @@ inline AdverseRun RunAdversely(bool with_twin, uint32_t rarity, int64_t most,
   return run;
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

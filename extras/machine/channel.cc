@@ -21,7 +21,7 @@
 #include "base/error.h"
 #include "base/text.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 constexpr std::array<std::pair<int, speed_t>, 9> kRates{{{115200, B115200},
@@ -214,4 +214,4 @@ void Channel::AnswerSender() {
   peer_size_ = sender_size_;
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -10,7 +10,7 @@
 #include "os/making.h"
 
 /// Bytes to and from another program or device. Only channel.cc knows sockets and terminals.
-namespace upswing {
+namespace upswing::machine {
 
 /// The address of a link, such as `udp:192.168.1.5:4000`, `serial:/dev/ttyACM0:921600`, `pty`, or
 /// the file of a twin.
@@ -63,4 +63,4 @@ class Channel {
   socklen_t sender_size_ = 0, peer_size_ = 0;
 };
 
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -14,7 +14,7 @@
 #include "base/sample.h"
 #include "base/text.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 /// A cycle: the time from a row to the next.
@@ -35,7 +35,7 @@ std::vector<Cycle> CyclesOf(Pieces pieces) {
 }
 
 LogRows RangeOf(const Cycle& cycle) {
-  return upswing::RangeOf(*cycle.piece, cycle.row - 1, cycle.row);
+  return machine::RangeOf(*cycle.piece, cycle.row - 1, cycle.row);
 }
 
 void CheckClockUnit(double median, Findings& findings) {
@@ -237,4 +237,4 @@ std::string CheckJson(std::span<const LogCheck> checks) {
   return PrintableJson({{"logs", logs}});
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

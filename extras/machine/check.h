@@ -12,7 +12,7 @@
 
 /// Checks of a machine's log for faults of sensors, columns and units, without a model of the
 /// machine. docs/reference/machine-log.md lists the checks.
-namespace upswing {
+namespace upswing::machine {
 
 enum class Severity { kNote, kWarning, kFault };
 const char* NameOf(Severity severity);
@@ -104,4 +104,4 @@ double AngleRange(Pieces pieces, int joint);
 /// Smallest range of an angle for which its differences say anything about velocities, rad.
 inline constexpr double kMoves = 0.05;
 
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -8,7 +8,7 @@
 #include "base/sample.h"
 #include "extras/machine/check.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 /// Step of a joint's encoder, rad: the smallest distance of two values. Nothing if other distances
@@ -237,4 +237,4 @@ void CheckMotion(Pieces pieces, Findings& findings) {
   for (const MachineLog& piece : pieces) CheckGrowth(piece, findings);
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -7,7 +7,7 @@
 #include "extras/machine/check.h"
 #include "report/figure.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 constexpr int kMostPoints = 4000;  // of a line
@@ -135,4 +135,4 @@ void DrawCheck(const LogCheck& check, Pieces pieces, const std::filesystem::path
   Draw(figure, file);
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

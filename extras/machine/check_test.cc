@@ -11,7 +11,7 @@
 #include "base/rng.h"
 #include "extras/machine/testing.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 /// A log of 10 s at 500 Hz without faults: smooth motion, velocities of their own, and a measured
@@ -350,4 +350,4 @@ TEST(MachineCheck, TheMeasuredDataHaveNoFaults) {
 }
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -7,7 +7,7 @@
 #include "extras/machine/check.h"
 #include "extras/machine/pairs.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 /// A model of the measured torque: the command after a delay, a first-order lag and a gain.
@@ -185,4 +185,4 @@ void CheckTorques(Pieces pieces, Findings& findings) {
   }
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

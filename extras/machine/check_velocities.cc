@@ -9,7 +9,7 @@
 #include "extras/machine/check.h"
 #include "extras/machine/pairs.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 /// Velocities of `joint` against central differences of the angle of `other`.
@@ -157,4 +157,4 @@ void CheckVelocities(Pieces pieces, Findings& findings) {
   }
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -7,7 +7,7 @@
 #include "base/error.h"
 #include "base/text.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 constexpr double kAnswerShare = 0.5;  // share of a cycle that waits for the answer
@@ -154,4 +154,4 @@ void ControlLoop::Run() {
   SwitchOff();
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

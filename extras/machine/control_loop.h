@@ -13,7 +13,7 @@
 #include "extras/machine/supervisor.h"
 
 /// The control loop on a machine.
-namespace upswing {
+namespace upswing::machine {
 
 /// A controller at the rate of the loop. It keeps its own period: a policy of 20 ms holds its
 /// torque for several cycles.
@@ -99,4 +99,4 @@ class ControlLoop {
   bool enabled_ = false;
 };
 
-}  // namespace upswing
+}  // namespace upswing::machine

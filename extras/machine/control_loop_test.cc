@@ -14,7 +14,7 @@
 #include "extras/machine/loop_testing.h"
 #include "os/testing.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 /// A FakeMachine behind faulty lines in simulated time.
@@ -318,4 +318,4 @@ TEST(LogRing, KeepsTheOrderAcrossThreads) {
 }
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::machine

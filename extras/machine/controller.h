@@ -4,7 +4,7 @@
 
 #include "pendulum/task.h"
 
-namespace upswing {
+namespace upswing::machine {
 
 /// A controller of one machine: from the state to the torque of its motor.
 class MachineController {
@@ -17,4 +17,4 @@ class MachineController {
   virtual double Torque(int64_t step, const PendulumState& state, bool estimated) = 0;
 };
 
-}  // namespace upswing
+}  // namespace upswing::machine

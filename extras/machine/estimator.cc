@@ -8,7 +8,7 @@
 
 #include "pendulum/friction.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 // Noise of the velocities, which stands for unmodelled torques, rad/s/√s: usually, and while a push
@@ -189,4 +189,4 @@ double Estimator::energy() const {
   return model_ ? 1 + model_->body.At(now_).energy / model_->hanging : 0;
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

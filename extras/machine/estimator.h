@@ -9,7 +9,7 @@
 #include "pendulum/plant.h"
 
 /// Estimates of a machine's state from the angles that its encoders report.
-namespace upswing {
+namespace upswing::machine {
 
 /// Estimates the state in each cycle. A cycle sends the torques of the cycle before and reads the
 /// angles at the same time.
@@ -93,4 +93,4 @@ class Estimator {
   PendulumState now_, ahead_;
 };
 
-}  // namespace upswing
+}  // namespace upswing::machine

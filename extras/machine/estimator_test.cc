@@ -17,7 +17,7 @@
 #include "extras/machine/validate.h"
 #include "extras/machine/windows.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 /// Errors of an estimator on a twin's machine under changing torques.
@@ -346,4 +346,4 @@ TEST(Estimator, KnowsTheEnergy) {
 }
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::machine

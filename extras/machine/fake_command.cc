@@ -11,7 +11,7 @@
 #include "extras/machine/link.h"
 #include "extras/machine/supervisor.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 struct FakeArguments {
@@ -98,4 +98,4 @@ void AddFake(CommandLine& line) {
       "  ./upswing fake twin.toml --link pty --stuck 2@1.5\n");
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

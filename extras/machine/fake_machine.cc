@@ -7,7 +7,7 @@
 
 #include "extras/machine/link.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 constexpr double kTick = 0.02;        // longest time between two looks at the clock, s
@@ -163,4 +163,4 @@ void Serve(Channel& channel, FakeMachine& machine, const LineFaults& faults, uin
   }
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -15,7 +15,7 @@
 
 /// A twin's machine as a process of its own, with the faults of real links and encoders: a
 /// rehearsal without hardware, and an example for firmware.
-namespace upswing {
+namespace upswing::machine {
 
 /// Faults of a line, for each frame in each direction.
 struct LineFaults {
@@ -110,4 +110,4 @@ class FakeMachine {
 void Serve(Channel& channel, FakeMachine& machine, const LineFaults& faults, uint64_t seed,
            const std::function<bool()>& stop, const std::function<void(double)>& report);
 
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -8,7 +8,7 @@
 #include "base/error.h"
 #include "extras/machine/loop_testing.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 Frame CommandOf(uint32_t sequence, bool enabled, double torque = 1) {
@@ -120,4 +120,4 @@ TEST(LinkAddress, IsParsed) {
 }
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::machine

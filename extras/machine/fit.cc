@@ -16,7 +16,7 @@
 
 // Symbols: θ values shared by all windows, x start state of a window, r residuals, J = ∂r/∂θ,
 // K = ∂r/∂x; H.. blocks of the Gauss-Newton matrix, g. gradients.
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 using Eigen::Matrix4d;
@@ -539,4 +539,4 @@ FitResult Fit(std::span<const MachineLog> logs, const Twin& first,
   return result;
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -13,7 +13,7 @@
 /// Identification of a twin by multiple shooting (Bock, 1983): many windows of the logs, each with
 /// a free start state, and values that all windows share. Levenberg and Marquardt's method with a
 /// robust cost; the start states are eliminated window by window.
-namespace upswing {
+namespace upswing::machine {
 
 /// Settings of an identification.
 struct FitConfig {
@@ -37,4 +37,4 @@ FitResult Fit(std::span<const MachineLog> logs, const Twin& first,
               const std::vector<std::string>& names, const FitConfig& config, ThreadPool* pool,
               const Progress& progress = nullptr);
 
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -11,7 +11,7 @@
 #include "extras/machine/simulated_machine.h"
 #include "extras/machine/validate.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 /// A plant like that of RealAIGym's machine.
@@ -234,4 +234,4 @@ TEST(Fit, AJointWithoutReportedTorqueLeavesTheReportsUnknown) {
 }
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -7,7 +7,7 @@
 
 #include "os/gzip.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 constexpr uint32_t kMagic = 0x57535055;  // "UPSW"
@@ -122,4 +122,4 @@ SequenceFilter::Verdict SequenceFilter::Judge(uint32_t sequence) {
   return Verdict::kNew;
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -10,7 +10,7 @@
 
 /// The frames between a control loop and a machine, over UDP and serial lines.
 /// docs/reference/machine-link.md describes the layout for people who write firmware.
-namespace upswing {
+namespace upswing::machine {
 
 inline constexpr size_t kFrameBytes = 44;
 
@@ -79,4 +79,4 @@ class SequenceFilter {
   uint32_t last_ = 0;
 };
 
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -11,7 +11,7 @@
 #include "base/text.h"
 #include "os/gzip.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 Frame Example(uint32_t sequence = 7) {
@@ -147,4 +147,4 @@ TEST(SequenceFilter, DistinguishesNewFrames) {
 }
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::machine

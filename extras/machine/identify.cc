@@ -8,7 +8,7 @@
 #include "base/text.h"
 #include "extras/machine/check.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 constexpr double kJudgedSeconds = 1;  // length of the windows that choose a structure
@@ -160,4 +160,4 @@ void MeasureLoop(std::span<const MachineLog> logs, Twin& twin) {
   if (!torque_steps.empty()) twin.sensors.torque_quantum = std::ranges::min(torque_steps);
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

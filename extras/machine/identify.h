@@ -8,7 +8,7 @@
 #include "extras/machine/validate.h"
 
 /// Identification with a choice of the model's structure on runs that were left out.
-namespace upswing {
+namespace upswing::machine {
 
 /// A structure: the names of the values to identify. Other values stay at the first guess.
 struct Structure {
@@ -54,4 +54,4 @@ Identification Identify(std::span<const MachineLog> logs, const Twin& first,
 /// logs.
 void MeasureLoop(std::span<const MachineLog> logs, Twin& twin);
 
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -13,7 +13,7 @@
 
 #include "base/text.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 constexpr int64_t kSecond = 1'000'000'000;    // ns
@@ -165,4 +165,4 @@ std::string EnterRealTime() {
   return problems;
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

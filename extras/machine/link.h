@@ -14,7 +14,7 @@
 #include "extras/machine/twin.h"
 
 /// Links of a control loop to a machine. A link brings the clock of its machine.
-namespace upswing {
+namespace upswing::machine {
 
 /// Faults of a link, as numbers of frames and bytes.
 struct LinkCounts {
@@ -129,4 +129,4 @@ int64_t MonotonicNanoseconds();
 /// permissions in one line; empty: none.
 std::string EnterRealTime();
 
-}  // namespace upswing
+}  // namespace upswing::machine

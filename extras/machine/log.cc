@@ -15,7 +15,7 @@
 #include "os/file.h"
 #include "os/gzip.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 namespace fs = std::filesystem;
@@ -347,4 +347,4 @@ std::vector<MachineLog> ReadLog(const fs::path& file, const fs::path& columns) {
   return ParseLog(text, columns.empty() ? nullptr : &own, where);
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

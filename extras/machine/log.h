@@ -9,7 +9,7 @@
 
 /// Logs of machines with two joints, real or simulated: one row for each cycle of the control loop.
 /// docs/reference/machine-log.md describes the files.
-namespace upswing {
+namespace upswing::machine {
 
 /// One number for each joint.
 using Joints = std::array<double, 2>;
@@ -69,4 +69,4 @@ std::vector<MachineLog> ParseLog(std::string_view csv, const LogColumns* columns
 std::vector<MachineLog> ReadLog(const std::filesystem::path& file,
                                 const std::filesystem::path& columns = {});
 
-}  // namespace upswing
+}  // namespace upswing::machine

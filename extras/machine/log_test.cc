@@ -14,7 +14,7 @@
 #include "extras/machine/testing.h"
 #include "os/testing.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 /// The only log of a text.
@@ -300,4 +300,4 @@ TEST(MachineLog, ReadsTheMeasuredData) {
 }
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -9,7 +9,7 @@
 #include "base/error.h"
 #include "base/text.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 constexpr size_t kRows = 1 << 14;  // 16 s at 1 kHz
@@ -95,4 +95,4 @@ void LogWriter::Finish() {
   if (!error_.empty()) throw Failure(error_);
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -10,7 +10,7 @@
 #include "extras/machine/log.h"
 #include "os/file.h"
 
-namespace upswing {
+namespace upswing::machine {
 
 /// A row of the log of a control loop.
 struct LoopRow {
@@ -68,4 +68,4 @@ class LogWriter {
   std::thread thread_;
 };
 
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -9,7 +9,7 @@
 #include "extras/machine/testing.h"
 
 /// Helpers for tests of control loops.
-namespace upswing {
+namespace upswing::machine {
 
 /// Swings the motor's joint by a sine of the time.
 class SineController : public MachineController {
@@ -56,4 +56,4 @@ struct LoopBench {
   }
 };
 
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -25,7 +25,7 @@
 #include "os/streams.h"
 #include "report/figure.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 struct MachineArguments {
@@ -389,4 +389,4 @@ void AddMachine(CommandLine& line) {
       "  ./upswing machine identify --help     show all options of identify\n");
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -1,6 +1,6 @@
 #include "cli/program.h"
 
-namespace upswing {
+namespace upswing::machine {
 
 // Each has a file *_command.cc.
 void AddMachine(CommandLine& line);
@@ -12,9 +12,9 @@ namespace {
 constexpr Command kCommands[] = {{"machine", AddMachine}, {"run", AddRun}, {"fake", AddFake}};
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::machine
 
 // An exception during the report of another one ends the program.
 int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
-  return upswing::MainProgram(argc, argv, upswing::kCommands);
+  return upswing::MainProgram(argc, argv, upswing::machine::kCommands);
 }

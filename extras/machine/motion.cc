@@ -5,7 +5,7 @@
 
 #include "pendulum/runge_kutta.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 constexpr double kShortestLag = 1e-5;  // s; shorter lags count as this one
@@ -149,4 +149,4 @@ void Predict(const Manipulator& body, const Drive& drive, const Joints& zero,
   }
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

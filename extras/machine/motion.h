@@ -8,7 +8,7 @@
 #include "pendulum/equations.h"
 
 /// A twin's motion under the torques of a log.
-namespace upswing {
+namespace upswing::machine {
 
 /// The torques (N·m) at both joints over the time of a log.
 class Drive {
@@ -68,4 +68,4 @@ void Predict(const Manipulator& body, const Drive& drive, const Joints& zero,
              const PendulumState& start, const MachineLog& log, int first, int last,
              double acceleration_age, Motion& motion);
 
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -8,7 +8,7 @@
 #include "extras/machine/simulated_machine.h"
 #include "extras/machine/windows.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 /// A machine whose values are all different from zero.
@@ -191,4 +191,4 @@ TEST(CutWindows, JumpOverALongGap) {
 }
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace upswing {
+namespace upswing::machine {
 
 /// Sums over pairs (x, y), for the regression y ≈ offset + gain x.
 struct Pairs {
@@ -19,4 +19,4 @@ struct Pairs {
   }
 };
 
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -15,7 +15,7 @@
 #include "extras/realaigym/boards.h"
 #include "os/streams.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 struct RunArguments {
@@ -72,13 +72,13 @@ void PrintSummary(const LoopSummary& s, const LinkCounts& counts, const Supervis
              supervisor.clipped(), 1e3 * s.longest_act);
 }
 
-int Drive(const RunArguments& a, const Competitor& competitor, const std::optional<Twin>& twin,
-          const LinkAddress& address) {
+int Drive(const RunArguments& a, const realaigym::Competitor& competitor,
+          const std::optional<Twin>& twin, const LinkAddress& address) {
   const PendulumState start = ParsePendulumStart(a.start);
   const int joint = static_cast<int>(competitor.robot);
   const auto hz = std::llround(a.hz);
   const double period = 1 / a.hz;
-  LoopController controller(MachineControllerOf(competitor), hz);
+  LoopController controller(realaigym::MachineControllerOf(competitor), hz);
   Estimator estimator = twin && !a.differences
                             ? Estimator(*twin, period)
                             : Estimator(twin ? twin->sensors : a.sensors, period);
@@ -101,7 +101,7 @@ int Drive(const RunArguments& a, const Competitor& competitor, const std::option
   MachineLink& link = *g_link;
   LogWriter log(a.log);
   fmt::print("{} on {}, {} Hz, {}\n", Printable(competitor.name), Printable(a.link), a.hz,
-             NameOf(competitor.robot));
+             realaigym::NameOf(competitor.robot));
   if (!link.simulated()) {
     const std::string missing = EnterRealTime();
     if (!missing.empty()) fmt::print("  not permitted: {}; cycles may be late\n", missing);
@@ -121,7 +121,7 @@ int Drive(const RunArguments& a, const Competitor& competitor, const std::option
 int RunRun(const RunArguments& a) {
   if (a.policy.name.empty()) throw BadInput("run: expected a policy or a controller, got none");
   if (a.link.empty()) throw BadInput("run: expected --link, got none");
-  if (!a.robot.empty() && !RobotNamed(a.robot)) {
+  if (!a.robot.empty() && !realaigym::RobotNamed(a.robot)) {
     throw BadInput(
         Concat("--robot: expected pendubot or acrobot, got \"", Printable(a.robot), "\""));
   }
@@ -143,7 +143,7 @@ int RunRun(const RunArguments& a) {
   if (a.differences && a.compensation > 0)
     throw BadInput(
         "--compensation: expected no --differences with it, which estimates no friction");
-  return Drive(a, GetCompetitor(a.policy, a.robot, twin), twin, address);
+  return Drive(a, realaigym::GetCompetitor(a.policy, a.robot, twin), twin, address);
 }
 
 }  // namespace
@@ -202,4 +202,4 @@ void AddRun(CommandLine& line) {
       "  ./upswing machine check first.csv\n");
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -5,7 +5,7 @@
 
 #include "pendulum/sensors.h"
 
-namespace upswing {
+namespace upswing::machine {
 
 SimulatedMachine::SimulatedMachine(const Twin& twin, const PendulumState& start)
     : twin_(twin), body_(BodyOf(twin)), drive_(twin.actuator.delay, twin.actuator.lag) {
@@ -136,4 +136,4 @@ MachineLog RunLoop(const Twin& twin, const LoopRun& run, const CycleController& 
   return log;
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -10,7 +10,7 @@
 #include "extras/machine/twin.h"
 
 /// The machine that a twin describes: motors, links, encoders and control loop, in time.
-namespace upswing {
+namespace upswing::machine {
 
 /// What the encoders and drives report.
 struct MachineReading {
@@ -101,4 +101,4 @@ struct LoopRun {
 /// the torques of the cycle before and then reads the angles.
 MachineLog RunLoop(const Twin& twin, const LoopRun& run, const CycleController& controller);
 
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -9,7 +9,7 @@
 #include "base/error.h"
 #include "base/text.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 constexpr double kSlow = 0.3;         // velocity at which braking may end, rad/s
@@ -323,4 +323,4 @@ PendulumState ParsePendulumStart(const std::string& text) {
   return {numbers[0], numbers[1], numbers[2], numbers[3]};
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

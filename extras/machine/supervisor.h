@@ -9,7 +9,7 @@
 
 /// The supervisor of a control loop: it decides in each cycle who drives the motors. It has no
 /// clock, no link and no thread of its own.
-namespace upswing {
+namespace upswing::machine {
 
 /// Limits of a run on a machine.
 struct Limits {
@@ -134,4 +134,4 @@ class Supervisor {
 /// with --start.
 PendulumState ParsePendulumStart(const std::string& text);
 
-}  // namespace upswing
+}  // namespace upswing::machine

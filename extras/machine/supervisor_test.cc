@@ -9,7 +9,7 @@
 #include "base/error.h"
 #include "base/rng.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 using enum LoopState;
@@ -415,4 +415,4 @@ TEST(Start, IsParsed) {
 }
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::machine

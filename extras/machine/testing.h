@@ -7,7 +7,7 @@
 #include "extras/machine/twin.h"
 
 /// Helpers for tests of machines.
-namespace upswing {
+namespace upswing::machine {
 
 /// The folder of the measured data: UPSWING_REAL, or `../shared/real` next to the project's root.
 /// Empty if there is none; a test then skips.
@@ -38,4 +38,4 @@ inline Twin TestTwin() {
   return twin;
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -17,7 +17,7 @@
 #include "runs/covariance.h"
 #include "runs/plant_file.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -302,4 +302,4 @@ Joints TorqueLimits(const Twin& twin, int actuated_joint) {
   return limit;
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

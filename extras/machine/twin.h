@@ -11,7 +11,7 @@
 
 /// The twin: a model of a real machine with motors, sensors and control loop, identified from the
 /// machine's logs.
-namespace upswing {
+namespace upswing::machine {
 
 /// The motors. A torque follows its command after a delay, with a first-order lag:
 ///   lag · dτ/dt = command(t - delay) - τ
@@ -115,4 +115,4 @@ int ActuatedJoint(const MachineLog& log, const Twin& twin);
 /// The motors' torque limits (N·m) under a controller of this joint, as ActuatedJoint counts them.
 Joints TorqueLimits(const Twin& twin, int actuated_joint);
 
-}  // namespace upswing
+}  // namespace upswing::machine

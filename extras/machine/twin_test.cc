@@ -8,7 +8,7 @@
 #include "base/text.h"
 #include "runs/plant_file.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 Twin SomeTwin() {
@@ -160,4 +160,4 @@ TEST(InSession, TakesTheSessionsValues) {
 }
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -12,7 +12,7 @@
 #include "base/text.h"
 #include "report/figure.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 /// The errors of all windows of each run (runs × windows).
@@ -259,4 +259,4 @@ void DrawErrors(std::span<const MachineLog> logs, std::span<const Predictor> pre
   Draw(figure, file);
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

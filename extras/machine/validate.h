@@ -12,7 +12,7 @@
 
 /// How well models predict measured motion. The error of a window is the rms over its rows of the
 /// length of the vector of both angles' errors (rad).
-namespace upswing {
+namespace upswing::machine {
 
 /// A model's name, and its twin for each of the logs.
 struct Predictor {
@@ -57,4 +57,4 @@ std::string MotionCsv(std::span<const MachineLog> logs, std::span<const Predicto
 void DrawErrors(std::span<const MachineLog> logs, std::span<const Predictor> predictors,
                 const std::filesystem::path& file, ThreadPool* pool);
 
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -10,7 +10,7 @@
 #include "extras/machine/simulated_machine.h"
 #include "extras/machine/testing.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 Twin RealPlant() { return ReadTwin("realaigym-c1", "test"); }
@@ -170,4 +170,4 @@ TEST(Identify, PredictsLeftOutRunsOfTheRealMachine) {
 }
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::machine

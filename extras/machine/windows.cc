@@ -9,7 +9,7 @@
 #include "base/sample.h"
 #include "extras/machine/check.h"
 
-namespace upswing {
+namespace upswing::machine {
 namespace {
 
 constexpr double kCubicSpan = 0.02;  // s, to both sides of a start
@@ -101,4 +101,4 @@ std::vector<LogWindow> CutWindows(std::span<const MachineLog> logs, const Window
   return windows;
 }
 
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -7,7 +7,7 @@
 #include "pendulum/plant.h"
 
 /// Short pieces of logs, over which a model predicts the motion from a start state.
-namespace upswing {
+namespace upswing::machine {
 
 /// Which windows of a log are used.
 struct WindowRules {
@@ -35,4 +35,4 @@ double Median(std::vector<double> values);
 /// The median of the numbers of all lists.
 double PooledMedian(std::span<const std::vector<double>> lists);
 
-}  // namespace upswing
+}  // namespace upswing::machine

@@ -31,7 +31,7 @@ thread_local int64_t g_allocations = 0;
 [[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
 [[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
-namespace upswing {
+namespace upswing::realaigym {
 namespace {
 
 /// A policy of the double pendulum with a network of two hidden units.
@@ -104,4 +104,4 @@ TEST(ControlLoop, ACycleAllocatesNoMemory) {
 }
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::realaigym

@@ -19,7 +19,7 @@
 #include "runs/plant_file.h"
 #include "runs/tensor_file.h"
 
-namespace upswing {
+namespace upswing::realaigym {
 namespace {
 
 namespace fs = std::filesystem;
@@ -370,4 +370,4 @@ void DrawBoard(const BoardReport& report, const fs::path& file) {
   Draw(figure, file);
 }
 
-}  // namespace upswing
+}  // namespace upswing::realaigym

@@ -13,7 +13,7 @@
 #include "runs/find_policy.h"
 
 /// Scoring of policies by the rules of RealAIGym's boards (docs/howto/realaigym.md).
-namespace upswing {
+namespace upswing::realaigym {
 
 /// A competitor on the board: a policy found by a search, any policy of the double pendulum, or the
 /// benchmark's own linear regulator.
@@ -93,4 +93,4 @@ std::string BoardCsv(const BoardReport& report);
 /// Draws the six rows of robustness as .svg or .png.
 void DrawBoard(const BoardReport& report, const std::filesystem::path& file);
 
-}  // namespace upswing
+}  // namespace upswing::realaigym

@@ -9,7 +9,7 @@
 #include "pendulum/identification.h"
 #include "pendulum/observation.h"
 
-namespace upswing {
+namespace upswing::realaigym {
 namespace {
 
 /// Records the first environment's observations, and moves it.
@@ -81,4 +81,4 @@ TEST(RealAIGym, PoliciesObserveAsInTraining) {
 }
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::realaigym

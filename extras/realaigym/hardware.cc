@@ -7,7 +7,7 @@
 #include "base/json.h"
 #include "base/text.h"
 
-namespace upswing {
+namespace upswing::realaigym {
 namespace {
 
 /// Start of the last stretch above the line, s; the end if the tip is below at the end.
@@ -147,4 +147,4 @@ std::string HardwareJson(const HardwareReport& report) {
   return PrintableJson(j);
 }
 
-}  // namespace upswing
+}  // namespace upswing::realaigym

@@ -10,7 +10,7 @@
 
 /// Scores of runs on the real robot by the rules of RealAIGym's hardware boards, version 2
 /// (docs/howto/realaigym.md).
-namespace upswing {
+namespace upswing::realaigym {
 
 /// The normalisers of a hardware board. Measured torque is rough, so cost and smoothness have wider
 /// ones than in simulation. The board of pushed acrobots has its own.
@@ -50,4 +50,4 @@ HardwareReport ScoreHardware(std::span<const MachineLog> logs, std::optional<Rob
 
 std::string HardwareJson(const HardwareReport& report);
 
-}  // namespace upswing
+}  // namespace upswing::realaigym

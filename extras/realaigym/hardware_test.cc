@@ -11,7 +11,7 @@
 #include "extras/machine/testing.h"
 #include "extras/realaigym/boards.h"
 
-namespace upswing {
+namespace upswing::realaigym {
 namespace {
 
 /// A run of 10 s at 100 Hz: hangs, stands upright from `up` to `down` (s), hangs again.
@@ -199,4 +199,4 @@ TEST(Hardware, PublishedScoresOfMeasuredRuns) {
 }
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::realaigym

@@ -9,7 +9,7 @@
 #include "extras/machine/estimator.h"
 #include "extras/machine/motion.h"
 
-namespace upswing {
+namespace upswing::realaigym {
 namespace {
 
 /// Two Gaussian pulses of torque at each joint, at least a second apart, the first at joint 1.
@@ -120,4 +120,4 @@ HardwareReport RunTrials(const Twin& twin, Robot robot, const TrialController& m
   return {robot, rules.pushes, std::move(runs)};
 }
 
-}  // namespace upswing
+}  // namespace upswing::realaigym

@@ -13,7 +13,7 @@
 #include "extras/realaigym/simulation.h"
 
 /// Controllers on machines of a twin's posterior, by the rules of RealAIGym's hardware boards.
-namespace upswing {
+namespace upswing::realaigym {
 
 /// Share of the estimated dry friction that the motors compensate, of both joints. The rules allow
 /// it. Less than all keeps the sum from driving a joint whose friction is overestimated.
@@ -47,4 +47,4 @@ HardwareReport RunTrials(const Twin& twin, Robot robot, const TrialController& m
                          const TrialRules& rules, ThreadPool* pool,
                          const Progress& progress = nullptr);
 
-}  // namespace upswing
+}  // namespace upswing::realaigym

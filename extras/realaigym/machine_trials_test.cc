@@ -14,7 +14,7 @@
 #include "extras/realaigym/swing_policy.h"
 #include "pendulum/friction.h"
 
-namespace upswing {
+namespace upswing::realaigym {
 namespace {
 
 Twin SomeMachine() {
@@ -240,4 +240,4 @@ TEST(PublishedTvlqr, PushedItEndsLikeEachRealRun) {
 }
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::realaigym

@@ -1,6 +1,6 @@
 #include "cli/program.h"
 
-namespace upswing {
+namespace upswing::realaigym {
 
 // Each has a file *_command.cc.
 void AddRealAiGym(CommandLine& line);
@@ -10,9 +10,9 @@ namespace {
 constexpr Command kCommands[] = {{"realaigym", AddRealAiGym}};
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::realaigym
 
 // An exception during the report of another one ends the program.
 int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
-  return upswing::MainProgram(argc, argv, upswing::kCommands);
+  return upswing::MainProgram(argc, argv, upswing::realaigym::kCommands);
 }

@@ -1,6 +1,6 @@
 #include "extras/realaigym/plant.h"
 
-namespace upswing {
+namespace upswing::realaigym {
 
 Manipulator ManipulatorOf(const BoardPlant& p) {
   Manipulator m;
@@ -18,4 +18,4 @@ Manipulator ManipulatorOf(const BoardPlant& p) {
   return m;
 }
 
-}  // namespace upswing
+}  // namespace upswing::realaigym

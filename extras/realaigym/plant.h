@@ -5,10 +5,15 @@
 
 #include "pendulum/equations.h"
 
+namespace upswing::machine {}
+
 /// The double pendulum of the benchmark RealAIGym (docs/howto/realaigym.md): its parameters, and
 /// the constants of its equations of motion. Its inertias are about the joints, unlike those of
 /// Plant.
-namespace upswing {
+namespace upswing::realaigym {
+
+// The benchmark's robots are machines, with logs and twins.
+using namespace machine;
 
 inline constexpr double kBoardTimestep = 0.002;  // step of Runge-Kutta and of control, s
 inline constexpr int kBoardSteps = 5000;         // steps per simulation, 10 s
@@ -37,4 +42,4 @@ inline constexpr size_t kBoardBlock = 64;
 /// One number for each simulation of a block.
 using Lanes = std::array<double, kBoardBlock>;
 
-}  // namespace upswing
+}  // namespace upswing::realaigym

@@ -10,7 +10,7 @@
 #include "pendulum/closed_form.h"
 #include "runs/plant_file.h"
 
-namespace upswing {
+namespace upswing::realaigym {
 namespace {
 
 // Parameters of the benchmark's plant without friction (docs/howto/realaigym.md).
@@ -138,4 +138,4 @@ TEST(BoardPlant, FrictionIsThatOfTheFormula) {
 }
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::realaigym

@@ -17,7 +17,7 @@
 #include "base/thread_pool.h"
 #include "extras/realaigym/simulation.h"
 
-namespace upswing {
+namespace upswing::realaigym {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -213,4 +213,4 @@ TEST(RealAiGymPublished, TvlqrHasItsPublishedScores) {
 }
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::realaigym

@@ -11,7 +11,7 @@
 #include "extras/machine/identify.h"
 #include "pendulum/friction.h"
 
-namespace upswing {
+namespace upswing::realaigym {
 namespace {
 
 constexpr double kGridStep = 0.002;  // of the reference, s
@@ -230,4 +230,4 @@ HardwareReport RunTvlqrTrials(const Twin& twin, Robot robot, const PublishedTvlq
   return RunTrials(machine, robot, law.OnMachine(), own, pool, progress);
 }
 
-}  // namespace upswing
+}  // namespace upswing::realaigym

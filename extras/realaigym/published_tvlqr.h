@@ -10,7 +10,7 @@
 
 /// The TVLQR controllers that ran on RealAIGym's robot, rebuilt from their published settings and
 /// the logs of their runs.
-namespace upswing {
+namespace upswing::realaigym {
 
 /// The law u = ū(t) - K(t) (x - x̄(t)) with friction compensation, then a constant regulator about
 /// upright. To first order, any path near the reference gives the same law: ū and x̄ are means over
@@ -50,4 +50,4 @@ HardwareReport RunTvlqrTrials(const Twin& twin, Robot robot, const PublishedTvlq
                               std::span<const MachineLog> runs, const TrialRules& rules,
                               ThreadPool* pool, const Progress& progress = nullptr);
 
-}  // namespace upswing
+}  // namespace upswing::realaigym

@@ -32,7 +32,7 @@
 #include "runs/find_policy.h"
 #include "runs/tensor_file.h"
 
-namespace upswing {
+namespace upswing::realaigym {
 namespace {
 
 struct RealAiGymArguments {
@@ -424,4 +424,4 @@ void AddRealAiGym(CommandLine& line) {
       "  ./upswing realaigym tvlqr --lqr-q1 100 --lqr-q2 100 --twin realaigym-twin\n");
 }
 
-}  // namespace upswing
+}  // namespace upswing::realaigym

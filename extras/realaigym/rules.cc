@@ -8,7 +8,7 @@
 #include "base/rng.h"
 #include "control/linearize.h"
 
-namespace upswing {
+namespace upswing::realaigym {
 namespace {
 
 /// Draws six pushes with growing times, and keeps three random ones for the motor's joint. Pushes
@@ -176,4 +176,4 @@ Robustness JudgeRobustness(const std::vector<RobustnessCase>& cases,
   return result;
 }
 
-}  // namespace upswing
+}  // namespace upswing::realaigym

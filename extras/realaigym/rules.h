@@ -14,7 +14,7 @@
 
 /// The rules of RealAIGym's simulation boards, version 2 (docs/howto/realaigym.md): the
 /// simulations, and the scores of performance and robustness.
-namespace upswing {
+namespace upswing::realaigym {
 
 /// The robot: the joint with the motor.
 enum class Robot { kPendubot = 1, kAcrobot = 2 };
@@ -155,4 +155,4 @@ struct Robustness {
 Robustness JudgeRobustness(const std::vector<RobustnessCase>& cases,
                            const std::vector<BoardOutcome>& outcomes);
 
-}  // namespace upswing
+}  // namespace upswing::realaigym

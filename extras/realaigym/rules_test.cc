@@ -13,7 +13,7 @@
 #include "extras/realaigym/simulation.h"
 #include "pendulum/closed_form.h"
 
-namespace upswing {
+namespace upswing::realaigym {
 namespace {
 
 TEST(RealAiGymRules, TheFormulaGivesThePublishedScores) {
@@ -275,4 +275,4 @@ TEST(RealAiGymSimulation, PlaceAndThreadsChangeNoBit) {
 }
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::realaigym

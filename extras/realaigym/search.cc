@@ -10,7 +10,7 @@
 #include "extras/realaigym/machine_trials.h"
 #include "extras/realaigym/swing_net.h"
 
-namespace upswing {
+namespace upswing::realaigym {
 namespace {
 
 /// Throws BadInput unless the sizes that must be even are even.
@@ -262,4 +262,4 @@ BoardOutcome BoardSearch::Nominal() const {
       .front();
 }
 
-}  // namespace upswing
+}  // namespace upswing::realaigym

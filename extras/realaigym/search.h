@@ -11,7 +11,7 @@
 #include "extras/machine/twin.h"
 #include "extras/realaigym/swing_policy.h"
 
-namespace upswing {
+namespace upswing::realaigym {
 
 /// Separable natural evolution strategies: Schaul, Glasmachers, Schmidhuber, "High dimensions and
 /// heavy tails for natural evolution strategies" (GECCO 2011). Candidates are normal about a mean,
@@ -107,4 +107,4 @@ class BoardSearch {
   int generation_ = 0;
 };
 
-}  // namespace upswing
+}  // namespace upswing::realaigym

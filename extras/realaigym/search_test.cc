@@ -7,7 +7,7 @@
 #include "base/error.h"
 #include "extras/realaigym/swing_net.h"
 
-namespace upswing {
+namespace upswing::realaigym {
 namespace {
 
 TEST(Snes, FindsTheBottomOfABowl) {
@@ -142,4 +142,4 @@ TEST(SwingNet, OtherFilesThanPoliciesAreRefused) {
 }
 
 }  // namespace
-}  // namespace upswing
+}  // namespace upswing::realaigym

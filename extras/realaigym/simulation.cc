@@ -9,7 +9,7 @@
 #include "base/rng.h"
 #include "pendulum/closed_form.h"
 
-namespace upswing {
+namespace upswing::realaigym {
 namespace {
 
 constexpr int kMostDelay = 32;  // steps, more than the longest delay of the rules
@@ -274,4 +274,4 @@ std::vector<BoardOutcome> SimulateOnBoard(Robot robot, std::span<const BoardEpis
   return outcomes;
 }
 
-}  // namespace upswing
+}  // namespace upswing::realaigym

@@ -9,7 +9,7 @@
 #include "base/thread_pool.h"
 #include "extras/realaigym/rules.h"
 
-namespace upswing {
+namespace upswing::realaigym {
 
 /// Measurements of a block of simulations: the states with noise and delay, or estimates.
 struct BoardMeasurement {
@@ -52,4 +52,4 @@ std::vector<BoardOutcome> SimulateOnBoard(Robot robot, std::span<const BoardEpis
                                           std::vector<BoardSample>* trace = nullptr,
                                           const Progress& progress = nullptr);
 
-}  // namespace upswing
+}  // namespace upswing::realaigym

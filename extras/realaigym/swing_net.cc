@@ -11,6 +11,8 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace upswing::HWY_NAMESPACE {
+
+using namespace realaigym;
 namespace {
 
 using F = hn::CappedTag<float, 16>;
@@ -176,7 +178,7 @@ void ActOnBlock(SwingBlock& block, const BoardMeasurement& measured, Lanes& torq
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace upswing {
+namespace upswing::realaigym {
 
 HWY_EXPORT(ActOnBlock);
 
@@ -184,5 +186,5 @@ void SwingTorques(SwingBlock& block, const BoardMeasurement& measured, Lanes& to
   HWY_DYNAMIC_DISPATCH(ActOnBlock)(block, measured, torque);
 }
 
-}  // namespace upswing
+}  // namespace upswing::realaigym
 #endif  // HWY_ONCE

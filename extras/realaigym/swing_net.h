@@ -7,7 +7,7 @@
 #include "extras/realaigym/simulation.h"
 
 /// The arithmetic of SwingNet (swing_policy.h) for a block of simulations.
-namespace upswing {
+namespace upswing::realaigym {
 
 /// Largest number of units in each of the network's two layers, and number of inputs: sine and
 /// cosine of q1, of q1 + q2 and of q2, w1/10 and w2/10.
@@ -39,4 +39,4 @@ constexpr size_t SwingWeights(int hidden) {
 /// Computes the torques for the measured angles, then stores the angles as those of one step ago.
 void SwingTorques(SwingBlock& block, const BoardMeasurement& measured, Lanes& torque);
 
-}  // namespace upswing
+}  // namespace upswing::realaigym

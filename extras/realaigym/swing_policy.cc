@@ -10,7 +10,7 @@
 #include "base/text.h"
 #include "extras/realaigym/swing_net.h"
 
-namespace upswing {
+namespace upswing::realaigym {
 namespace {
 
 constexpr const char* kFormat = "upswing-realaigym";
@@ -139,4 +139,4 @@ SwingPolicy ReadSwingPolicy(const Tensors& tensors) {
   return policy;
 }
 
-}  // namespace upswing
+}  // namespace upswing::realaigym

@@ -9,7 +9,7 @@
 #include "base/tensors.h"
 #include "extras/realaigym/simulation.h"
 
-namespace upswing {
+namespace upswing::realaigym {
 
 /// A small network that swings up, blended with a linear regulator that holds upright:
 ///   u = (1 - s) u_net(x) + s u_lin(x),   u_lin = -K x,   s = smooth step of (1 - x' P x / ρ)
@@ -73,4 +73,4 @@ bool IsSwingPolicy(const Tensors& tensors);
 /// within 50 and the others within 1e6.
 SwingPolicy ReadSwingPolicy(const Tensors& tensors);
 
-}  // namespace upswing
+}  // namespace upswing::realaigym

@@ -7,6 +7,9 @@
 #include "tools/fuzz/target.h"
 
 namespace upswing {
+
+using namespace machine;
+
 namespace {
 
 bool SameNumber(double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); }

@@ -9,6 +9,9 @@
 #include "tools/fuzz/target.h"
 
 namespace upswing {
+
+using namespace machine;
+
 namespace {
 
 constexpr std::string_view kEndOfColumns = "\n===\n";

@@ -5,6 +5,8 @@
 
 namespace upswing {
 
+using namespace machine;
+
 bool TryInput(std::string_view input) {
   size_t at = 0;
   // Without further bytes there are no further faults.

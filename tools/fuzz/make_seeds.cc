@@ -14,6 +14,9 @@
 #include "tools/fuzz/tiny_training.h"
 
 namespace upswing {
+
+using namespace realaigym;
+
 namespace {
 
 namespace fs = std::filesystem;

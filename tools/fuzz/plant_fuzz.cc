@@ -9,6 +9,8 @@
 #include "tools/fuzz/target.h"
 
 namespace upswing {
+
+using namespace machine;
 namespace {
 
 /// Checks that all numbers of a struct are finite.

@@ -17,6 +17,10 @@
 #include "tools/fuzz/target.h"
 
 namespace upswing {
+
+using namespace deploy;
+using namespace realaigym;
+
 namespace {
 
 /// Checks a board policy: it is written as it was read, chooses finite torques from any reachable

@@ -11,6 +11,8 @@
 
 namespace upswing {
 
+using namespace deploy;
+
 bool TryInput(std::string_view input) {
   (void)RunConditions::OfLog(input);
 

@@ -7,6 +7,8 @@
 
 namespace upswing {
 
+using namespace deploy;
+
 bool TryInput(std::string_view input) {
   const HttpRequest request = ParseHttpRequest(input);
   if (request.refusal != 0) {
