@@ -303,14 +303,14 @@ class BadInput(BadInputTest):
                     {"actions": "levels", "levels": 1},
                 "levels: expected actions=": {"levels": 5},
                 "threads: expected several environments": {"threads": 2},
-                "expected a width and a height": {"width": 1},
+                "expected 16 to 8192 pixels": {"width": 1},
                 "height: expected an integer": {"height": 4.5},
                 "actions: expected one of continuous, levels": {"actions": "discrete"},
                 "delay: expected a multiple of 0.02": {"delay": 0.03},
                 'mass1: expected a number in [0.01, 100], got "nan"': {"mass1": np.nan},
                 'got "acrobot"; train on Gymnasium': {"agent": "acrobot"},
                 'got "fsat"': {"agent": "fsat"},
-                "render_mode: expected": {"render_mode": "human"},
+                "render_mode: expected": {"render_mode": "ansi"},
                 "/nothing/here.xml": {"model": "/nothing/here.xml"}}.items():
             if settings is not None:
                 self.refuse(text, lambda settings=settings: upswing.DoublePendulumEnv(**settings))

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from gymnasium import spaces
 
 from . import _upswing
+from ._mujoco import stop_clock
 from ._settings import text_of, texts_of, whole_number
 
 
@@ -200,6 +201,7 @@ class Pictures:
             from . import _view  # pylint: disable=import-outside-toplevel
         except ImportError as error:
             raise _upswing.Failure(f"render: {error}") from error
+        stop_clock()
         try:
             return make(_view)
         except _view.CannotDraw as error:

@@ -23,11 +23,9 @@ try:
 except ImportError as missing:
     if __name__ != "__main__":
         raise
-    sys.exit(f"upswing: view: {missing}: expected a Python with the packages {PACKAGES}; make one by: "
-             f"python3 -m venv view && view/bin/pip install {PACKAGES} && "
+    sys.exit(f"upswing: view: {missing}: expected Python 3.11 or newer with the packages {PACKAGES}; "
+             f"make one by: python3 -m venv view && view/bin/pip install {PACKAGES} && "
              "export UPSWING_PYTHON=$PWD/view/bin/python")
-
-mujoco.set_mjcb_time(None)  # a clock in Python, which would slow down every step in this process
 
 PERIOD = 0.02  # s, control step
 TRAIL = 60  # control steps that the path of the tip shows
@@ -241,7 +239,10 @@ class Canvas:
         self._camera, self._option = mujoco.MjvCamera(), mujoco.MjvOption()
         self._scene: mujoco.MjvScene | None = None
         try:
-            self._graphics = mujoco.GLContext(width, height)
+            make = mujoco.GLContext  # that of MUJOCO_GL, if it was set when `mujoco` was imported
+            if os.environ["MUJOCO_GL"] == "egl":
+                from mujoco.egl import GLContext as make  # pylint: disable=import-outside-toplevel
+            self._graphics = make(width, height)
         except Exception as error:  # pylint: disable=broad-exception-caught  # many kinds
             text = str(error).partition("\n")[0]
             raise CannotDraw(

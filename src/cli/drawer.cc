@@ -34,6 +34,7 @@ Drawer::Drawer(std::string job) : socket_(-1) {
   }
   socket_ = Descriptor(ends[0]);
   const Descriptor other(ends[1]);
+  setenv("PYTHONSAFEPATH", "1", 1);  // no modules from the present folder
   std::string python = PythonName(), flag = "-c", program = ViewProgram();
   const std::array<char*, 5> words{python.data(), flag.data(), program.data(), job.data(), nullptr};
 
