@@ -8,11 +8,11 @@ import { core } from './core';
 test('frees a controller without references', async () => {
   setFlagsFromString('--expose-gc');
   const collect = runInNewContext('gc') as () => void;
-  const file = readPolicy('d3qn');
+  const file = readPolicy('fast');
   async function openAndForget(times: number): Promise<number> {
     for (let k = 0; k < times; ++k) {
       new CoreController(file.slice(0));
-      if (k % 5 > 0) continue; // a garbage collection takes longer than opening a policy
+      if (k % 10 > 0) continue; // a garbage collection takes longer than opening a policy
       collect();
       await new Promise((resolve) => setTimeout(resolve, 0));
     }

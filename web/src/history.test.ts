@@ -16,7 +16,7 @@ test('keeps the last seconds, oldest first', () => {
 });
 
 test('a window includes its oldest moment, whenever it began', () => {
-  for (let start = 0; start < 1000; ++start) {
+  for (let start = 0; start < 1000; start += 9) {
     const history = new History(60);
     const time = (k: number) => (start + 4 * k) / STEPS_PER_SECOND; // as World.time
     for (let k = 0; k <= 4000; ++k) history.add(moment(time(k)));
