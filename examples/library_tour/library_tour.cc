@@ -70,6 +70,17 @@ std::unique_ptr<Policy> Learn(Agent& agent, VectorEnv& env, int steps) {
   return agent.ExportPolicy(PolicyInfo());
 }
 
+/// Judges policies from other starts at each evaluation.
+struct Starts : Evaluator {
+  PendulumEnvConfig config;
+
+  Evaluation Evaluate(const Policy& policy, int64_t step) override {
+    config.seed = uint64_t(1000 + step);
+    PendulumEnv test(config);
+    return upswing::Evaluate(policy, test);
+  }
+};
+
 int main() try {
   PendulumEnvConfig config;
   config.num_envs = 16;
@@ -87,14 +98,10 @@ int main() try {
   TrainConfig train;
   train.envs = config.num_envs;
   train.steps = 20000;
-  const auto evaluate = [&](const Policy& policy, int64_t step) {
-    PendulumEnvConfig fresh = config;
-    fresh.seed = uint64_t(1000 + step);  // other starts at each evaluation
-    PendulumEnv test(fresh);
-    return Evaluate(policy, test, &pool);
-  };
+  Starts evaluator;
+  evaluator.config = config;
   Dqn learner(small, env.spec(), /*seed=*/2, pool);
-  Trainer trainer({train, evaluate}, learner, env);
+  Trainer trainer(train, learner, env, evaluator);
   while (trainer.Step()) continue;
 
   Tensors state;

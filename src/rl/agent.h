@@ -9,12 +9,10 @@
 #include "base/archive.h"
 #include "base/env.h"
 #include "base/matrix.h"
-#include "base/policy_info.h"
 #include "base/steps.h"
+#include "nn/network_policy.h"
 
 namespace upswing {
-
-class NetworkPolicy;
 
 /// Names and values, in a fixed order.
 using Metrics = std::vector<std::pair<std::string, double>>;
