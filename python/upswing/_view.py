@@ -239,7 +239,7 @@ class Canvas:
         self._camera, self._option = mujoco.MjvCamera(), mujoco.MjvOption()
         self._scene: mujoco.MjvScene | None = None
         try:
-            make = mujoco.GLContext  # that of MUJOCO_GL, if it was set when `mujoco` was imported
+            make = mujoco.GLContext  # MUJOCO_GL chose it if it was set at the import
             if os.environ["MUJOCO_GL"] == "egl":
                 from mujoco.egl import GLContext as make  # pylint: disable=import-outside-toplevel
             self._graphics = make(width, height)

@@ -140,7 +140,7 @@ class Recordings(ViewTest):
                                    "print(*film.size, film.n_frames, film.info['duration'])"),
                          ["64", "48", "6", "40"])
 
-    def test_what_is_interrupted_leaves_nothing(self):
+    def test_an_interruption_leaves_nothing(self):
         arguments = [UPSWING, "view", "--record", "a.mp4", "--seconds", "1000", "--size", "32x24"]
         with subprocess.Popen(arguments, cwd=self.folder, stdout=subprocess.PIPE,
                               stderr=subprocess.STDOUT,
@@ -201,7 +201,7 @@ class BadInput(ViewTest):
 
 @unittest.skipIf(why_nothing_is_drawn(), why_nothing_is_drawn())
 class WindowTest(ViewTest):
-    """The window under Xvfb. A stand-in for Python writes down what is asked."""
+    """The window under Xvfb. A stand-in for Python writes down its input."""
 
     def setUp(self):
         super().setUp()
