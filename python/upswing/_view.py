@@ -70,7 +70,8 @@ class Scene:
             bodies += f"""
     <geom type="box" pos="{x} {back} {(floor + thin) / 2}" size="{thin} {thin} {(thin - floor) / 2}"
           material="metal"/>
-    <geom type="box" pos="{x} {back} {floor + thin}" size="{0.16 * r} {0.16 * r} {thin}" material="metal"/>
+    <geom type="box" pos="{x} {back} {floor + thin}" size="{0.16 * r} {0.16 * r} {thin}"
+          material="metal"/>
     <geom type="cylinder" fromto="{x} {radius + 0.01 * r} 0 {x} {back} 0" size="{1.25 * radius}"
           material="motor"/>
     <body pos="{x} 0 0">
@@ -239,10 +240,11 @@ class Canvas:
         self._camera, self._option = mujoco.MjvCamera(), mujoco.MjvOption()
         self._scene: mujoco.MjvScene | None = None
         try:
-            make = mujoco.GLContext  # MUJOCO_GL chose it if it was set at the import
-            if os.environ["MUJOCO_GL"] == "egl":
-                from mujoco.egl import GLContext as make  # pylint: disable=import-outside-toplevel
-            self._graphics = make(width, height)
+            if os.environ["MUJOCO_GL"] == "egl":  # even if `mujoco` was imported before this file
+                from mujoco import egl  # pylint: disable=import-outside-toplevel
+                self._graphics = egl.GLContext(width, height)
+            else:
+                self._graphics = mujoco.GLContext(width, height)
         except Exception as error:  # pylint: disable=broad-exception-caught  # many kinds
             text = str(error).partition("\n")[0]
             raise CannotDraw(
@@ -330,7 +332,11 @@ def _check_display() -> None:
     if not os.environ.get("DISPLAY") and not os.environ.get("WAYLAND_DISPLAY"):
         raise CannotDraw("cannot open a window: DISPLAY and WAYLAND_DISPLAY are not set")
     problems: list[str] = []
-    glfw.set_error_callback(lambda code, text: problems.append(text.decode(errors="replace")))
+
+    def note(_: int, text: Any) -> None:
+        problems.append(text.decode(errors="replace"))
+
+    glfw.set_error_callback(note)
     if glfw.init():
         glfw.window_hint(glfw.VISIBLE, glfw.FALSE)
         window = glfw.create_window(16, 16, "upswing", None, None)
@@ -378,7 +384,7 @@ class Episodes:
             sys.exit(0)
         self.steps, *numbers = map(float, line.split())
         table = np.reshape(numbers, (len(self.names), 5))
-        self.scene.show(table[:, :4], table[:, 4], self.steps)
+        self.scene.show(table[:, :4], table[:, 4].tolist(), self.steps)
 
     def label(self, more: str = "") -> None:
         """Labels each pendulum with name, time and torque."""

@@ -1,16 +1,19 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <filesystem>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "agents/controllers.h"
 #include "base/error.h"
+#include "base/format.h"
 #include "base/text.h"
 #include "cli/commands.h"
 #include "cli/drawer.h"
-#include "cli/progress.h"
 #include "cli/say.h"
 #include "cli/signals.h"
 #include "judge/rollout.h"
