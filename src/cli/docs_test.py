@@ -14,7 +14,7 @@ from pathlib import Path
 
 from testing import ROOT, UPSWING, ProgramTest, read_csv, train_once
 
-sys.path.insert(0, str(ROOT / "tools"))
+sys.path[:0] = [str(ROOT / "tools"), str(ROOT / "tools/results")]
 import program  # noqa: E402
 import prose  # noqa: E402
 import results  # noqa: E402
@@ -164,7 +164,7 @@ class Documents(ProgramTest):
                     self.assertLessEqual(flags, program.flags(command) | {"--help"})
 
     def test_tables_and_values_are_up_to_date(self):
-        done = subprocess.run([sys.executable, "-B", ROOT / "tools/results.py", "check"],
+        done = subprocess.run([sys.executable, "-B", ROOT / "tools/results/results.py", "check"],
                               check=False, stdout=subprocess.PIPE, encoding="utf-8")
         self.assertEqual((done.returncode, done.stdout), (0, ""))
 

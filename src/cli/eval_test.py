@@ -10,7 +10,7 @@ import unittest
 
 from testing import REWARD_TERMS, ROOT, ProgramTest, train_once
 
-sys.path.insert(0, str(ROOT / "tools/seeds"))
+sys.path.insert(0, str(ROOT / "tools/results/seeds"))
 from wilson import wilson  # noqa: E402
 
 PLANT = {"mass1": 1, "mass2": 1, "length1": 0.5, "length2": 0.5, "damping1": 0.2, "damping2": 0.2,

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 """Draw the figures of the documentation, as SVG in docs/figures/.
 
-    python3 tools/figures.py                  draw all figures
-    python3 tools/figures.py pareto maps      draw these
-    python3 tools/figures.py --measure        run the program for the data of episode, maps and lqr-catch
+    python3 tools/results/figures.py                  draw all figures
+    python3 tools/results/figures.py pareto maps      draw these
+    python3 tools/results/figures.py --measure        run the program for the data of episode, maps and lqr-catch
 
 Each figure is a function with @figure. It reads docs/results/data/*.json or docs/figures/**/*.csv. Drawing
 needs matplotlib (tools/docs-requirements.txt) and no built program. Draw again when a data file changes:
-tools/figures_test.py compares. Ink and background are CSS variables with a dark variant. Colours of agents
+tools/results/figures_test.py compares. Ink and background are CSS variables with a dark variant. Colours of agents
 are the same in both.
 """
 import argparse
@@ -20,8 +20,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from program import ROOT
-from results import DATA
+from results import DATA, ROOT
 from seeds.wilson import wilson
 
 FIGURES = ROOT / "docs/figures"

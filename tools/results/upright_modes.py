@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Shows the success of policies on plants that are easier or harder to hold upright.
 
-    tools/upright_modes.py POLICY|RUN|'CONTROLLER FLAGS' ... [--episodes 1000] [--share 0.25] [--seed 1]
+    tools/results/upright_modes.py POLICY|RUN|'CONTROLLER FLAGS' ... [--episodes 1000] [--share 0.25] [--seed 1]
         [--physics mujoco] [--figure FILE.svg|FILE.png]
-    tools/upright_modes.py runs/d3qn-adaptive-seed1 'mpc --known-plant' --figure delta.svg
+    tools/results/upright_modes.py runs/d3qn-adaptive-seed1 'mpc --known-plant' --figure delta.svg
 
 With delta = 0, no torque reaches one of the two modes in which the upright pendulum falls. Each episode
 draws its plant from a box of ± SHARE, as `upswing eval --randomize` does. Needs a built program
@@ -18,7 +18,7 @@ import subprocess
 
 from seeds.wilson import wilson
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 EDGES = [0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, math.inf]
 
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Watches a study's folder until all runs are done, then draws which worker trained which run when.
 
-    tools/draw_workers.py runs/my workers.svg
+    tools/results/draw_workers.py runs/my workers.svg
 """
 
 import json

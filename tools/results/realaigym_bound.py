@@ -5,7 +5,7 @@ The unknowns are the motion and torques of a swing-up that ends upright at rest 
 cost is the sum of the score's penalties. The constraints are the equations of motion in Runge-Kutta
 steps of 4 ms. Each start from random torques finds a local optimum. Needs `pip install casadi`.
 
-    python3 tools/realaigym_bound.py pendubot --starts 40
+    python3 tools/results/realaigym_bound.py pendubot --starts 40
 """
 
 import argparse

@@ -34,9 +34,10 @@ import tempfile
 import time
 from pathlib import Path
 
-import program
-from pages import markdown_table, pages, without_code
-from program import ROOT
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+import program  # noqa: E402
+from pages import markdown_table, pages, without_code  # noqa: E402
+from program import ROOT  # noqa: E402
 
 DATA = ROOT / "docs/results/data"
 MACHINES_PAGE = ROOT / "docs/results/index.md"
@@ -209,7 +210,7 @@ def problems_of(text, page=MACHINES_PAGE):
     for block in BLOCK.finditer(seen):
         try:
             if render(block[2], block[3], page) != block[4]:
-                yield f"{block[2]} {block[3]}: out of date; run tools/results.py write"
+                yield f"{block[2]} {block[3]}: out of date; run tools/results/results.py write"
         except Problem as problem:
             yield str(problem)
     for value in VALUE.finditer(seen):

@@ -2,7 +2,7 @@
 """Shows how often a study with few seeds comes to a wrong conclusion.
 
     ./upswing study configs/studies/how-many-seeds.toml
-    ./upswing python tools/seeds/how_many.py runs/how-many-seeds --out docs/figures/seeds
+    ./upswing python tools/results/seeds/how_many.py runs/how-many-seeds --out docs/figures/seeds
 
 Treats a study with very many seeds as the truth, draws small studies from it many times, and counts
 their conclusions: the better agent is better, the worse agent is better, or undecided. Writes seeds.csv

@@ -13,7 +13,7 @@ from pages import pages
 
 DARK = "@media (prefers-color-scheme:dark)"
 
-# Pictures drawn by the program itself, not by tools/figures.py: they show a user's output.
+# Pictures drawn by the program itself, not by tools/results/figures.py: they show a user's output.
 OUTPUT = {"map.svg", "workers.svg"}
 
 
@@ -66,7 +66,7 @@ class Figures(unittest.TestCase):
             path = figures.FIGURES / f"{name}.svg"
             drawn = figures.draw(name)
             on_disk = path.read_text(encoding="utf-8") if path.exists() else None
-            self.assertTrue(drawn == on_disk, f"{name}.svg is out of date: run python3 tools/figures.py {name}")
+            self.assertTrue(drawn == on_disk, f"{name}.svg is out of date: run python3 tools/results/figures.py {name}")
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 """Shows the distribution of results over very many seeds of one agent.
 
     ./upswing study configs/studies/ten-thousand.toml
-    ./upswing python tools/seeds/distribution.py runs/ten-thousand --out docs/figures/seeds
+    ./upswing python tools/results/seeds/distribution.py runs/ten-thousand --out docs/figures/seeds
 
 Prints the share of seeds that solve the task with its 95% interval, and quantiles of steps and
 return. Writes GROUP.csv, a row for each seed, and histograms by gnuplot, GROUP.svg and GROUP.png.
