@@ -2,8 +2,11 @@
 // page deletes. Texts are UTF-8, most of them JSON. A failed call returns 0 and leaves a message.
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <initializer_list>
 #include <limits>
 #include <numeric>
+#include <type_traits>
 
 #include "agents/controllers.h"
 #include "agents/loaded_policy.h"
@@ -247,28 +250,70 @@ void ObservationRemember(const float* before, double torque, int steps, float* o
 
 UPSWING_EXPORT(numbers) double* Numbers() { return number.data(); }
 
-/// Input: plant (8), state (4), torque. Output: observation (8), energy, energy upright, normalised
-/// energy, tip height, whether both links are inverted, the reward's terms (5).
-UPSWING_EXPORT(pendulum_at) void PendulumAt() {
-  const Plant plant = PlantAt(number.data());
-  const PendulumState s{number[8], number[9], number[10], number[11]};
-  const double torque = number[12];
-  double* to = number.data();
-  for (const float x : Observe(plant, s)) *to++ = x;
-  for (const double x : {Energy(plant, s), EnergyTarget(plant), NormalizedEnergy(plant, s),
-                         TipHeight(plant, s), Inverted(s) ? 1.0 : 0.0}) {
-    *to++ = x;
-  }
-  for (const double x : RewardTerms(plant, s, torque)) *to++ = x;
+namespace {
+
+// Inputs of the formulas, in the order in which the page writes their numbers.
+
+/// A pendulum at a control step, and a push.
+struct PendulumInput {
+  std::array<double, 8> plant;
+  PendulumState state;
+  double torque;             // N·m
+  double link, along, x, z;  // see Push
+};
+
+/// A measured state, and the torque of the control period before it.
+struct IdentifierInput {
+  PendulumState state;
+  double torque, noise;  // see Identifier::Update
+};
+
+/// A state at a control step, and the torque of the control period before it.
+struct SensorsInput {
+  PendulumState state;
+  double torque;  // N·m
+  SensorModel model;
+};
+
+struct CapsuleInput {
+  double mass, radius, length;  // kg, m
+};
+
+/// The page's numbers as a struct of doubles.
+template <typename T>
+T Input() {
+  static_assert(std::is_trivially_copyable_v<T> && sizeof(T) <= sizeof(number));
+  T input;
+  std::memcpy(&input, number.data(), sizeof(T));
+  return input;
 }
 
-/// One physics step. Input: plant (8), state (4), torque, and a push: link (0: none), distance from
-/// its hinge, force along x and z. Output: the state after it (4).
+/// Gives numbers to the page.
+void Output(std::initializer_list<double> numbers) { std::ranges::copy(numbers, number.begin()); }
+
+}  // namespace
+
+/// Input: plant, state, torque. Output: observation (8), energy, energy upright, normalised energy,
+/// tip height, whether both links are inverted, the reward's terms (5).
+UPSWING_EXPORT(pendulum_at) void PendulumAt() {
+  const auto in = Input<PendulumInput>();
+  const Plant plant = PlantAt(in.plant.data());
+  const PendulumState& s = in.state;
+  double* to = std::ranges::copy(Observe(plant, s), number.data()).out;
+  to = std::ranges::copy(
+           std::array{Energy(plant, s), EnergyTarget(plant), NormalizedEnergy(plant, s),
+                      TipHeight(plant, s), Inverted(s) ? 1.0 : 0.0},
+           to)
+           .out;
+  std::ranges::copy(RewardTerms(plant, s, in.torque), to);
+}
+
+/// One physics step. Output: the state after it (4).
 UPSWING_EXPORT(pendulum_step) void PendulumStep() {
-  const PendulumState before{number[8], number[9], number[10], number[11]};
-  const Push push{static_cast<int>(number[13]), number[14], number[15], number[16]};
-  const PendulumState s = Step(PlantAt(number.data()), before, number[12], push);
-  std::ranges::copy(std::array{s.q1, s.q2, s.w1, s.w2}, number.begin());
+  const auto in = Input<PendulumInput>();
+  const Push push{static_cast<int>(in.link), in.along, in.x, in.z};
+  const PendulumState s = Step(PlantAt(in.plant.data()), in.state, in.torque, push);
+  Output({s.q1, s.q2, s.w1, s.w2});
 }
 
 /// An estimator of the plant of one pendulum, from its nominal plant (8).
@@ -278,21 +323,20 @@ UPSWING_EXPORT(identifier_open) Identifier* IdentifierOpen() {
 
 UPSWING_EXPORT(identifier_close) void IdentifierClose(Identifier* identifier) { delete identifier; }
 
-/// Begins in a measured state (4).
+/// Begins in a measured state.
 UPSWING_EXPORT(identifier_begin) void IdentifierBegin(Identifier* identifier) {
-  identifier->Begin(0, {number[0], number[1], number[2], number[3]});
+  identifier->Begin(0, Input<PendulumState>());
 }
 
-/// Takes a measured state (4), the torque of the control period before it, and the noise of
-/// Identifier::Update.
 UPSWING_EXPORT(identifier_update) void IdentifierUpdate(Identifier* identifier) {
-  identifier->Update(0, number[4], {number[0], number[1], number[2], number[3]}, number[5]);
+  const auto in = Input<IdentifierInput>();
+  identifier->Update(0, in.torque, in.state, in.noise);
 }
 
-/// Input: state (4). Output: the estimate's part of its observation (kIdentifiedSize).
+/// Input: state. Output: the estimate's part of its observation (kIdentifiedSize).
 UPSWING_EXPORT(identifier_observe) void IdentifierObserve(const Identifier* identifier) {
   std::array<float, kIdentifiedSize> added;
-  identifier->Observe(0, {number[0], number[1], number[2], number[3]}, added);
+  identifier->Observe(0, Input<PendulumState>(), added);
   std::ranges::copy(added, number.begin());
 }
 
@@ -304,27 +348,23 @@ UPSWING_EXPORT(sensors_open) Sensors* SensorsOpen() {
 
 UPSWING_EXPORT(sensors_close) void SensorsClose(Sensors* sensors) { delete sensors; }
 
-/// Begins in a state (4).
+/// Begins in a state.
 UPSWING_EXPORT(sensors_begin) void SensorsBegin(Sensors* sensors) {
-  sensors->Begin(0, {number[0], number[1], number[2], number[3]});
+  sensors->Begin(0, Input<PendulumState>());
 }
 
-/// Input: state (4) at a control step, torque of the control period before it, SensorModel (4).
 /// Output: measured state (4), Sensors::Torque and SensorModel::velocity_noise.
 UPSWING_EXPORT(sensors_measure) void SensorsMeasure(Sensors* sensors) {
-  const PendulumState now{number[0], number[1], number[2], number[3]};
-  const SensorModel model{number[5], number[6], number[7], number[8]};
-  const PendulumState measured = sensors->Measure(0, model, now, number[4]);
-  std::ranges::copy(std::array{measured.q1, measured.q2, measured.w1, measured.w2,
-                               sensors->Torque(0, model), model.velocity_noise()},
-                    number.begin());
+  const auto in = Input<SensorsInput>();
+  const PendulumState s = sensors->Measure(0, in.model, in.state, in.torque);
+  Output({s.q1, s.q2, s.w1, s.w2, sensors->Torque(0, in.model), in.model.velocity_noise()});
 }
 
-/// Input: a capsule's mass, radius and length. Output: its inertia across and along.
+/// Output: a capsule's inertia across and along its axis.
 UPSWING_EXPORT(capsule_inertia) void CapsuleInertiaOf() {
-  const CapsuleInertia inertia(number[0], number[1], number[2]);
-  number[0] = inertia.across;
-  number[1] = inertia.along;
+  const auto in = Input<CapsuleInput>();
+  const CapsuleInertia inertia(in.mass, in.radius, in.length);
+  Output({inertia.across, inertia.along});
 }
 
 /// Input: plant (8). Leaves the model as MJCF.
