@@ -1,5 +1,5 @@
-// The equations of motion. Symbols: see pendulum/equations.h; of a link: m mass (kg), l length (m),
-// c distance of the centre of mass from the joint (m), I moment of inertia about it (kg·m²).
+// The equations of motion. Symbols: see pendulum/equations.h. Of a link: m mass (kg), l length (m),
+// c distance from joint to centre of mass (m), I moment of inertia about that centre (kg·m²).
 #include "pendulum/equations.h"
 
 #include <cmath>

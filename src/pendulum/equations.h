@@ -4,15 +4,14 @@
 
 #include "pendulum/plant.h"
 
-/// The equations of motion of a double pendulum, in one form for every plant and every caller:
+/// The equations of motion of every plant (Murray, Li and Sastry, "A Mathematical Introduction to
+/// Robotic Manipulation", 1994, Section 4.2). MuJoCo or closed_form.cc solves them in a training.
 ///   M(q) q̈ + c(q, q̇) + g(q) + d q̇ + f atan(100 q̇) = τ
 ///   M = [[J1 + J2 + 2 b cos q2, J2 + b cos q2], [·, J2 + a]]
-/// (Murray, Li and Sastry, "A Mathematical Introduction to Robotic Manipulation", 1994, Section
-/// 4.2). The last term is dry friction, smoothed as in RealAIGym's plant (Wiebe et al., "Open
-/// source dual-purpose acrobot and pendubot platform", IEEE Robotics and Automation Magazine 31
-/// (2024)).
-///
-/// closed_form.cc steps many environments at a time by the same equations.
+/// Symbols: q = (q1, q2) joint angles (rad; 0 hanging, q2 relative to link 1), q̇ = (w1, w2)
+/// velocities (rad/s), τ torques at both joints (N·m), c velocity terms, g gravity, d damping.
+/// Dry friction f is smoothed as in RealAIGym's plant (Wiebe et al., "Open source dual-purpose
+/// acrobot and pendubot platform", IEEE Robotics and Automation Magazine 31 (2024)).
 namespace upswing {
 
 struct MassMatrix {
@@ -29,17 +28,17 @@ struct ManipulatorTerms : MassMatrix {
 
 /// The constants of the equations of motion. Motor rotors change only J1, J2 and a.
 struct Manipulator {
-  double J1;      // inertia about joint 1 with link 2 as a point, and its armature, kg·m²
+  double J1;      // inertia about joint 1 with link 2 as a point at joint 2, plus armature, kg·m²
   double J2;      // inertia of link 2 about joint 2, kg·m²
   double b;       // mass of link 2 · length of link 1 · centre of link 2: coupling, kg·m²
   double a;       // armature of joint 2, kg·m²
-  double G1;      // largest moment of gravity about joint 1 with link 2 as a point, N·m
+  double G1;      // largest moment of gravity about joint 1, link 2 as a point at joint 2, N·m
   double G2;      // largest moment of gravity on link 2 about joint 2, N·m
   double d1, d2;  // damping, N·m·s/rad
-  double f1, f2;  // dry friction, N·m
+  double f1, f2;  // dry friction f, N·m; its torque is at most π/2 f
 
-  /// Adds the rotors of two motors (kg·m² each) behind gears. One rotor turns at gear · w1. Link 1
-  /// carries the other, which turns at w1 - gear · w2.
+  /// Adds the rotors of two motors (kg·m² each) behind gears (rotors.cc). Rotor 1 turns at
+  /// gear · w1. Link 1 carries rotor 2, which turns at w1 - gear · w2.
   void AddRotors(double inertia, double gear);
 
   MassMatrix Mass(double cos_q2) const {

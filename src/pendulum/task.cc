@@ -22,9 +22,9 @@ double Energy(const Plant& plant, const PendulumState& s) {
   const double w12 = s.w1 + s.w2;  // absolute velocity of link 2
   const double potential =
       -m1 * g * c1 * std::cos(s.q1) - m2 * g * (l1 * std::cos(s.q1) + c2 * std::cos(s.q1 + s.q2));
-  const double v1_squared = c1 * c1 * s.w1 * s.w1;  // of the centre of link 1
+  const double v1_squared = c1 * c1 * s.w1 * s.w1;  // of link 1's centre of mass, m²/s²
   const double v2_squared = l1 * l1 * s.w1 * s.w1 + c2 * c2 * w12 * w12 +
-                            2 * l1 * c2 * std::cos(s.q2) * s.w1 * w12;  // of the centre of link 2
+                            2 * l1 * c2 * std::cos(s.q2) * s.w1 * w12;  // of link 2's centre
   const double kinetic =
       0.5 * (I1 * s.w1 * s.w1 + I2 * w12 * w12 + m1 * v1_squared + m2 * v2_squared);
   return kinetic + potential;

@@ -7,21 +7,21 @@
 /// The task of the double pendulum as formulas: observation, reward and goal. MuJoCo trainings call
 /// them; closed_form.cc computes the same for many environments at a time.
 ///
-/// Symbols: q1, q2 joint angles (rad; 0 hanging, q2 relative to link 1), w1, w2 velocities (rad/s).
-/// Of a link: m mass (kg), l length (m), c distance of the centre of mass from the joint (m),
-/// I moment of inertia about it (kg·m²). g gravity (m/s²), tau the motor's torque (N·m).
+/// Symbols: q1, q2 joint angles (rad; 0 hanging, q1 = π and q2 = 0 upright; q2 relative to link 1),
+/// w1, w2 velocities (rad/s), g gravity (m/s²). Of a link: m mass (kg), l length (m), c distance
+/// from joint to centre of mass (m), I moment of inertia about that centre (kg·m²).
 namespace upswing {
 
 /// The task's name.
 inline constexpr const char* kDoublePendulum = "double-pendulum";
 
-/// An evaluation episode begins hanging and lasts kEvaluationSeconds. Its return is the sum of the
-/// rewards of the first kReturnSeconds. It succeeds if Inverted holds throughout the last
+/// An evaluation episode starts near hanging and lasts kEvaluationSeconds. Its return is the sum of
+/// the rewards of the first kReturnSeconds. It succeeds if Inverted holds throughout the last
 /// kHoldSeconds (s).
 inline constexpr double kEvaluationSeconds = 20, kReturnSeconds = 10, kHoldSeconds = 10;
 
-/// The links whose energy the task takes: thin rods, whose inertia is m l²/12. If the plant has own
-/// links, those of LinksOf.
+/// The links in the energy of observation and reward: thin rods of inertia m l²/12. If the plant
+/// sets a centre of mass or an inertia, they are the links of the equations of motion (LinksOf).
 std::array<Link, 2> TaskLinksOf(const Plant& plant);
 
 /// Mechanical energy (J) of TaskLinksOf, with heights measured from the pivot. It leaves out
@@ -47,15 +47,15 @@ inline constexpr double kMaxVelocity1 = 10.0;
 inline constexpr double kMaxVelocity2 = 20.0;
 
 /// The observation [cos q1, sin q1, w1/kMaxVelocity1, cos q2, sin q2, w2/kMaxVelocity2, Ê, ĥ], with
-/// Ê = NormalizedEnergy and ĥ = TipHeight over l1 + l2, in [-1, 1].
+/// Ê = NormalizedEnergy and ĥ = TipHeight / (l1 + l2). ĥ is within [-1, 1].
 std::array<float, kObservationSize> Observe(const Plant& plant, const PendulumState& s);
 
 inline constexpr int kRewardTerms = 5;
 inline constexpr std::array<const char*, kRewardTerms> kRewardTermNames{
     "energy", "height", "balance", "velocity_penalty", "torque_penalty"};
 
-/// The reward's signed terms for being in state s under torque tau (N·m), before weighting; the
-/// reward is their sum.
+/// The signed terms of the reward Σ weight · term; all weights are 1 by default. In an environment,
+/// s is the state at the end of a control step and tau (N·m) the motor's torque during it.
 std::array<double, kRewardTerms> RewardTerms(const Plant& plant, const PendulumState& s,
                                              double tau);
 
