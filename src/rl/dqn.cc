@@ -57,7 +57,7 @@ void Dqn::Observe(const StepResult& result) {
 }
 
 void Dqn::Learn() {
-  while (UpdateIsDue()) {
+  while (UpdateIsDue()) {  // updates_per_step for each step after learning_starts
     update_threads_.Run([&] { Update(Sample()); });
     UpdatePriorities();
   }
@@ -69,7 +69,7 @@ void Dqn::Update(const Minibatch& batch) {
   ForSlices(pool_, B_, [&](RowRange rows) { BackwardRows(batch, rows); });
   CountMinibatch(batch);
 
-  // Move θ against the gradient with Adam, and θ⁻ by θ⁻ ← θ⁻ + τ (θ - θ⁻), or copy θ once a period.
+  // Move θ with Adam, then θ⁻: θ⁻ ← θ⁻ + τ (θ - θ⁻), or θ⁻ ← θ every target_period updates.
   const bool polyak = config_.target_period == 0;
   norm_sum_ += online_.Step({batch.obs.data(), B_, D_}, learning_rate(), config_.max_gradient_norm,
                             theta_target_, polyak ? config_.tau : 0.0, pool_);
@@ -88,7 +88,7 @@ void Dqn::BackwardRows(const Minibatch& batch, RowRange rows) {
   const Matrix<float> q(q_, B_, A), q_target(q_target_, B_, A), dq(dq_, B_, A);
   const Matrix<float> q_select(config_.double_q || config_.mirror ? q_select_ : q_target_, B_, A);
 
-  // y = r + γⁿ Q(s', a*; θ⁻). θ selects a* in Double DQN, θ⁻ otherwise.
+  // y = r + γⁿ Q(s', a*; θ⁻), with a* by θ in Double DQN, else by θ⁻. `mirror` evaluates at σs'.
   online_.Forward(config_.double_q ? online_.theta() : theta_target_, s_next, rows, q_select);
   if (config_.mirror) {
     ForwardMirrored(s_next, rows, q_target);

@@ -12,8 +12,9 @@
 
 /// Deep Q-Network (Mnih et al., 2015) and its extensions, each a flag.
 ///
-/// Symbols: s observation, a action, r reward, γ discount, θ online parameters, θ⁻ target
-/// parameters, y target, B batch size, A number of actions, D observation size, N environments.
+/// Symbols: s observation, a action (index of a torque), r scaled reward, γ discount, θ online
+/// parameters, θ⁻ target parameters, y TD target, w importance weight, B batch size, A number of
+/// actions (but in replay.h A = 1, the index), D observation size, N environments.
 namespace upswing {
 
 /// TD targets y (B) = r + discount · evaluate(s', a*) with a* = argmax_a select(s', a); the
@@ -35,7 +36,7 @@ class Dqn : public OffPolicyAgent {
   /// the task has no mirror symmetry.
   Dqn(const DqnConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool);
 
-  void Act(Matrix<const float> obs, Matrix<double> action) override;
+  void Act(Matrix<const float> obs, Matrix<double> action) override;  // (N × D), (N × 1) N·m
   void Observe(const StepResult& result) override;
   void Learn() override;
   /// Makes one gradient step on the given minibatch and adds it to the metrics.
@@ -43,7 +44,7 @@ class Dqn : public OffPolicyAgent {
 
   std::span<const float> online() const { return online_.theta(); }
   std::span<const float> target() const { return theta_target_; }
-  double epsilon() const;
+  double epsilon() const;  // ε, probability of a random action
 
   Metrics TakeMetrics() override;
   std::unique_ptr<NetworkPolicy> ExportPolicy(PolicyInfo info) const override;
@@ -74,7 +75,7 @@ class Dqn : public OffPolicyAgent {
   AlignedVector<float> mirrored_;                      // (B × D) σs'
   AlignedVector<float> y_, q_taken_;                   // (B) targets, Q(s, a)
   Network::Activations act_activations_;
-  AlignedVector<float> act_q_;  // (N × A) Q-values of the last Act
+  AlignedVector<float> act_q_;  // (N × A) Q-values of the last Act; dueling: advantages
 };
 
 }  // namespace upswing

@@ -1,4 +1,4 @@
-// Replay memory (Lin, 1992). Letters: B batch size, D observation size, A numbers of an action.
+// Replay memory (Lin, 1992). Symbols: see rl/replay.h.
 #include "rl/replay.h"
 
 #include <algorithm>

@@ -13,16 +13,16 @@
 #include "rl/action_space.h"
 #include "rl/sum_tree.h"
 
-/// Replay memory (Lin, 1992). Letters: B batch size, D observation size, A numbers of an action.
+/// Replay memory (Lin, 1992). B batch size, D observation size, A components of an action (DQN: 1).
 namespace upswing {
 
-/// A transition (s, a, r, s'), over one or more steps. Its target is y = r + discount · V(s').
+/// A transition (s, a, r, s') over n ≥ 1 steps. Its TD target is y = r + discount · V(s').
 struct Transition {
   std::span<const float> obs;       // (D) s
   std::span<const float> next_obs;  // (D) s'
   std::span<const float> action;    // (A) a; of a discrete agent its index
-  double reward = 0;                // r, or Σ γᵏ r over n steps
-  double discount = 0;              // γ, or γⁿ over n steps; 0 if s' is terminal
+  double reward = 0;                // Σ γᵏ rₖ over k = 0 … n - 1
+  double discount = 0;              // γⁿ; 0 if s' is terminal
 };
 
 /// A minibatch: row i of each array belongs to one transition.
@@ -37,8 +37,8 @@ struct Minibatch {
   int size() const { return static_cast<int>(reward.size()); }  // B
 };
 
-/// The newest `capacity` transitions, each in a row, so that sampling it touches one place in
-/// memory.
+/// The newest `capacity` transitions. Each is one contiguous row of numbers, so that a draw touches
+/// one place in memory.
 class Replay {
  public:
   Replay(int64_t capacity, int obs_size, ActionSpace actions, bool prioritized = false);
@@ -54,8 +54,8 @@ class Replay {
   void Sample(Rng& rng, Minibatch& batch) const;
 
   // Prioritised replay (Schaul et al., 2016), in prioritized_replay.cc.
-  /// Draws transition i with P(i) = p_i / Σ p, one from each of B equal parts of the sum. Its
-  /// weight is (N · P(i))^-β with N = size(), over the largest such weight in the minibatch
+  /// Draws transition i with P(i) = p_i / Σ p, one from each of B equal parts of Σ p. Its weight is
+  /// w_i / max w, where w_i = (N · P(i))^-β, N = size(), and the maximum is over the minibatch
   /// (Section 3.4).
   void SamplePrioritized(Rng& rng, double beta, ThreadPool& pool, Minibatch& batch) const;
   /// Sets the priorities of the minibatch's transitions to p = (|TD error| + 1e-6)^α (Section 3.3).

@@ -26,7 +26,7 @@ bool Trainer::Step() {
 
   // Make one step of all environments, then the updates that are due.
   const Matrix<double> action(action_, env_.num_envs(), env_.spec().action_size());
-  env_.SetStartNoise(config_.StartNoise(s.steps));
+  env_.SetStartNoise(config_.StartNoise(s.steps));  // the curriculum
   agent_.Act(env_.obs(), action);
   env_.Step(action, result_);
   agent_.Observe(result_);

@@ -30,7 +30,7 @@ class Trainer {
   bool Step();
 
   bool finished() const { return state_.Finished(config_); }
-  /// Whether something that is due at each multiple of `every` steps is due after the last Step.
+  /// Whether the last Step reached or passed a multiple of `every` steps.
   bool IsDue(int64_t every) const { return upswing::IsDue(before_, state_.steps, every); }
 
   const TrainState& state() const { return state_; }
@@ -52,7 +52,7 @@ class Trainer {
   Evaluator& evaluator_;
   TrainState state_;
   StepResult result_;
-  std::vector<double> action_;  // (N × A)
+  std::vector<double> action_;  // (N × A), A components of an action
   int64_t before_ = 0;          // steps before the last Step
 };
 
