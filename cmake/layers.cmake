@@ -6,9 +6,12 @@ function(upswing_unity)
   set_target_properties(${ARGN} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 12)
 endfunction()
 
-# Compiles tests in half the time. Their slow code is in the libraries.
-function(upswing_quickly name)
-  target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
+# Compiles targets in two thirds of the time: tests, commands and layers whose slow code is in other
+# layers.
+function(upswing_quickly)
+  foreach(NAME IN LISTS ARGN)
+    target_compile_options(${NAME} PRIVATE $<$<CONFIG:Release>:-O1>)
+  endforeach()
 endfunction()
 
 # One library for each layer, a folder, with the tests next to its files.
