@@ -298,6 +298,8 @@ class LauncherTest(ProgramTest):
         self.assert_one_line(self.launch("--nosetup", "info"), 2, "unknown flag --nosetup",
                              "expected --no-setup or a command")
         self.assertEqual(self.launch("--no-setup", "info", "x").stdout, "ran: info x\n")
+        self.assert_one_line(self.launch("--no-setup", "run", "lqr"), 1, "upswing-machine is not built",
+                             "./upswing run --help once without --no-setup")
 
     def test_its_help_lists_the_commands_of_the_program(self):
         def commands(text, title):
@@ -332,7 +334,7 @@ class LauncherTest(ProgramTest):
         (self.folder / "build/release/bin/upswing").unlink()
         done = self.launch("info", "x", **nobody)
         self.assertEqual(done.returncode, 1)
-        self.assertIn("the program is not built", done.stderr)
+        self.assertIn("the program upswing is not built", done.stderr)
         (self.folder / "build/release/bin/base_test").write_text("")
         (self.folder / "build/release/bin/base_test").chmod(0o755)
         done = self.launch("test", **nobody)
