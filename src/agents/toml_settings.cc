@@ -143,6 +143,7 @@ std::vector<FlagValue> ApplyTable(const Options& options, const toml::table& tab
     const std::string key(name.str());
     const auto* section = node.as_table();
     if (flat && section == nullptr) {
+      if (IsRemoved("task", key, node, where)) continue;  // the only such setting of old studies
       settings.push_back(ApplyNode(options, "", key, node, where));
       continue;
     }

@@ -148,9 +148,28 @@ std::string FullName(const CLI::App& app) {
   return is_nested ? Concat(FullName(*parent), " ", app.get_name()) : app.get_name();
 }
 
+/// A flag of version 0.5.0, and what a message says about its replacement.
+struct RemovedFlag {
+  std::string_view command, flag, instead;
+};
+constexpr std::string_view kNoSlurm =
+    "; queue workers with sbatch and examples/slurm.sh, after `study FILE.toml --prepare`";
+constexpr RemovedFlag kRemovedFlags[] = {
+    {"study", "--slurm", kNoSlurm},
+    {"study", "--tasks", kNoSlurm},
+    {"study", "--print", kNoSlurm},
+    {"export", "--test-vectors", "; the tensors sample.* of a policy file are test vectors"},
+    {"train", "--task",
+     "; the task is the double pendulum, and upswing.train(env=...) in Python has others"}};
+
 /// Suggests a similar flag for an unknown one, explains why this command lacks it, or names a
 /// declared command that has it.
 std::string ExplainFlag(const CLI::App& app, const std::string& word) {
+  for (const RemovedFlag& removed : kRemovedFlags) {
+    if (app.get_name() == removed.command && word == removed.flag) {
+      return std::string(removed.instead);
+    }
+  }
   if (const auto* help = dynamic_cast<const HelpFormatter*>(app.get_formatter().get())) {
     help->HideFlags();
   }

@@ -69,6 +69,9 @@ class ResumeTest(ProgramTest):
         for command in (["info", "run"], ["train", "--config", config, "--out", "x"]):
             self.refuse(command, "task: expected double-pendulum or gymnasium, got pendulum-v1; train "
                         'on Gymnasium\'s Pendulum-v1 in Python: upswing.train(env="Pendulum-v1")')
+        study = 'seeds = 1\n[settings]\nsteps = 1000\ntask = "pendulum-v1"\n[variants.a]\n'
+        (self.folder / "old.toml").write_text(study)
+        self.refuse(["study", "old.toml"], "old.toml:4: task: expected double-pendulum", "Pendulum-v1")
         for agent, instead in (("sac-pendulum-v1", 'upswing.train(env="Pendulum-v1")'),
                                ("ppo-discrete", "use the agent ppo with --actions levels")):
             self.refuse(["train", "--agent", agent], "--agent: expected an agent", instead)
