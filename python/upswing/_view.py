@@ -11,6 +11,7 @@ import queue
 import sys
 import threading
 import time
+import warnings
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
@@ -26,6 +27,12 @@ except ImportError as missing:
     sys.exit(f"upswing: view: {missing}: expected Python 3.11 or newer with the packages {PACKAGES}; "
              f"make one by: python3 -m venv view && view/bin/pip install {PACKAGES} && "
              "export UPSWING_PYTHON=$PWD/view/bin/python")
+except Exception as broken:  # pylint: disable=broad-exception-caught  # many kinds
+    PROBLEM = (f"cannot draw with MUJOCO_GL={os.environ['MUJOCO_GL']}: {broken}: expected its libraries; "
+               "egl needs Debian's packages libegl1 and libgl1-mesa-dri")
+    if __name__ != "__main__":
+        raise ImportError(PROBLEM) from broken
+    sys.exit(f"upswing: view: {PROBLEM}")
 
 PERIOD = 0.02  # s, control step
 TRAIL = 60  # control steps that the path of the tip shows
@@ -82,7 +89,7 @@ class Scene:
             mass="0" material="metal"/>
       <body pos="0 0 {-l1}">
         <joint type="hinge" axis="0 1 0"/>
-        <geom type="capsule" size="{radius}" fromto="0 0 0 0 0 {-l2}" mass="{plant["mass2"]}"
+        <geom type="capsule" size="{0.97 * radius}" fromto="0 0 0 0 0 {-l2}" mass="{plant["mass2"]}"
               material="link2"/>
         <geom type="cylinder" size="{0.55 * radius}" fromto="0 {-1.12 * radius} 0 0 {1.12 * radius} 0"
               mass="0" material="metal"/>
@@ -92,7 +99,7 @@ class Scene:
         return f"""<mujoco>
   <visual>
     <headlight ambient="0.38 0.38 0.38" diffuse="0.25 0.25 0.25" specular="0.05 0.05 0.05"/>
-    <quality offsamples="4"/>
+    <quality offsamples="4" numslices="16" numstacks="8"/>
     <map znear="0.02" zfar="60" force="0.08"/>
     <rgba haze="0.86 0.90 0.94 1" force="0.85 0.20 0.55 1"/>
     <scale forcewidth="0.04"/>
@@ -161,7 +168,9 @@ class Scene:
             self._add_goal(scene, i)
             self._add_torque(scene, i)
             if self.labels[i]:
-                at = np.array((self.places[i] - 0.4 * self.reach, 0, -1.14 * self.reach))
+                # In a crowd, labels stand in two rows and begin further left.
+                left, down = (1.15, 1.14 + 0.35 * (i % 2)) if len(self.plants) > 4 else (0.4, 1.14)
+                at = np.array((self.places[i] - left * self.reach, 0, -down * self.reach))
                 geom = _new_geom(scene, mujoco.mjtGeom.mjGEOM_LABEL, at, (0.1, 0.1, 0.1, 1))
                 geom.label = self.labels[i]
 
@@ -232,6 +241,13 @@ def _new_geom(scene: mujoco.MjvScene, kind: int, at: Any, color: tuple[float, ..
     return geom
 
 
+def _cannot_draw(error: Exception) -> CannotDraw:
+    text = str(error).partition("\n")[0]
+    return CannotDraw(
+        f"cannot draw without a display: {text}: expected EGL (Debian's packages libegl1 and "
+        f"libgl1-mesa-dri) and the Python packages {PACKAGES}")
+
+
 class Canvas:
     """Pictures without a window, of any scenes. `close` frees it."""
 
@@ -246,20 +262,20 @@ class Canvas:
             else:
                 self._graphics = mujoco.GLContext(width, height)
         except Exception as error:  # pylint: disable=broad-exception-caught  # many kinds
-            text = str(error).partition("\n")[0]
-            raise CannotDraw(
-                f"cannot draw without a display: {text}: expected EGL (Debian's packages libegl1 and "
-                f"libgl1-mesa-dri) and the Python packages {PACKAGES}") from error
+            raise _cannot_draw(error) from error
 
     def draw(self, scene: Scene) -> Any:
         """Pixels (height, width, 3) in red, green, blue."""
         self._graphics.make_current()
         if self._scene is None:
-            self._scene = mujoco.MjvScene(scene.model, 2000)
             scene.model.vis.global_.offwidth = self._rect.width
             scene.model.vis.global_.offheight = self._rect.height
-            self._context = mujoco.MjrContext(scene.model, mujoco.mjtFontScale.mjFONTSCALE_100)
+            try:
+                self._context = mujoco.MjrContext(scene.model, mujoco.mjtFontScale.mjFONTSCALE_100)
+            except mujoco.FatalError as error:
+                raise _cannot_draw(error) from error
             mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
+            self._scene = mujoco.MjvScene(scene.model, 2000)
         mujoco.mjv_defaultFreeCamera(scene.model, self._camera)
         mujoco.mjv_updateScene(scene.model, scene.data, self._option, None, self._camera,
                                mujoco.mjtCatBit.mjCAT_ALL, self._scene)
@@ -330,7 +346,8 @@ def _check_display() -> None:
         raise CannotDraw(f"cannot open a window: {error}: expected the Python packages {PACKAGES}"
                          ) from error
     if not os.environ.get("DISPLAY") and not os.environ.get("WAYLAND_DISPLAY"):
-        raise CannotDraw("cannot open a window: DISPLAY and WAYLAND_DISPLAY are not set")
+        raise CannotDraw("cannot open a window: DISPLAY and WAYLAND_DISPLAY are not set: "
+                         "expected a display; recordings and rgb_array need none")
     problems: list[str] = []
 
     def note(_: int, text: Any) -> None:
@@ -483,6 +500,7 @@ def _run(job: dict[str, Any], episodes: Episodes, viewer: Viewer) -> None:
 
 def main() -> None:
     job = json.loads(sys.argv[1])
+    warnings.simplefilter("ignore")  # of GLFW, before an error that says the same
     try:
         record(job) if "path" in job else show(job)  # pylint: disable=expression-not-assigned
     except ImportError as error:

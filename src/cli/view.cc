@@ -183,6 +183,24 @@ void DescribeRecording(const ViewArguments& a, const fs::path& path, nlohmann::j
   job["frames"] = single ? 1 : static_cast<int64_t>(seconds * fps / a.speed + 1e-9) + 1;
 }
 
+/// Shows how many pictures are drawn.
+class PictureProgress {
+ public:
+  explicit PictureProgress(const nlohmann::json& job)
+      : pictures_(job["frames"]), stride_(job["stride"]) {}
+
+  /// `request`: see Show::Answer. A GIF goes through its pictures twice.
+  void operator()(const std::string& request) {
+    const double steps = ParseNumber(Split(request, ' ').front()).value_or(0);
+    if (steps <= 0) line_.emplace(false, "pictures");
+    if (pictures_ > 1 && steps > 0 && line_) (*line_)(steps / stride_, pictures_);
+  }
+
+ private:
+  double pictures_, stride_;
+  std::optional<EpisodeProgress> line_;
+};
+
 int RunView(const ViewArguments& a) {
   nlohmann::json job;
   SetSize(a.size, job);
@@ -201,10 +219,19 @@ int RunView(const ViewArguments& a) {
 
   InstallSignalHandlers("");
   Drawer drawer(job.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
-  while (const auto request = drawer.Next()) drawer.Answer(show.Answer(*request));
+  std::optional<PictureProgress> progress;
+  if (making) progress.emplace(job);
+  while (const auto request = drawer.Next()) {
+    drawer.Answer(show.Answer(*request));
+    if (progress) (*progress)(*request);
+  }
+  progress.reset();
   const int code = drawer.Finish();
   if (StopSignal() != 0) return 128 + StopSignal();
   if (code != 0 || !making) return code;
+  if (fs::is_empty(making->path())) {
+    throw Failure("view: Python drew nothing: expected UPSWING_PYTHON to name a Python");
+  }
   making->Publish();
   fmt::print("{}: {} of {}x{}\n", Printable(a.record),
              Counted(job["frames"].get<int64_t>(), "picture"), job["width"].get<int>(),
@@ -236,7 +263,7 @@ void AddView(CommandLine& line) {
   ViewArguments& a = line.Runs(RunView);
   AddControllers(line, a.controller);
   line.Texts(
-      "policies", a.names, "POLICY|RUN...",
+      "policies", a.names, "POLICY|RUN",
       Concat("policies, shown side by side: policy.safetensors, run folders or controllers (",
              Join(ControllerNames(), ", "), "); none: the motor is off"));
   AddPicture(line, a);

@@ -159,7 +159,10 @@ class Recordings(ViewTest):
                 ([], {}, "cannot open a window: DISPLAY"),
                 ([], {"DISPLAY": ":987"}, "cannot open a window", "libgl1"),
                 (["--record", "x.png"], {"__EGL_VENDOR_LIBRARY_FILENAMES": "/none"},
-                 "cannot draw without a display", "libegl1")):
+                 "cannot draw without a display", "libegl1"),
+                (["--record", "x.png"], {"MUJOCO_GL": "glfw"}, "cannot draw without a display"),
+                (["--record", "x.png"], {"MUJOCO_GL": "other"}, "MUJOCO_GL=other"),
+                (["--record", "x.png"], {"UPSWING_PYTHON": "true"}, "Python drew nothing")):
             self.refuse(["view", *arguments], *words, code=1, env=environment | more)
 
 
