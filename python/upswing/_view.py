@@ -303,6 +303,7 @@ class Viewer:
         self.scene = scene
         self.keys: queue.SimpleQueue[int] = queue.SimpleQueue()
         self._next = time.monotonic()  # s, see wait
+        self._words: list[str] = []  # see say
         others = threading.enumerate()
         self._handle = viewer.launch_passive(scene.model, scene.data, key_callback=self.keys.put,
                                              show_left_ui=False, show_right_ui=False)
@@ -325,6 +326,14 @@ class Viewer:
             scene.ngeom = 0
             self.scene.mark(scene)
         self._handle.sync()
+
+    def say(self, words: list[str]) -> None:
+        """Shows words in the upper left corner."""
+        if words == self._words:
+            return
+        self._words = words
+        text = (mujoco.mjtFontScale.mjFONTSCALE_100, mujoco.mjtGridPos.mjGRID_TOPLEFT, "   ".join(words), "")
+        self._handle.set_texts([text] if words else [])
 
     def wait(self, seconds: float) -> None:
         """Waits until this long after the last call's wait."""
@@ -403,11 +412,11 @@ class Episodes:
         table = np.reshape(numbers, (len(self.names), 5))
         self.scene.show(table[:, :4], table[:, 4].tolist(), self.steps)
 
-    def label(self, more: str = "") -> None:
+    def label(self) -> None:
         """Labels each pendulum with name, time and torque."""
         for i, (name, torque) in enumerate(zip(self.names, self.scene.torques)):
             time_shown = round(self.steps * PERIOD, 6)
-            self.scene.labels[i] = f"{name}   {time_shown:.2f} s   {torque:+.2f} N m{more}"
+            self.scene.labels[i] = f"{name}   {time_shown:.2f} s   {torque:+.2f} N m"
 
 
 def record(job: dict[str, Any]) -> None:
@@ -493,7 +502,8 @@ def _run(job: dict[str, Any], episodes: Episodes, viewer: Viewer) -> None:
             elif key == RIGHT:
                 paused, steps = True, np.floor(steps) + 1
         episodes.go(steps, viewer.pulls())
-        episodes.label((f"   speed {speed:g}" if speed != 1 else "") + ("   paused" if paused else ""))
+        episodes.label()
+        viewer.say([f"speed {speed:g}"] * (speed != 1) + ["paused"] * paused)
         viewer.draw()
         viewer.wait(1 / 60)
 
