@@ -12,7 +12,7 @@
 #include "agents/config.h"
 #include "base/options.h"
 
-namespace CLI {
+namespace CLI {  // NOLINT(readability-identifier-naming)
 class App;
 }
 
