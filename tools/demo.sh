@@ -12,7 +12,8 @@ demo() {
   for word; do
     case $word in -h | --help) help=yes ;; esac
   done
-  set_up release upswing upswing-deploy
+  # shellcheck disable=SC2046  # a list of words
+  set_up release upswing $(extra_programs demo)
   [ -x "$program" ] || fail "the program is not built: run ./upswing demo once without --no-setup"
   if [ -z "${UPSWING_PAGE:-}" ]; then
     [ "$setup" = no ] || [ "$help" = yes ] || build_demo
