@@ -118,6 +118,7 @@ void AddExport(CommandLine& line) {
   line.Texts("policies", a.policies, "POLICY|RUN",
              "policies: policy.safetensors or run folders; for --c also lqr, energy, pfl or tvlqr");
   AddControllers(line, a.controller);
+  line.Removed("--test-vectors", "the tensors sample.* of a policy file are test vectors");
   line.Text(
       "--onnx", a.onnx, "FILE",
       "ONNX file to write, which maps observations to torques and values; -: standard output");

@@ -148,28 +148,9 @@ std::string FullName(const CLI::App& app) {
   return is_nested ? Concat(FullName(*parent), " ", app.get_name()) : app.get_name();
 }
 
-/// A flag of version 0.5.0, and what a message says about its replacement.
-struct RemovedFlag {
-  std::string_view command, flag, instead;
-};
-constexpr std::string_view kNoSlurm =
-    "; queue workers with sbatch and examples/slurm.sh, after `study FILE.toml --prepare`";
-constexpr RemovedFlag kRemovedFlags[] = {
-    {"study", "--slurm", kNoSlurm},
-    {"study", "--tasks", kNoSlurm},
-    {"study", "--print", kNoSlurm},
-    {"export", "--test-vectors", "; the tensors sample.* of a policy file are test vectors"},
-    {"train", "--task",
-     "; the task is the double pendulum, and upswing.train(env=...) in Python has others"}};
-
 /// Suggests a similar flag for an unknown one, explains why this command lacks it, or names a
 /// declared command that has it.
 std::string ExplainFlag(const CLI::App& app, const std::string& word) {
-  for (const RemovedFlag& removed : kRemovedFlags) {
-    if (app.get_name() == removed.command && word == removed.flag) {
-      return std::string(removed.instead);
-    }
-  }
   if (const auto* help = dynamic_cast<const HelpFormatter*>(app.get_formatter().get())) {
     help->HideFlags();
   }
@@ -263,10 +244,10 @@ CLI::Option* AddText(CLI::App& app, std::string_view name, Target& target, std::
   return option;
 }
 
-/// Whether --help lists a command: packages leave out some programs, and have no launcher.
-bool IsAvailable(const CommandEntry& entry) {
-  return !IsInstalled() || (!entry.program.empty() &&
-                            std::filesystem::exists(ProgramPath().replace_filename(entry.program)));
+/// Whether packages have a command: they leave out some programs, and the launcher.
+bool IsInPackages(const CommandEntry& entry) {
+  return !entry.program.empty() &&
+         std::filesystem::exists(ProgramPath().replace_filename(entry.program));
 }
 
 }  // namespace
@@ -317,6 +298,16 @@ void CommandLine::Require(std::string_view name) { app_.get_option(std::string(n
 
 void CommandLine::Flag(std::string_view name, bool& target, std::string_view help) {
   app_.add_flag(std::string(name), target, std::string(help))->disable_flag_override();
+}
+
+void CommandLine::Removed(std::string_view name, std::string_view instead) {
+  const std::string message = Concat("unknown flag ", name, "; ", instead);
+  app_.add_option_function<std::vector<std::string>>(
+          std::string(name),
+          [message](const std::vector<std::string>&) { throw BadInput(message); },
+          std::string(instead))
+      ->expected(0, 1)
+      ->group("");
 }
 
 void CommandLine::Arguments(const Options& options) {
@@ -393,9 +384,10 @@ int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> 
   formatter->column_width(kCommandColumns);
   program.formatter(formatter);
   program.footer(footer);
+  const bool installed = IsInstalled();
   for (const CommandEntry& entry : table) {
-    if (IsAvailable(entry))
-      program.add_subcommand(std::string(entry.name), std::string(entry.help));
+    if (installed && !IsInPackages(entry)) continue;
+    program.add_subcommand(std::string(entry.name), std::string(entry.help));
   }
   // Only the called command has arguments.
   const std::string_view called = CalledCommand(argc, argv);

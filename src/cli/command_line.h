@@ -49,6 +49,9 @@ class CommandLine {
   /// Adds a flag without a value.
   void Flag(std::string_view name, bool& target, std::string_view help);
 
+  /// Refuses a flag that an earlier version had. `instead` tells its replacement.
+  void Removed(std::string_view name, std::string_view instead);
+
   /// Adds a flag for each of the command's own numbers and choices. Parsing the flag sets the value
   /// immediately; see Option::Set.
   void Arguments(const Options& options);

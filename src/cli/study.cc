@@ -157,6 +157,10 @@ void AddStudy(CommandLine& line) {
       "--status", arguments.status,
       "print how many runs are done, running and lost, and exit; also takes the study's folder");
   line.Flag("--prepare", arguments.prepare, "prepare the folder for workers, and exit");
+  for (const char* flag : {"--slurm", "--tasks", "--print"}) {
+    line.Removed(
+        flag, "queue workers with sbatch and examples/slurm.sh, after `study FILE.toml --prepare`");
+  }
   line.Text("--work", arguments.work, "FOLDER",
             "work on the study in this folder, on any host that shares it: claim and train runs "
             "until none is left");

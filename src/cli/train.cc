@@ -125,6 +125,8 @@ void AddTrain(CommandLine& line) {
   line.Text("--out", arguments.out, "FOLDER",
             "new run folder (default runs/AGENT-seedSEED); with --seeds the folder of all runs "
             "(default runs/AGENT)");
+  line.Removed("--task",
+               "the task is the double pendulum, and upswing.train(env=...) in Python has others");
   line.Text("--config", arguments.config, "FILE",
             "TOML file of settings; -: standard input; flags override the file");
   AddPlant(line, arguments.plant);
