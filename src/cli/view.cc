@@ -128,29 +128,32 @@ class Show {
     for (const std::string_view word : Split(request, ' ')) {
       numbers.push_back(ParseNumber(word).value_or(0));
     }
-    double steps = numbers.front();
+    steps_ = numbers.front();
     numbers.resize(1 + 2 * episodes_.size());
-    if (steps <= 0) Restart();
+    if (steps_ <= 0) Restart();
     try {
       for (size_t i = 0; i < episodes_.size(); ++i) {
-        Advance(episodes_[i], steps, {numbers[1 + 2 * i], numbers[2 + 2 * i]});
+        Advance(episodes_[i], steps_, {numbers[1 + 2 * i], numbers[2 + 2 * i]});
       }
     } catch (const Error& error) {
       if (recording_) throw;
       SayError(OneLine(error.what()));
       Restart();
-      steps = 0;
+      steps_ = 0;
       for (Episode& episode : episodes_) Advance(episode, 0, {});
     }
-    std::string answer = FormatNumber(steps);
+    std::string answer = FormatNumber(steps_);
     for (const Episode& episode : episodes_) {
-      const PendulumState s = episode.StateAt(steps);
-      for (const double number : {s.q1, s.q2, s.w1, s.w2, episode.TorqueAt(steps)}) {
+      const PendulumState s = episode.StateAt(steps_);
+      for (const double number : {s.q1, s.q2, s.w1, s.w2, episode.TorqueAt(steps_)}) {
         answer += ' ' + FormatNumber(number);
       }
     }
     return answer;
   }
+
+  /// The time of the last answer [control steps].
+  double steps() const { return steps_; }
 
  private:
   void Restart() {
@@ -164,6 +167,7 @@ class Show {
   }
 
   std::vector<Episode> episodes_;
+  double steps_ = 0;
   bool recording_;
 };
 
@@ -189,9 +193,8 @@ class PictureProgress {
   explicit PictureProgress(const nlohmann::json& job)
       : pictures_(job["frames"]), stride_(job["stride"]) {}
 
-  /// `request`: see Show::Answer. A GIF goes through its pictures twice.
-  void operator()(const std::string& request) {
-    const double steps = ParseNumber(Split(request, ' ').front()).value_or(0);
+  /// `steps`: see Show. A GIF goes through its pictures twice.
+  void operator()(double steps) {
     if (steps <= 0) line_.emplace(false, "pictures");
     if (pictures_ > 1 && steps > 0 && line_) (*line_)(steps / stride_, pictures_);
   }
@@ -223,7 +226,7 @@ int RunView(const ViewArguments& a) {
   if (making) progress.emplace(job);
   while (const auto request = drawer.Next()) {
     drawer.Answer(show.Answer(*request));
-    if (progress) (*progress)(*request);
+    if (progress) (*progress)(show.steps());
   }
   progress.reset();
   const int code = drawer.Finish();
