@@ -218,7 +218,7 @@ class WindowTest(ViewTest):
         self.addCleanup(server.terminate)
         with os.fdopen(reading, encoding="ascii") as answer:
             self.environment = self.script(
-                f'#!/bin/sh\ntee answers | "{PYTHON}" "$@" | tee requests\n')
+                f'#!/bin/sh\ntee answers 2>/dev/null | "{PYTHON}" "$@" | tee requests\n')
             self.environment["DISPLAY"] = f":{answer.readline().strip()}"
 
     def xdotool(self, *words):
@@ -227,11 +227,8 @@ class WindowTest(ViewTest):
                               encoding="utf-8").stdout.split()
 
     def until(self, condition):
-        deadline = time.monotonic() + PATIENCE
-        while not condition():
-            self.assertIsNone(self.process.poll(), "the program has ended")
-            self.assertLess(time.monotonic(), deadline, self.last("requests"))
-            time.sleep(0.05)
+        self.wait_for(lambda: self.process.poll() is not None or condition())
+        self.assertIsNone(self.process.poll(), "the program has ended")
 
     def last(self, name):
         """Numbers of the last whole line of a file."""
