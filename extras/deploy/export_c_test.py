@@ -357,7 +357,7 @@ class HeaderTest(ProgramTest):
                 for (i = 0; i < tables[t].count; i++) {
                   float *x = tables[t].numbers + i;
                   const float right = *x;
-                  *x = right + (tables[t].sample ? 0.03f : 0.01f) * fmaxf(1.0f, fabsf(right));
+                  *x = right + (tables[t].sample ? 0.1f : 0.01f) * fmaxf(1.0f, fabsf(right));
                   if (policy_selftest() != POLICY_DAMAGED) printf("%s[%d]\n", tables[t].name, i);
                   *x = nextafterf(right, 9.0f);
                   if (!tables[t].sample && policy_selftest() != POLICY_DAMAGED)

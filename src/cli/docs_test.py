@@ -31,6 +31,24 @@ def text_of(name):
     return (ROOT / name).read_text(encoding="utf-8")
 
 
+def tested_blocks(markdown):
+    """The commands of each block marked as a test, and the output that the page shows below them: a
+    block of text or a generated one, or None."""
+    return [(commands, text or generated and re.sub(r"(?m)^    ", "", generated))
+            for commands, text, generated in re.findall(
+                r"^```sh test\n(.*?)^```\n(?:\n```text\n(.*?)^```|\n<!-- generated: .*? -->\n\n(.*?)\n<!-- end)?",
+                markdown, re.MULTILINE | re.DOTALL)]
+
+
+def pattern_of(shown):
+    """Matches an output of which a page shows some lines. "…" stands for part of a line, or in a
+    line of its own for any lines."""
+    lines = [r"(?:.*\n)*?" if line.strip() == "…" else
+             " *" + "[^\n]*".join(map(re.escape, line.strip().split("…"))) + r" *\n"
+             for line in shown.splitlines()]
+    return re.compile("^" + "".join(lines), re.MULTILINE)
+
+
 def first_column(markdown):
     """The text in backticks at the beginning of each table row."""
     return re.findall(r"^\| `([^`]+)`", markdown, re.MULTILINE)
@@ -231,8 +249,7 @@ class Documents(ProgramTest):
         launcher.write_text(f'#!/bin/sh\nexec "{UPSWING}" "$@"\n', encoding="utf-8")
         launcher.chmod(0o755)
         for path in PAGES:
-            blocks = re.findall(r"^```sh test\n(.*?)^```", path.read_text(encoding="utf-8"),
-                                re.MULTILINE | re.DOTALL)
+            blocks = tested_blocks(path.read_text(encoding="utf-8"))
             if not blocks:
                 continue
             # The blocks of a page run in order, in a folder that looks like a fresh checkout.
@@ -242,13 +259,23 @@ class Documents(ProgramTest):
                 if entry.name not in {"upswing", "build", "runs", ".git"}:
                     (here / entry.name).symlink_to(entry)
             (here / "upswing").symlink_to(launcher)
-            for block in blocks:
+            for block, shown in blocks:
                 with self.subTest(page=path.name, block=block):
                     done = subprocess.run(["sh", "-eu"], input=block, cwd=here, check=False,
                                           stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                                           encoding="utf-8")
                     self.assertEqual(done.returncode, 0, done.stdout)
+                    if shown and "UPSWING_FINGERPRINTS" in os.environ:
+                        self.assertRegex(done.stdout, pattern_of(shown))
             shutil.rmtree(here)
+
+    def test_shown_output_is_compared(self):
+        markdown = "```sh test\na\n```\n\n```text\nsolved at … steps\n…\nend 5\n```\n"
+        (commands, shown), = tested_blocks(markdown)
+        self.assertEqual(commands, "a\n")
+        self.assertRegex("solved at 90 steps\nx\ny\n  end 5\n", pattern_of(shown))
+        self.assertNotRegex("solved at 90 steps\nx\ny\n  end 6\n", pattern_of(shown))
+        self.assertNotRegex("solved at 90\nend 5\n", pattern_of(shown))
 
     def test_the_post_is_named_where_it_is_mentioned(self):
         for path in DOCUMENTS:

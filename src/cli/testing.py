@@ -78,7 +78,8 @@ def small(**changes):
 def run(*arguments, cwd=None, stdout=subprocess.PIPE, **more):
     """Runs the program to its end; stdout and stderr are text. Removes from stderr the lines that
     long work writes every ten seconds."""
-    done = subprocess.run([UPSWING, *map(str, arguments)], cwd=cwd, check=False,
+    emulator = os.environ.get("UPSWING_EMULATOR", "").split()
+    done = subprocess.run([*emulator, UPSWING, *map(str, arguments)], cwd=cwd, check=False,
                           stdin=subprocess.DEVNULL, stdout=stdout,
                           stderr=subprocess.PIPE, encoding="utf-8", **more)
     done.stderr = re.sub(r"(?m)^upswing: \d+%  \S+ episodes/s  .+ left\n", "", done.stderr)

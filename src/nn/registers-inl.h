@@ -78,22 +78,62 @@ HWY_INLINE void ForVectors(size_t n, const F& f) {
   if (i < n) f(i, n - i, std::true_type());
 }
 
-/// Σ term(i, count, partial) over all vectors, in four independent sums.
+/// Numbers that are summed side by side. With fused multiply-adds, every target sums in the order
+/// of a register of 16 numbers, so that all of them give the same bits. Without, each target has
+/// other bits anyway, and sums in the order of its own registers.
+constexpr size_t kLanes = HWY_LANES(Real);
+constexpr size_t kSummed = HWY_NATIVE_FMA ? 16 : kLanes;
+constexpr size_t kParts = kSummed / kLanes;  // registers that hold them
+
+/// Sum of the numbers of a register. With fused multiply-adds, its halves are added until one
+/// number remains.
+template <class D>
+HWY_INLINE Real SumOfRegister(D d, hn::Vec<D> x) {
+#if HWY_NATIVE_FMA
+  if constexpr (hn::MaxLanes(d) * sizeof(Real) > 16) {
+    const hn::Half<D> half;
+    return SumOfRegister(half, hn::Add(hn::LowerHalf(half, x), hn::UpperHalf(half, x)));
+  } else if constexpr (sizeof(Real) == 4) {
+    const auto pair = hn::Add(x, hn::Shuffle1032(x));
+    return hn::GetLane(hn::Add(pair, hn::Shuffle2301(pair)));
+  } else {
+    return hn::GetLane(hn::Add(x, hn::Shuffle01(x)));
+  }
+#else
+  return hn::GetLane(hn::SumOfLanes(d, x));
+#endif
+}
+
+/// Σ term(i, count, partial) over all vectors, in four independent sums of kSummed numbers.
 template <typename F>
 HWY_INLINE Real SumVectors(size_t n, const F& term) {
   const Tag d;
-  Vec sum[4] = {hn::Zero(d), hn::Zero(d), hn::Zero(d), hn::Zero(d)};
-  const size_t lanes = hn::Lanes(d);
-  size_t i = 0;
-  for (; i + 4 * lanes <= n; i += 4 * lanes) {
-    for (size_t k = 0; k < 4; ++k) {
-      sum[k] = hn::Add(sum[k], term(i + k * lanes, lanes, std::false_type()));
+  Vec sum[4][kParts];
+  for (auto& parts : sum) std::fill_n(parts, kParts, hn::Zero(d));
+  const auto add = [&](Vec(&parts)[kParts], size_t i) HWY_ATTR {
+    HWY_UNROLL(4)
+    for (size_t p = 0; p < kParts; ++p) {
+      parts[p] = hn::Add(parts[p], term(i + p * kLanes, kLanes, std::false_type()));
     }
+  };
+  size_t i = 0;
+  for (; i + 4 * kSummed <= n; i += 4 * kSummed) {
+    HWY_UNROLL(4)
+    for (size_t k = 0; k < 4; ++k) add(sum[k], i + k * kSummed);
   }
-  for (; i + lanes <= n; i += lanes) sum[0] = hn::Add(sum[0], term(i, lanes, std::false_type()));
-  if (i < n) sum[1] = hn::Add(sum[1], term(i, n - i, std::true_type()));
-  const Vec all = hn::Add(hn::Add(sum[0], sum[1]), hn::Add(sum[2], sum[3]));
-  return hn::GetLane(hn::SumOfLanes(d, all));
+  for (; i + kSummed <= n; i += kSummed) add(sum[0], i);
+  for (size_t p = 0; i < n; ++p, i += kLanes) {
+    sum[1][p] = hn::Add(sum[1][p], i + kLanes <= n ? term(i, kLanes, std::false_type())
+                                                   : term(i, n - i, std::true_type()));
+  }
+  Vec all[kParts];
+  for (size_t p = 0; p < kParts; ++p) {
+    all[p] = hn::Add(hn::Add(sum[0][p], sum[1][p]), hn::Add(sum[2][p], sum[3][p]));
+  }
+  for (size_t half = kParts / 2; half > 0; half /= 2) {
+    for (size_t p = 0; p < half; ++p) all[p] = hn::Add(all[p], all[p + half]);
+  }
+  return SumOfRegister(d, all[0]);
 }
 
 }  // namespace upswing::HWY_NAMESPACE
