@@ -41,6 +41,7 @@ endif()
 set_target_properties(${UPSWING_PROGRAMS} PROPERTIES INSTALL_RPATH "${UPSWING_RPATH}")
 install(TARGETS ${UPSWING_PROGRAMS})
 install(FILES LICENSE README.md CHANGELOG.md CITATION.cff DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(DIRECTORY web/public/agents DESTINATION ${CMAKE_INSTALL_DATADIR}/upswing/page) # shipped policies
 install(DIRECTORY examples DESTINATION ${CMAKE_INSTALL_DATADIR}/upswing PATTERN "*_test.py" EXCLUDE
         PATTERN "__pycache__" EXCLUDE)
 install(PROGRAMS examples/slurm.sh DESTINATION ${CMAKE_INSTALL_DATADIR}/upswing/examples)

@@ -116,7 +116,8 @@ int RunExport(const ExportArguments& a) {
 void AddExport(CommandLine& line) {
   ExportArguments& a = line.Runs(RunExport);
   line.Texts("policies", a.policies, "POLICY|RUN",
-             "policies: policy.safetensors or run folders; for --c also lqr, energy, pfl or tvlqr");
+             "policies: policy.safetensors, run folders or shipped policies; for --c also lqr, "
+             "energy, pfl or tvlqr");
   AddControllers(line, a.controller);
   line.Removed("--test-vectors", "the tensors sample.* of a policy file are test vectors");
   line.Text(
@@ -141,7 +142,7 @@ void AddExport(CommandLine& line) {
   line.Footer(
       "Examples:\n"
       "  ./upswing export runs/d3qn-seed1 --onnx policy.onnx\n"
-      "  ./upswing export runs/fast-seed1 --c policy.h          for a microcontroller\n"
+      "  ./upswing export fast --c policy.h                     a shipped policy as C\n"
       "  ./upswing export tvlqr --c tvlqr.h                     a controller as C\n"
       "  ./upswing export runs/d3qn-seed1 --page web/public/agents    for every visitor\n"
       "  ./upswing export runs/* --page build/web/agents        in the page built here\n"

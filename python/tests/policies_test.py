@@ -113,6 +113,12 @@ class Policies(unittest.TestCase):
         self.assertTrue(info["at_goal"])
         self.assertLess(abs(env.state[0] - np.pi), 1e-3)
 
+    def test_shipped_policy(self):
+        policy, file = upswing.load_policy("sac"), upswing.load_policy(AGENTS / "sac.safetensors")
+        obs = np.ones((3, 8))
+        self.assertEqual(policy.name, "sac")
+        np.testing.assert_array_equal(policy.act(obs), file.act(obs))
+
     def test_threads_share_a_policy(self):
         policy = upswing.load_policy(AGENTS / "d3qn.safetensors")
         obs = np.random.default_rng(0).normal(size=(500, 8))

@@ -138,7 +138,8 @@ def load_policy(
     """Loads a policy.
 
     Args:
-        path: policy file, run folder (for its best policy) or name of a controller, such as "lqr"
+        path: policy file, run folder (for its best policy), shipped policy, such as "sac", or
+            controller, such as "lqr"
         made_for: changes of a controller's design plant, such as {"mass2": 1.2}; or a plant file or
             shipped plant, such as "realaigym"
         **settings: settings of a controller, such as lqr_torque

@@ -123,8 +123,9 @@ int RunBounds(const BoundsArguments& arguments) {
 
 void AddBounds(CommandLine& line) {
   BoundsArguments& a = line.Runs(RunBounds);
-  line.Texts("policy", a.policies, "POLICY|RUN",
-             "policies to compare: policy.safetensors, run folders or controllers");
+  line.Texts(
+      "policy", a.policies, "POLICY|RUN",
+      "policies to compare: policy.safetensors, run folders, shipped policies or controllers");
   ControllerConfig controllers;
   line.Settings(OptionsOf(controllers), a.flags);
   Options own;

@@ -318,10 +318,10 @@ class Documents(ProgramTest):
         self.assertIn('"debian 12 "* | "debian 13 "*', text_of("upswing"))
 
     def test_shipped_policies_can_be_evaluated_as_the_docs_say(self):
-        policy = re.search(r"upswing eval (web/public/agents/\S+)",
-                           text_of("docs/tutorials/exercises.md"))[1]
-        self.assertIn("success", self.succeed("eval", ROOT / policy, "--episodes", 2, "--physics",
-                                              "closed-form"))
+        for page in ("exercises", "your-own-plant"):
+            policy = re.search(r"upswing eval (d3qn\S*)", text_of(f"docs/tutorials/{page}.md"))[1]
+            self.assertIn("success", self.succeed("eval", policy, "--episodes", 2, "--physics",
+                                                  "closed-form"))
 
 
 class Site(ProgramTest):

@@ -15,6 +15,7 @@
 #include "control/lqr_catch.h"
 #include "mujoco/model.h"
 #include "nn/network_policy.h"
+#include "os/command.h"
 #include "os/host.h"
 #include "pendulum/observation.h"
 #include "pendulum/upright_modes.h"
@@ -165,6 +166,9 @@ void PrintProgram() {
   fmt::print("  threads     {} by default\n", ResolveThreads(0));
   fmt::print("  vectors     {} (this processor supports: {})\n", SimdPath(),
              fmt::join(SimdPaths(), ", "));
+  fmt::print("  policies    {} (shipped)\n", fmt::join(ShippedPolicies(), ", "));
+  if (IsInstalled())
+    fmt::print("  examples    {}\n", Printable((SharePath() / "examples").string()));
 }
 
 int RunInfo(const PolicyArguments& a) {

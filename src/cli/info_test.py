@@ -32,6 +32,14 @@ class InfoTest(ProgramTest):
         used, choice = re.search(r"vectors +(\S+) \(this processor supports: (.*)\)", text).groups()
         self.assertEqual(used, choice.split(", ")[0])
 
+    def test_shipped_policy(self):
+        self.assert_says(self.succeed("info"), "policies    d3qn, d3qn-adaptive, ", "sac (shipped)")
+        self.assert_says(self.succeed("info", "sac"), "sac\n", "agent sac", "self-check  passed")
+        self.refuse(["info", "sax"], "a shipped policy or a controller", "did you mean sac?")
+        self.refuse(["compare", "sac"], "expected runs too, whose episodes sac")
+        (self.folder / "sac").mkdir()  # a folder here comes first
+        self.refuse(["info", "sac"], "sac/policy.safetensors: no such file")
+
     def test_plain_network(self):
         self.succeed(*small(agent="dqn", layer_norm=False))
         text = self.succeed("info", "run/policy.safetensors")

@@ -265,10 +265,10 @@ void AddPicture(CommandLine& line, ViewArguments& a) {
 void AddView(CommandLine& line) {
   ViewArguments& a = line.Runs(RunView);
   AddControllers(line, a.controller);
-  line.Texts(
-      "policies", a.names, "POLICY|RUN",
-      Concat("policies, shown side by side: policy.safetensors, run folders or controllers (",
-             Join(ControllerNames(), ", "), "); none: the motor is off"));
+  line.Texts("policies", a.names, "POLICY|RUN",
+             Concat("policies, shown side by side: policy.safetensors, run folders, shipped "
+                    "policies or controllers (",
+                    Join(ControllerNames(), ", "), "); none: the motor is off"));
   AddPicture(line, a);
   AddEpisodeOptions(line, a.trial);
   AddTrialOptions(line, a.trial, "noise, random plants and the start of --episode");

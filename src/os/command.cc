@@ -1,5 +1,6 @@
 #include "os/command.h"
 
+#include <dlfcn.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -106,6 +107,25 @@ std::optional<CommandResult> RunCommand(std::vector<std::string> words, const st
 }
 
 std::filesystem::path ProgramPath() { return std::filesystem::read_symlink("/proc/self/exe"); }
+
+std::filesystem::path PageFile(const std::filesystem::path& name) {
+  // The Python package is a shared library in another program. The program itself may have a
+  // relative path here.
+  Dl_info code{};
+  dladdr(reinterpret_cast<const void*>(&PageFile), &code);
+  std::filesystem::path folder = code.dli_fname != nullptr ? code.dli_fname : "";
+  if (!folder.is_absolute()) folder = ProgramPath();
+  // Up to the source repository, from build/release/python/upswing.
+  constexpr int kMostParents = 5;
+  for (int parent = 0; parent < kMostParents; ++parent) {
+    folder = folder.parent_path();
+    for (const char* page : {"share/upswing/page", "web/public"}) {
+      std::error_code none;
+      if (std::filesystem::exists(folder / page / name, none)) return folder / page / name;
+    }
+  }
+  return {};
+}
 
 std::filesystem::path SharePath() { return ShareOf(ProgramPath()); }
 

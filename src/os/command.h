@@ -27,6 +27,10 @@ std::filesystem::path ProgramPath();
 /// folder. A program in a build folder has none.
 std::filesystem::path SharePath();
 
+/// Path of a file of the page, such as `agents/sac.safetensors`: in the package that contains this
+/// code, or in the source repository; empty if there is none.
+std::filesystem::path PageFile(const std::filesystem::path& name);
+
 /// Whether this program is installed, not in a build folder of the source repository.
 bool IsInstalled();
 

@@ -9,6 +9,7 @@
 #include "base/format.h"
 #include "base/text.h"
 #include "mujoco/model.h"
+#include "os/command.h"
 #include "runs/plant_file.h"
 #include "runs/run_folder.h"
 #include "runs/tensor_file.h"
@@ -80,7 +81,27 @@ void CheckSettings(const PolicyArguments& settings, const std::vector<std::strin
   }
 }
 
+/// What LoadPolicy takes.
+constexpr const char* kKinds = "a policy.safetensors, a run folder, a shipped policy";
+
 }  // namespace
+
+fs::path ShippedPolicy(const fs::path& name) {
+  if (name.empty() || name.has_parent_path() || fs::exists(name)) return {};
+  return PageFile(fs::path("agents") / Concat(name.string(), ".safetensors"));
+}
+
+std::vector<std::string> ShippedPolicies() {
+  std::vector<std::string> names;
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(PageFile("agents"), none)) {
+    const std::string name = entry.path().stem();
+    const bool is_stage = name.find("-at-") != std::string::npos;  // of the page's training
+    if (entry.path().extension() == ".safetensors" && !is_stage) names.push_back(name);
+  }
+  std::ranges::sort(names);
+  return names;
+}
 
 std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
                                       const PolicyArguments& controllers) {
@@ -134,19 +155,15 @@ LoadedPolicy GetPolicy(const PolicyArguments& a) {
             "",
             design_for};
   }
-  if (!is_path) {
-    const std::string shipped = Concat("web/public/agents/", a.name, ".safetensors");
-    const std::string meant = std::filesystem::exists(shipped)
-                                  ? Concat(" (did you mean ", shipped, "?)")
-                                  : DidYouMean(a.name, ControllerNames());
-    throw BadInput(Concat(
-        a.name, ": no such file; expected a policy.safetensors, a run folder or a controller (",
-        Join(ControllerNames(), ", "), ")", meant));
-  }
   return LoadPolicy(a.name);
 }
 
 LoadedPolicy LoadPolicy(const fs::path& path) {
+  if (const fs::path shipped = ShippedPolicy(path); !shipped.empty()) {
+    LoadedPolicy loaded = ReadPolicy(LoadTensors(shipped, kMostPolicyBytes));
+    loaded.name = path.string();
+    return loaded;
+  }
   fs::path file = path;
   if (fs::is_directory(path)) {
     file = path / RunFolder::kPolicy;
@@ -156,10 +173,13 @@ LoadedPolicy LoadPolicy(const fs::path& path) {
     }
   }
   if (!fs::exists(file)) {
-    const bool is_controller = IsController(path.string());
-    throw BadInput(Concat(file.string(),
-                          ": no such file; expected a policy.safetensors or a run folder",
-                          is_controller ? ", not a controller" : ""));
+    std::vector<std::string> names = ShippedPolicies();
+    std::ranges::copy(ControllerNames(), std::back_inserter(names));
+    throw BadInput(IsController(path.string())
+                       ? Concat(path.string(), ": expected ", kKinds, ", got a controller")
+                       : Concat(file.string(), ": no such file; expected ", kKinds,
+                                " or a controller (", Join(names, ", "), ")",
+                                DidYouMean(path.string(), names)));
   }
   return ReadPolicy(LoadTensors(file, kMostPolicyBytes));
 }

@@ -7,12 +7,12 @@
 
 #include "agents/loaded_policy.h"
 
-/// Loading of policies by name: a controller, a policy file or a run folder.
+/// Loading of policies by name: a policy file, a run folder, a shipped policy or a controller.
 namespace upswing {
 
 /// A policy as named on a command line.
 struct PolicyArguments {
-  std::string name;  // name of a controller (agents/controllers.h), a file or a run folder
+  std::string name;  // controller (agents/controllers.h), file, run folder or shipped policy
   std::vector<FlagValue> flags;  // settings of the controller
   // The controller's design plant: changes such as mass2=1.2, and at most one plant file.
   std::vector<std::string> made_for;
@@ -22,9 +22,15 @@ struct PolicyArguments {
   bool empty() const { return name.empty() && !has_settings(); }
 };
 
-/// Makes the controller with this name, or loads the policy from this path. Also throws BadInput if
-/// the name could mean both, or if there are controller settings for a policy that is not a
-/// controller.
+/// The file of a policy that comes with the program, such as `sac`; empty if there is none, or if
+/// a file or folder here has this name.
+std::filesystem::path ShippedPolicy(const std::filesystem::path& name);
+/// Names of the policies that come with the program, sorted.
+std::vector<std::string> ShippedPolicies();
+
+/// Makes the controller with this name, or loads the policy as LoadPolicy does. Also throws
+/// BadInput if the name could mean a controller or a file, or if there are controller settings for
+/// a policy that is not a controller.
 LoadedPolicy GetPolicy(const PolicyArguments& a);
 
 /// Gets policies of the double pendulum by these names, each a PolicyArguments::name. Each
@@ -33,8 +39,8 @@ LoadedPolicy GetPolicy(const PolicyArguments& a);
 std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
                                       const PolicyArguments& controllers);
 
-/// Loads a policy file, or the best policy of a run folder. Throws as PolicyIn does. Also throws
-/// BadInput if its model is invalid.
+/// Loads a policy file, the best policy of a run folder, or a shipped policy. Throws as PolicyIn
+/// does. Also throws BadInput if its model is invalid.
 LoadedPolicy LoadPolicy(const std::filesystem::path& path);
 
 /// Makes the policy of a file that has been read. Throws as LoadPolicy does.

@@ -122,7 +122,7 @@ class Packager:
         shutil.rmtree(self.work, ignore_errors=True)
         output("cmake", "--install", self.target.build, "--strip", "--prefix", self.tree)
         add_libraries(self.target, self.programs(), self.tree / "lib/upswing")
-        shutil.copytree(self.page, self.tree / "share/upswing/page")
+        shutil.copytree(self.page, self.tree / "share/upswing/page", dirs_exist_ok=True)
         documents = self.tree / "share/doc/upswing"
         shutil.copytree(self.docs, documents / "html",
                         ignore=shutil.ignore_patterns(".buildinfo*", "_sources"))
@@ -225,7 +225,7 @@ Description: controllers that swing up and balance a double pendulum
 
     def wheels(self):
         files = self.work / "wheel"
-        for part in ("bin", "share/upswing/page"):
+        for part in ("bin", "share/upswing"):
             shutil.copytree(self.tree / part, files / part)
         shutil.copytree(self.tree / "lib/upswing", files / "lib/upswing",
                         ignore=shutil.ignore_patterns("mujoco"))

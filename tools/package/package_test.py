@@ -115,6 +115,10 @@ class PackageTest(unittest.TestCase):
             self.assertTrue(entry["licenses"])
             self.assertIn(entry["name"] + (f" {entry['version']}" if "version" in entry else ""), notice)
 
+    def test_has_shipped_policies(self):
+        done = call(self.tree / "bin/upswing", "info", "sac", cwd="/")
+        self.assertEqual((done.returncode, done.stdout[:4]), (0, "sac\n"), done.stderr)
+
     def test_command_of_a_wheel(self):
         site = self.folder / "site"
         (site / "upswing").mkdir(parents=True)
