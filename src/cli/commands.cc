@@ -3,15 +3,18 @@
 #include "agents/arguments.h"
 #include "agents/controllers.h"
 #include "base/text.h"
+#include "cli/say.h"
+#include "report/figure.h"
 #include "runs/find_policy.h"
 #include "runs/plant_file.h"
 
 namespace upswing {
 
 void AddPolicy(CommandLine& line, PolicyArguments& a) {
-  line.Text("policy", a.name, "POLICY|RUN",
-            Concat("policy.safetensors, a run folder or a controller (",
-                   Join(ControllerNames(), ", "), ")"));
+  line.Text(
+      "policy", a.name, "POLICY|RUN",
+      Concat("policy.safetensors, a run folder, a shipped policy such as sac, or a controller (",
+             Join(ControllerNames(), ", "), ")"));
   AddControllers(line, a);
 }
 
@@ -87,6 +90,11 @@ void AddEpisodeOptions(CommandLine& line, TrialArguments& a) {
           "index of the episode of `eval` with the same flags")
       .usual = "none";
   line.Arguments(own);
+}
+
+void SayIfNoFigures() {
+  const std::string why = WhyNoFigures();
+  if (!why.empty()) SayError(Concat("tables only, no figures: ", why));
 }
 
 }  // namespace upswing

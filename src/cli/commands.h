@@ -22,7 +22,8 @@ void AddInfo(CommandLine& line);
 void AddCompare(CommandLine& line);
 void AddStudy(CommandLine& line);
 
-/// Adds the policy argument (a file, a run folder or a controller) and the controllers' settings.
+/// Adds the policy argument (a file, a run folder, a shipped policy or a controller) and the
+/// controllers' settings.
 void AddPolicy(CommandLine& line, PolicyArguments& a);
 
 /// Adds the settings of controllers and --made-for.
@@ -52,6 +53,9 @@ void AddUnknownPlant(CommandLine& line, bool& unknown_plant);
 /// Adds --plant, --set, --model, --physics, --seed (of `seed_of`), --unknown-plant, and the
 /// settings of Disturbance and Randomization: the conditions of `eval`, `simulate` and `plot`.
 void AddTrialOptions(CommandLine& line, TrialArguments& a, const std::string& seed_of);
+
+/// Says on standard error why there will be tables only, if figures cannot be drawn.
+void SayIfNoFigures();
 
 /// Adds --start and --episode: the single episode of `simulate`, `plot` and `view`.
 void AddEpisodeOptions(CommandLine& line, TrialArguments& a);

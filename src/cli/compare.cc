@@ -12,7 +12,6 @@
 #include "cli/progress.h"
 #include "os/file.h"
 #include "os/host.h"
-#include "report/figure.h"
 #include "runs/find_policy.h"
 
 namespace upswing {
@@ -29,11 +28,12 @@ struct CompareArguments {
   bool as_json = false;
 };
 
-/// Whether a name is a controller or a policy file; other names are runs or folders of runs.
+/// Whether a name is a controller, a shipped policy or a policy file; other names are runs or
+/// folders of runs.
 bool IsPolicy(const std::string& name) {
   const fs::path path = name;
   std::error_code error;
-  return IsController(name) ||
+  return IsController(name) || !ShippedPolicy(name).empty() ||
          (path.extension() == ".safetensors" && !fs::is_directory(path, error));
 }
 
@@ -65,7 +65,7 @@ int RunCompare(const CompareArguments& arguments) {
   CheckPolicies(arguments, policy_names);
   if (!arguments.out.empty()) {
     CheckFree(arguments.out);
-    CheckCanDraw();
+    SayIfNoFigures();
   }
   const std::vector<LoadedPolicy> policies = GetPolicies(policy_names, arguments.controllers);
   Comparison comparison = Compare(request);
@@ -82,8 +82,8 @@ int RunCompare(const CompareArguments& arguments) {
   }
   if (arguments.out.empty()) return 0;
   MakeNewFolder(arguments.out);
-  WriteComparison(comparison, arguments.out);
-  if (!arguments.as_json) PrintWritten(comparison, arguments.out);
+  const std::vector<std::string> files = WriteComparison(comparison, arguments.out);
+  if (!arguments.as_json) PrintWritten(files);
   return 0;
 }
 
@@ -92,7 +92,8 @@ int RunCompare(const CompareArguments& arguments) {
 void AddCompare(CommandLine& line) {
   CompareArguments& a = line.Runs(RunCompare);
   line.Texts("runs", a.names, "RUN|FOLDER|POLICY",
-             Concat("runs or folders of runs; with them also policies: policy.safetensors or ",
+             Concat("runs or folders of runs; with them also policies: policy.safetensors, shipped "
+                    "policies or ",
                     "controllers (", Join(ControllerNames(), ", "), ")"));
   line.Require("runs");
   AddControllers(line, a.controllers);

@@ -216,14 +216,11 @@ void PrintComparison(const Comparison& comparison) {
   }
 }
 
-void PrintWritten(const Comparison& comparison, const std::filesystem::path& folder) {
-  std::string curves;
-  for (int task = 0; task < NumTasks(comparison); ++task) {
-    curves += fmt::format(", {0}.svg, {0}.png", CurvesName(task));
-  }
-  fmt::print("Written: summary.csv, runs.csv{}{} in {}\n",
-             comparison.policies.empty() ? "" : ", policies.csv", curves,
-             Printable(folder.string()));
+void PrintWritten(const std::vector<std::string>& files) {
+  std::vector<std::string> names;
+  for (const std::string& file : files) names.push_back(std::filesystem::path(file).filename());
+  const std::string folder = std::filesystem::path(files.front()).parent_path();
+  fmt::print("Written: {} in {}\n", Join(names, ", "), Printable(folder));
 }
 
 std::string ComparisonJson(const Comparison& comparison) {

@@ -10,8 +10,8 @@ namespace upswing {
 /// Prints a comparison as tables.
 void PrintComparison(const Comparison& comparison);
 
-/// Prints which files were written to a folder.
-void PrintWritten(const Comparison& comparison, const std::filesystem::path& folder);
+/// Prints which files WriteComparison has written.
+void PrintWritten(const std::vector<std::string>& files);
 
 /// A comparison as JSON, with every run's figures. A figure that is not reached (the time to solve
 /// of an unsolved run) is null.

@@ -93,6 +93,7 @@ int RunMapCommand(const MapCommand& a) {
   }
   CheckSameAxes(maps);
   const fs::path folder = MapFolder(a, policies.front(), maps.front());
+  SayIfNoFigures();
   ThreadPool pool(ResolveThreads(a.threads));
   for (size_t i = 0; i < maps.size(); ++i) {
     EpisodeProgress progress(a.as_json);
@@ -113,7 +114,8 @@ int RunMapCommand(const MapCommand& a) {
 void AddMap(CommandLine& line) {
   MapCommand& a = line.Runs(RunMapCommand);
   line.Texts("policies", a.policies, "POLICY|RUN",
-             Concat("policies, several for maps side by side: policy.safetensors, run folders or ",
+             Concat("policies, several for maps side by side: policy.safetensors, run folders, "
+                    "shipped policies or ",
                     "controllers (", Join(ControllerNames(), ", "), ")"));
   line.Require("policies");
   AddControllers(line, a.controllers);

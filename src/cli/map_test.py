@@ -240,8 +240,12 @@ class MapTest(ProgramTest):
         self.refuse(["map", self.policy, "--out", "full"],
                     "full: expected a new or empty folder, got one that is not empty")
 
-    def test_without_gnuplot_it_does_not_begin(self):
-        self.refuse(["map", self.policy], "gnuplot-nox", code=1, env={"PATH": str(self.folder)})
+    def test_without_gnuplot_there_is_only_a_table(self):
+        done = self.run_here("map", self.policy, "--x", "mass2=0.9:1.1:2", "--y", "gravity=9:10:2",
+                            "--json", "--out", "map", env={"PATH": str(self.folder)})
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertRegex(done.stderr, r"^upswing: tables only, no figures: .*gnuplot-nox.*\n$")
+        self.assertEqual(json.loads(done.stdout)["files"], ["map/map.csv"])
 
     def test_another_model_needs_mujoco(self):
         self.write("model.xml", MODEL)

@@ -11,7 +11,6 @@
 #include "cli/study_work.h"
 #include "os/file.h"
 #include "os/host.h"
-#include "report/figure.h"
 #include "runs/many_runs.h"
 #include "runs/seeds.h"
 #include "runs/study_file.h"
@@ -90,11 +89,11 @@ int CompareStudy(const StudyPlan& plan) {
   request.different_tasks = true;
   for (const SeedRun& run : RunsOf(plan)) request.paths.push_back(run.path);
   const Comparison comparison = Compare(request);
-  WriteComparison(comparison, plan.folder);
+  const std::vector<std::string> files = WriteComparison(comparison, plan.folder);
   WriteEvaluations(plan);
   Say("All evaluations of all runs: evaluations.csv\n");
   PrintComparison(comparison);
-  PrintWritten(comparison, plan.folder);
+  PrintWritten(files);
   return 0;
 }
 
@@ -117,7 +116,7 @@ int RunStudy(const StudyArguments& arguments) {
         ShellQuoted(Printable(many.plan.folder.string())));
     return 0;
   }
-  CheckCanDraw();  // fail before hours of training, not after
+  SayIfNoFigures();
   const int exit_code = TrainManyAndShow(many);
   return exit_code != 0 ? exit_code : CompareStudy(many.plan);
 }

@@ -166,10 +166,13 @@ class StudyTest(ProgramTest):
         self.refuse(["study", "little.toml", "--out", "run"], "run: expected a new or empty folder",
                     "no study.toml")
 
-    def test_without_gnuplot_it_does_not_begin(self):
+    def test_without_gnuplot_there_are_only_tables(self):
         self.write("little.toml", STUDY)
-        self.refuse(["study", "little.toml"], "gnuplot-nox", code=1,
-                    env={"PATH": str(self.folder)})
+        done = self.run_here("study", "little.toml", "--seeds", 1, env={"PATH": str(self.folder)})
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertRegex(done.stderr, r"^upswing: tables only, no figures: .*gnuplot-nox.*\n$")
+        self.assertTrue((self.folder / "runs/little/summary.csv").exists())
+        self.assertFalse((self.folder / "runs/little/curves.svg").exists())
 
     def test_bad_studies(self):
         one = "[variants.a]\n"

@@ -48,9 +48,9 @@ std::string MapCsv(const MapResult& map);
 /// Throws BadInput unless all maps have the same axes.
 void CheckSameAxes(const std::vector<MapResult>& maps);
 
-/// Writes map.csv, map.svg and map.png into a folder and adds them to the map's `files`. Several
-/// maps become map-1.csv, map-2.csv, … and maps.svg and maps.png. Their figure has a panel with the
-/// success of each, all with one colour scale.
+/// Writes map.csv and, if possible, map.svg and map.png into a folder and adds them to the map's
+/// `files`. Several maps become map-1.csv, map-2.csv, … and maps.svg and maps.png. Their figure has
+/// a panel with the success of each, all with one colour scale.
 void WriteMaps(std::vector<MapResult>& maps, const std::filesystem::path& folder);
 
 /// The map as a JSON document; several maps as a list.

@@ -147,10 +147,7 @@ MapResult PlanMap(const MapArguments& a, const LoadedPolicy& loaded) {
 }
 
 fs::path MapFolder(const MapArguments& a, const LoadedPolicy& loaded, const MapResult& map) {
-  const fs::path folder =
-      FigureFolder(a.out, loaded, Concat("map-", map.config.x.name, "-", map.config.y.name));
-  CheckCanDraw();
-  return folder;
+  return FigureFolder(a.out, loaded, Concat("map-", map.config.x.name, "-", map.config.y.name));
 }
 
 void FillMap(const MapArguments& a, const LoadedPolicy& loaded, ThreadPool& pool,

@@ -357,6 +357,15 @@ std::string Script(const Figure& figure, const Terminal& terminal) {
 
 void CheckCanDraw() { RunGnuplot(""); }
 
+std::string WhyNoFigures() {
+  try {
+    CheckCanDraw();
+    return "";
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
+
 void CheckFigureName(const std::filesystem::path& file) {
   if (file.extension() == ".svg" || file.extension() == ".png") return;
   throw BadInput(Concat(file.string(), ": expected a name that ends with .svg or .png"));
@@ -365,6 +374,13 @@ void CheckFigureName(const std::filesystem::path& file) {
 void Draw(const Figure& figure, const std::filesystem::path& file) {
   CheckFigureName(file);
   WriteFileAtomically(file, RunGnuplot(Script(figure, file.extension() == ".svg" ? kSvg : kPng)));
+}
+
+std::vector<std::string> DrawIfPossible(const Figure& figure, const std::filesystem::path& name) {
+  if (!WhyNoFigures().empty()) return {};
+  std::vector<std::string> files{name.string() + ".svg", name.string() + ".png"};
+  for (const std::string& file : files) Draw(figure, file);
+  return files;
 }
 
 }  // namespace upswing

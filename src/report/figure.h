@@ -47,8 +47,11 @@ struct Figure {
   std::string caption = {};       // text below the title, wrapped into lines
 };
 
-/// Throws Failure if figures cannot be drawn because gnuplot is missing or broken. Call it before
-/// long work whose result will be drawn.
+/// Why figures cannot be drawn, such as a missing gnuplot; empty if they can.
+std::string WhyNoFigures();
+
+/// Throws Failure if figures cannot be drawn. Call it before long work that is nothing without its
+/// figures.
 void CheckCanDraw();
 
 /// Throws BadInput unless the name ends with .svg or .png.
@@ -58,5 +61,9 @@ void CheckFigureName(const std::filesystem::path& file);
 /// escapes replace unprintable characters (see Printable). Throws BadInput for another ending.
 /// Throws Failure if gnuplot is missing or fails.
 void Draw(const Figure& figure, const std::filesystem::path& file);
+
+/// Draws a figure as NAME.svg and NAME.png and returns these files; none if there is a reason in
+/// WhyNoFigures.
+std::vector<std::string> DrawIfPossible(const Figure& figure, const std::filesystem::path& name);
 
 }  // namespace upswing

@@ -245,7 +245,15 @@ void AddPolicies(const std::vector<LoadedPolicy>& policies, bool redesign, Threa
   }
 }
 
-void WriteComparison(const Comparison& comparison, const fs::path& folder) {
+std::vector<std::string> WriteComparison(const Comparison& comparison, const fs::path& folder) {
+  std::vector<std::string> files;
+  const auto write = [&](const char* name, const std::string& table) {
+    WriteFileAtomically(folder / name, table);
+    files.push_back((folder / name).string());
+  };
+  write("summary.csv", SummaryCsv(comparison.groups));
+  write("runs.csv", RunsCsv(comparison.groups));
+  if (!comparison.policies.empty()) write("policies.csv", PoliciesCsv(comparison.policies));
   for (int task = 0; task < NumTasks(comparison); ++task) {
     std::vector<RunGroup> groups;
     std::ranges::copy_if(comparison.groups, std::back_inserter(groups),
@@ -256,14 +264,10 @@ void WriteComparison(const Comparison& comparison, const fs::path& folder) {
       levels.push_back(
           {policy.title, policy.figures.success_rate(), policy.figures.reward_sum.mean});
     }
-    const Figure curves = LearningCurves(groups, levels);
-    Draw(curves, folder / Concat(CurvesName(task), ".svg"));
-    Draw(curves, folder / Concat(CurvesName(task), ".png"));
+    std::ranges::move(DrawIfPossible(LearningCurves(groups, levels), folder / CurvesName(task)),
+                      std::back_inserter(files));
   }
-  WriteFileAtomically(folder / "summary.csv", SummaryCsv(comparison.groups));
-  WriteFileAtomically(folder / "runs.csv", RunsCsv(comparison.groups));
-  if (comparison.policies.empty()) return;
-  WriteFileAtomically(folder / "policies.csv", PoliciesCsv(comparison.policies));
+  return files;
 }
 
 }  // namespace upswing
