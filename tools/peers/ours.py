@@ -52,6 +52,7 @@ def train_flags(width, batch, threads, steps, out):
         "epsilon-start": EPSILON, "epsilon-end": EPSILON, "replay": REPLAY,
         "learning-starts": LEARNING_STARTS, "episode-seconds": 10, "random-start-share": 0,
         "start-noise": 0.1, "start-noise-end": 0.1, "log-every": LOG_EVERY,
+        "reward-centering": 0,
         # One evaluation at the end, of one episode; only the last checkpoint.
         "eval-every": steps + 1, "eval-episodes": 1, "checkpoint-every": steps + 1,
     }

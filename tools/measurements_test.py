@@ -1,0 +1,85 @@
+#!/usr/bin/env python3
+"""Tests that the tools whose numbers the documentation quotes still run (tools/results, tools/peers): each
+for a second, and without the other libraries."""
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+ROOT = Path(os.environ.get("UPSWING_ROOT", Path(__file__).resolve().parent.parent))
+UPSWING = Path(os.environ.get("UPSWING", ROOT / "build/release/bin/upswing"))
+sys.dont_write_bytecode = True
+sys.path[:0] = [str(ROOT / "tools/peers"), str(ROOT / "tools/results")]
+import actors  # noqa: E402  pylint: disable=wrong-import-position
+import ours  # noqa: E402  pylint: disable=wrong-import-position
+
+# Settings whose defaults do not matter here: of features that are off, of schedules that are constant.
+NEUTRAL = {"dqn": {"head", "levels", "priority_exponent", "importance_exponent", "learning_rate_steps",
+                   "target_period", "epsilon_decay"},
+           "sac": {"value_low", "value_high", "priority_exponent", "importance_exponent",
+                   "learning_rate_steps", "actor_rate", "tune_alpha"},
+           "ppo": {"actions", "levels", "learning_rate_steps"}}
+TINY = {"width": 8, "batch": 8, "threads": 1}
+
+
+class Peers(unittest.TestCase):
+    def test_no_setting_is_left_to_a_default_that_changes(self):
+        """A new default of an agent must not change the algorithm that is compared."""
+        for agent, neutral in NEUTRAL.items():
+            text = ours.run([ours.PROGRAM, "train", "--agent", agent, "--print-config"])
+            sections = re.findall(r"^\[(?:agent|network)\]\n((?:\w.*\n)*)", text, re.MULTILINE)
+            names = set(re.findall(r"^(\w+) = ", "".join(sections), re.MULTILINE))
+            flags = ours.train_flags(**TINY, steps=1, out="run") if agent == "dqn" else [
+                actors.flag(*each) for each in
+                actors.settings(agent, "double-pendulum", **TINY, seed=1).items()]
+            given = {re.match(r"--(?:no-)?([\w-]+)", flag)[1].replace("-", "_") for flag in flags}
+            self.assertEqual(names - given, neutral, agent)
+
+    def test_measures(self):
+        for what, steps in (("sac", 500), ("ppo", 1)):
+            result = actors.measure(what, "double-pendulum", **TINY, steps=steps, seed=1)
+            self.assertGreater(result["seconds"], 0)
+        self.assertGreater(ours.train(**TINY, steps=7 * ours.LOG_EVERY)["steps_per_second"], 0)
+        if (UPSWING.parent / "upswing-bench").exists():
+            self.assertGreater(ours.gradient(**TINY, seconds=0.1)["steps_per_second"], 0)
+
+
+@unittest.skipUnless(UPSWING == ROOT / "build/release/bin/upswing", "the tools run the release build")
+class Results(unittest.TestCase):
+    def succeed(self, *command):
+        done = subprocess.run([sys.executable, "-B", *map(str, command)], check=False, cwd=ROOT,
+                              stdin=subprocess.DEVNULL, capture_output=True, encoding="utf-8")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return done.stdout
+
+    def test_recipes(self):
+        for table, words in (("first-training", "steps"), ("perf-c", "`d3qn`")):
+            self.assertIn(words, self.succeed("tools/results/results.py", "measure", table, "--try"))
+
+    def test_upright_modes(self):
+        self.assertIn("|delta|", self.succeed("tools/results/upright_modes.py", "fast", "--episodes", 4,
+                                              "--physics", "closed-form"))
+
+    def test_seeds(self):
+        with tempfile.TemporaryDirectory(prefix="upswing-") as folder:
+            runs = Path(folder, "runs")
+            runs.mkdir()
+            rows = [f"{agent},{seed},90000,{1000 * seed},{seed},1,{2000 + seed},1,{2000 - seed}\n"
+                    for agent in ("fast", "d3qn") for seed in range(1, 30)]
+            (runs / "runs.csv").write_text(
+                "group,seed,steps,solve_steps,solve_seconds,best_success,best_return,final_success,"
+                "final_return\n" + "".join(rows), encoding="utf-8")
+            try:
+                import numpy  # noqa: F401  pylint: disable=import-outside-toplevel,unused-import
+            except ImportError:
+                self.skipTest("needs NumPy")
+            for tool in ("distribution", "how_many"):
+                self.succeed(f"tools/results/seeds/{tool}.py", runs, "--out", Path(folder, tool))
+
+
+if __name__ == "__main__":
+    unittest.main()
