@@ -69,7 +69,7 @@ class Results(unittest.TestCase):
             runs = Path(folder, "runs")
             runs.mkdir()
             rows = [f"{agent},{seed},90000,{1000 * seed},{seed},1,{2000 + seed},1,{2000 - seed}\n"
-                    for agent in ("fast", "d3qn") for seed in range(1, 30)]
+                    for agent in ("fast", "d3qn") for seed in range(1, 201)]
             (runs / "runs.csv").write_text(
                 "group,seed,steps,solve_steps,solve_seconds,best_success,best_return,final_success,"
                 "final_return\n" + "".join(rows), encoding="utf-8")

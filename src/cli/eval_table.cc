@@ -61,9 +61,9 @@ bool ValueIsOff(double expected, double attained) {
 }
 
 std::string MomentsText(const Moments& m, double scale) {
-  constexpr double kLeast = 1e-6;  // smaller deviations are rounding errors
+  constexpr double kLeast = 1e-6;  // smaller numbers are rounding errors
   const double mean = scale * m.mean, deviation = scale * m.deviation;
-  if (deviation < kLeast) return fmt::format("{:.4g} ± 0", mean);
+  if (deviation < kLeast) return fmt::format("{:.4g} ± 0", std::abs(mean) < kLeast ? 0 : mean);
   const int decimals = std::max(0, 1 - static_cast<int>(std::floor(std::log10(deviation))));
   return fmt::format("{:.{}f} ± {:.{}f}", mean, decimals, deviation, decimals);
 }

@@ -114,7 +114,7 @@ std::string TorqueText(const Rollout& rollout) {
   const std::vector<RolloutRow>& rows = rollout.rows;
   // Leave out the last state, because no step follows it.
   const size_t steps = std::max<size_t>(1, rows.size() - 1);
-  TorqueTally tally(1, kControlPeriod);
+  TorqueTally tally({&rollout.plant.torque_limit, 1}, kControlPeriod);
   for (size_t k = 0; k < steps; ++k) {
     const size_t after = std::min(k + 1, rows.size() - 1);
     tally.Add({&rows[k].torque, 1}, rows[after].inverted);

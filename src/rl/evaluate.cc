@@ -29,7 +29,7 @@ class EpisodeTally {
         gamma_(ValueUnitsOf(policy).gamma),
         discount_(gamma_ > 0 ? 1 : 0),
         lean_(static_cast<size_t>(spec.bodies)),
-        torques_(spec.action_limit.size(), seconds_) {
+        torques_(spec.action_limit, seconds_) {
     episode_.terms.resize(spec.term_names.size());
     episode_.tilt.resize(lean_.size());
   }
@@ -198,15 +198,18 @@ std::span<const EvaluationFigure> EvaluationFigures() {
 void TorqueTally::Add(std::span<const double> torque, bool at_goal) {
   ++steps_;
   double change = 0;
+  bool is_chatter = false;
   for (size_t a = 0; a < torque.size(); ++a) {
     peak_ = std::max(peak_, std::abs(torque[a]));
     squares_ += torque[a] * torque[a];
-    if (steps_ > 1) change += std::abs(torque[a] - last_[a]);
+    const double step = steps_ > 1 ? std::abs(torque[a] - last_[a]) : 0;
+    change += step;
+    is_chatter |= step > kLeastChange * limit_[a];
     last_[a] = torque[a];
   }
   variation_ += change;
   goal_variation_ += change;
-  goal_changes_ += change > 0 ? 1 : 0;
+  goal_changes_ += is_chatter ? 1 : 0;
   if (!at_goal) goal_since_ = -1;
   if (!at_goal || goal_since_ >= 0) return;
   goal_since_ = steps_;

@@ -18,6 +18,9 @@ inline constexpr double kSteadyTiltSeconds = 1;  // steady tilt: mean lean over 
 /// Largest lean of a settled body, rad: 5% of the half turn from hanging to upright.
 inline constexpr double kSettledTilt = 0.05 * std::numbers::pi;
 
+/// Smallest change of a torque that counts as chatter, as a share of its limit.
+inline constexpr double kLeastChange = 1e-3;
+
 /// Results of one evaluation episode.
 struct EvaluationEpisode {
   bool success = false;
@@ -34,7 +37,7 @@ struct EvaluationEpisode {
   // Torques in the stretch at the goal with which the episode ends; 0 if there is none or it has no
   // steps.
   double goal_variation = 0;  // total variation of the torque per second
-  double goal_changes = 0;    // number of torque changes per second
+  double goal_changes = 0;    // number of torque changes above kLeastChange per second
   double value = 0;           // largest value of the first observation, in units of reward
   /// Σ γᵏ r over the whole episode. `value` estimates it if the policy was trained with the same
   /// reward.
@@ -87,8 +90,9 @@ std::span<const EvaluationFigure> EvaluationFigures();
 /// Running statistics of an episode's torques.
 class TorqueTally {
  public:
-  /// Tally for `size` motors.
-  TorqueTally(size_t size, double step_seconds) : seconds_(step_seconds), last_(size) {}
+  /// Tally for motors with these torque limits (A).
+  TorqueTally(std::span<const double> limit, double step_seconds)
+      : seconds_(step_seconds), limit_(limit.begin(), limit.end()), last_(limit.size()) {}
 
   /// Adds the torques (A) of a step. `at_goal` says whether the step leads to the goal.
   void Add(std::span<const double> torque, bool at_goal);
@@ -105,8 +109,8 @@ class TorqueTally {
   void Finish(bool at_goal, EvaluationEpisode& episode) const;
 
  private:
-  double seconds_;            // length of a step
-  std::vector<double> last_;  // (A)
+  double seconds_;                    // length of a step
+  std::vector<double> limit_, last_;  // (A)
   int64_t steps_ = 0, goal_since_ = -1;
   double peak_ = 0, squares_ = 0, variation_ = 0;
   double goal_variation_ = 0;  // in the current stretch at the goal

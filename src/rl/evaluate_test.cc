@@ -180,6 +180,16 @@ TEST(Evaluate, SettlingTimeTorqueVariationAndTilt) {
   EXPECT_DOUBLE_EQ(e.goal_changes.mean, 10);
 }
 
+TEST(Evaluate, TorqueChangesBelowAThousandthOfTheLimitAreNoChatter) {
+  const std::vector<double> limit{5};
+  TorqueTally tally(limit, 0.1);
+  for (const double torque : {0.0, 0.004, 0.008, 0.02}) tally.Add({&torque, 1}, true);
+  EvaluationEpisode episode;
+  tally.Finish(true, episode);
+  EXPECT_DOUBLE_EQ(episode.goal_changes, 1 / (3 * 0.1));
+  EXPECT_DOUBLE_EQ(episode.goal_variation, 0.02 / (3 * 0.1));
+}
+
 TEST(Evaluate, AStretchAtTheGoalCountsItsOwnChangesOnly) {
   ScriptedEnv never({2000}), whole({1});
   EXPECT_EQ(EvaluateEpisodes(Constant(1), never)[0].goal_changes, 0);
