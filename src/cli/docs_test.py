@@ -317,12 +317,6 @@ class Documents(ProgramTest):
             self.assertRegex(text_of(name), r"Debian 12 (and|or) 13")
         self.assertIn('"debian 12 "* | "debian 13 "*', text_of("upswing"))
 
-    def test_shipped_policies_can_be_evaluated_as_the_docs_say(self):
-        for page in ("exercises", "your-own-plant"):
-            policy = re.search(r"upswing eval (d3qn\S*)", text_of(f"docs/tutorials/{page}.md"))[1]
-            self.assertIn("success", self.succeed("eval", policy, "--episodes", 2, "--physics",
-                                                  "closed-form"))
-
 
 class Site(ProgramTest):
     """Tests of the documentation as HTML, built by ./upswing docs in build/docs-venv."""
