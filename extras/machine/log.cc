@@ -33,10 +33,13 @@ constexpr double kTurn = 2 * std::numbers::pi;
 constexpr LogUnit kUnits[] = {{"s", "time", 1},
                               {"ms", "time", 1e-3},
                               {"us", "time", 1e-6},
+                              {"ns", "time", 1e-9},
                               {"rad", "angle", 1},
                               {"deg", "angle", kTurn / 360},
+                              {"turn", "angle", kTurn},
                               {"rad/s", "velocity", 1},
                               {"deg/s", "velocity", kTurn / 360},
+                              {"turn/s", "velocity", kTurn},
                               {"rpm", "velocity", kTurn / 60},
                               {"Nm", "torque", 1},
                               {"N·m", "torque", 1},
@@ -83,7 +86,8 @@ std::string TextIn(const toml::node& node, const std::string& place) {
                         TextOf(node).value_or("another type")));
 }
 
-/// Reads `"name"` or `{column = "name", unit = "deg", factor = -1}`.
+/// Reads `"name"` or `{column = "name", unit = "deg", factor = -1}`. An angle may have the keys
+/// `wrap` and `hanging`, too.
 LogColumn ColumnIn(const toml::node& node, std::string_view quantity, const std::string& place) {
   LogColumn column;
   const toml::table* table = node.as_table();
@@ -99,8 +103,14 @@ LogColumn ColumnIn(const toml::node& node, std::string_view quantity, const std:
       column.scale *= ScaleOf(TextOf(value).value_or(""), quantity, place);
     } else if (key == "factor") {
       column.scale *= NumberIn(value, {1e-9, 1e9}, inner);
+    } else if (key == "wrap" && quantity == "angle") {
+      column.wrap = std::abs(NumberIn(value, {1e-9, 1e12}, inner));
+    } else if (key == "hanging" && quantity == "angle") {
+      column.hanging = NumberIn(value, {0, 1e12}, inner);
     } else {
-      throw BadInput(Concat(place, "expected column, unit or factor, got ", key.str()));
+      throw BadInput(Concat(place, "expected column, unit",
+                            quantity == "angle" ? ", factor, wrap or hanging" : " or factor",
+                            ", got ", key.str()));
     }
   }
   if (column.name.empty()) throw BadInput(Concat(place, "expected a column, got none"));
@@ -115,7 +125,8 @@ bool SetColumn(LogColumns& columns, std::string_view key, const toml::node& node
   } else if (key == "piece") {
     columns.piece = TextIn(node, place);
   } else if (key == "hanging") {
-    columns.hanging = NumberIn(node, {0, 1e6}, place);
+    throw BadInput(Concat(
+        place, "expected it with an angle, such as angle1 = {column = \"a\", hanging = 180}"));
   } else if (key == "absolute") {
     if (!node.is_boolean()) {
       throw BadInput(
@@ -154,7 +165,7 @@ void CheckOwnColumns(const LogColumns& columns, const std::string& where) {
 }
 
 std::vector<std::string> KnownKeys() {
-  std::vector<std::string> keys{"time", "piece", "hanging", "absolute"};
+  std::vector<std::string> keys{"time", "piece", "absolute"};
   for (const JointQuantity& q : kJointQuantities) {
     for (const int joint : {1, 2}) keys.push_back(Concat(q.key, joint));
   }
@@ -184,16 +195,28 @@ LogColumns RealAiGymColumns(const std::vector<std::string>& names, const std::st
   return columns;
 }
 
+/// Undoes the wrapping of an angle: no step between rows is longer than half of `wrap`.
+void Unwrap(std::vector<double>& angle, double wrap) {
+  double turns = 0, before = angle.empty() ? 0 : angle.front();
+  for (double& x : angle) {
+    turns -= std::round((x - before) / wrap);
+    before = x;
+    x += turns * wrap;
+  }
+}
+
 /// Numbers of a column in SI units. Throws BadInput for a huge one.
-std::vector<double> Scaled(CsvColumn column, double scale, double zero, const std::string& where) {
-  for (size_t row = 0; row < column.values.size(); ++row) {
-    double& x = column.values[row];
-    x = (x - zero) * scale;
+std::vector<double> Scaled(CsvColumn table, const LogColumn& column, const std::string& where) {
+  std::vector<double> values = std::move(table.values);
+  if (column.wrap > 0) Unwrap(values, column.wrap);
+  for (size_t row = 0; row < values.size(); ++row) {
+    double& x = values[row];
+    x = (x - column.hanging) * column.scale;
     if (std::abs(x) <= kMostMagnitude) continue;
     throw BadInput(Concat(where, ": row ", row + 1, ": ", column.name,
                           ": expected a number of magnitude 0 to ", kMostMagnitude, ", got ", x));
   }
-  return std::move(column.values);
+  return values;
 }
 
 /// All rows of a file as one log, and the values of its column of pieces.
@@ -222,7 +245,7 @@ WholeLog ReadRows(std::string_view csv, const LogColumns& columns, const std::st
     table.emplace(std::move(name), std::move(column));
   }
   WholeLog whole;
-  whole.log.time = Scaled(table[columns.time.name], columns.time.scale, 0, where);
+  whole.log.time = Scaled(table[columns.time.name], columns.time, where);
   if (!columns.piece.empty()) whole.piece = table[columns.piece].values;
   for (const JointQuantity& q : kJointQuantities) {
     std::vector<Joints>& values = whole.log.*q.values;
@@ -230,8 +253,7 @@ WholeLog ReadRows(std::string_view csv, const LogColumns& columns, const std::st
     for (int joint = 0; joint < 2; ++joint) {
       const LogColumn& column = (columns.*q.columns)[joint];
       if (column.name.empty()) continue;
-      const std::vector<double> numbers =
-          Scaled(table[column.name], column.scale, is_angle ? columns.hanging : 0, where);
+      const std::vector<double> numbers = Scaled(table[column.name], column, where);
       values.resize(numbers.size());
       for (size_t row = 0; row < numbers.size(); ++row) values[row][joint] = numbers[row];
     }

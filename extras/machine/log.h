@@ -41,8 +41,10 @@ bool HasCommands(std::span<const MachineLog> logs);
 
 /// A column of a file and its unit.
 struct LogColumn {
-  std::string name;  // empty: the file lacks the quantity
-  double scale = 1;  // SI units in the file's unit
+  std::string name;    // empty: the file lacks the quantity
+  double scale = 1;    // SI units in the file's unit
+  double wrap = 0;     // an angle starts again after this much, in the file's unit; 0: it does not
+  double hanging = 0;  // the angle that hangs, in the file's unit
 };
 
 /// The columns of a log file, by quantity and joint.
@@ -51,7 +53,6 @@ struct LogColumns {
   std::array<LogColumn, 2> angle, velocity, commanded, measured, push;
   std::string piece;      // column whose value changes where the next piece begins; may be empty
   bool absolute = false;  // whether angle and velocity of joint 2 are against the vertical
-  double hanging = 0;     // angle that hangs, in the file's unit
 };
 
 /// Parses a TOML text that names the columns of a file. Throws BadInput with `where` and the line.

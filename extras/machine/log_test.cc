@@ -193,12 +193,11 @@ TEST(MachineLog, OwnColumnsAndUnits) {
 TEST(MachineLog, AbsoluteAnglesThatHangAtPi) {
   const LogColumns columns = ParseLogColumns(R"(
     time = "t"
-    angle1 = "a"
-    angle2 = "b"
+    angle1 = {column = "a", hanging = 3.0}
+    angle2 = {column = "b", hanging = 3.0}
     velocity1 = "va"
     velocity2 = "vb"
     absolute = true
-    hanging = 3.0
   )",
                                              "columns.toml");
   const MachineLog log =
@@ -206,6 +205,42 @@ TEST(MachineLog, AbsoluteAnglesThatHangAtPi) {
   EXPECT_EQ(log.angle[0], (Joints{0, 0}));
   EXPECT_EQ(log.angle[1], (Joints{0.5, 1}));  // joint 2 relative to link 1
   EXPECT_EQ(log.velocity[1], (Joints{2, 3}));
+}
+
+TEST(MachineLog, AMotionHasOneLogInAnyConventionOfItsAngles) {
+  // One motion over two turns of joint 1 and back, as loggers write it.
+  std::string turns = "t,a,b\n", degrees = "t;a;b\n", counts = "t,a,b\n", lean = "t,a,b\n";
+  const auto wrapped = [](double x, double turn) { return x - turn * std::floor(x / turn); };
+  for (int k = 0; k < 100; ++k) {
+    const double a = 2.5 * std::sin(0.1 * k), b = -0.3 * a;  // turns, joint 2 relative
+    turns += Concat(0.01 * k, ",", a, ",", b, "\n");
+    degrees +=
+        Concat(10 * k, ";", 360 * (wrapped(a + 0.25, 1) - 0.5), ";", 360 * wrapped(a + b, 1), "\n");
+    counts += Concat(0.01 * k, ",", wrapped(4096 * a + 100, 4096), ",", -4096 * b, "\n");
+    lean += Concat(0.01 * k, ",", a - 0.25, ",", a + b - 0.25, "\n");
+  }
+  const auto read = [](std::string csv, const std::string& a, const std::string& b,
+                       const std::string& more) {
+    std::ranges::replace(csv, '.', csv.find(';') != csv.npos ? ',' : '.');
+    const LogColumns columns = ParseLogColumns(
+        Concat("angle1 = {column = \"a\", ", a, "}\nangle2 = {column = \"b\", ", b, "}\n", more),
+        "columns.toml");
+    return ParseLog(csv, &columns, "own.csv").front().angle;
+  };
+  const std::string unit = "unit = \"turn\"", seconds = "time = \"t\"\n";
+  const auto expected = read(turns, unit, unit, seconds);
+  const auto same = [&](const std::vector<Joints>& angle) {
+    ASSERT_EQ(angle.size(), expected.size());
+    for (size_t k = 0; k < angle.size(); ++k) {
+      for (const int joint : {0, 1}) EXPECT_NEAR(angle[k][joint], expected[k][joint], 1e-4);
+    }
+  };
+  same(read(degrees, "unit = \"deg\", wrap = 360, hanging = -90", "unit = \"deg\", wrap = 360",
+            "time = {column = \"t\", unit = \"ms\"}\nabsolute = true\n"));
+  same(read(counts, unit + ", wrap = 4096, factor = 0.000244140625, hanging = 100",
+            unit + ", factor = -0.000244140625", seconds));
+  same(read(lean, unit + ", hanging = -0.25", unit + ", hanging = -0.25",
+            seconds + "absolute = true\n"));
 }
 
 TEST(MachineLog, APieceBeginsWhereItsColumnChanges) {
@@ -239,7 +274,7 @@ TEST(MachineLog, BadColumnFilesGetOneLineWithThePlace) {
   EXPECT_EQ(ComplaintAboutColumns(good + "speed1 = \"w\"\n").substr(0, 37),
             "columns.toml:4: speed1: expected one ");
   EXPECT_EQ(ComplaintAboutColumns(good + "velocity1 = {column = \"w\", unit = \"deg\"}\n"),
-            "columns.toml:4: velocity1: unit: expected rad/s, deg/s, rpm, got \"deg\"");
+            "columns.toml:4: velocity1: unit: expected rad/s, deg/s, turn/s, rpm, got \"deg\"");
   EXPECT_EQ(ComplaintAboutColumns(good + "velocity1 = {unit = \"rpm\"}\n"),
             "columns.toml:4: velocity1: expected a column, got none");
   EXPECT_EQ(ComplaintAboutColumns(good + "velocity1 = {column = \"w\", sign = -1}\n"),
@@ -253,9 +288,16 @@ TEST(MachineLog, BadColumnFilesGetOneLineWithThePlace) {
             "columns.toml:4: absolute: expected true or false, got 1");
   EXPECT_EQ(ComplaintAboutColumns(good + "absolute = true\nvelocity1 = \"w\"\n"),
             "columns.toml: expected velocity1 and velocity2, or neither, with absolute");
-  EXPECT_EQ(ComplaintAboutColumns(good + "hanging = inf\n").substr(0, 41),
-            "columns.toml:4: hanging: expected a numbe");
-  EXPECT_NE(ComplaintAboutColumns(good + "hanging = [\n"), "");
+  EXPECT_EQ(ComplaintAboutColumns(good + "hanging = 3\n"),
+            "columns.toml:4: hanging: expected it with an angle, such as angle1 = {column = \"a\", "
+            "hanging = 180}");
+  EXPECT_EQ(ComplaintAboutColumns("angle1 = {column = \"a\", hanging = inf}\n").substr(0, 50),
+            "columns.toml:1: angle1: hanging: expected a number");
+  EXPECT_EQ(ComplaintAboutColumns("angle1 = {column = \"a\", wrap = 0}\n").substr(0, 47),
+            "columns.toml:1: angle1: wrap: expected a number");
+  EXPECT_EQ(ComplaintAboutColumns("angle1 = {column = \"a\", sign = -1}\n"),
+            "columns.toml:1: angle1: expected column, unit, factor, wrap or hanging, got sign");
+  EXPECT_NE(ComplaintAboutColumns(good + "absolute = [\n"), "");
 }
 
 TEST(MachineLog, ReadsFilesAndNamesThem) {
@@ -285,8 +327,9 @@ TEST(MachineLog, ReadsTheMeasuredData) {
 
   const TempFolder folder;
   std::ofstream(folder / "columns.toml")
-      << "time = \"time\"\nangle1 = \"theta1\"\nangle2 = \"theta2\"\nvelocity1 = \"omega1\"\n"
-         "velocity2 = \"omega2\"\npiece = \"segment\"\nabsolute = true\nhanging = 3.14159265\n";
+      << "time = \"time\"\nangle1 = {column = \"theta1\", hanging = 3.14159265}\n"
+         "angle2 = {column = \"theta2\", hanging = 3.14159265}\nvelocity1 = \"omega1\"\n"
+         "velocity2 = \"omega2\"\npiece = \"segment\"\nabsolute = true\n";
   const auto pieces = ReadLog(real / "multiarm/free_swing.csv.gz", folder / "columns.toml");
   EXPECT_EQ(pieces.size(), 20);
   int rows = 0;

@@ -98,16 +98,15 @@ class Machine(ProgramTest):
     def test_own_columns(self):
         self.write("columns.toml", """
             time = {column = "t", unit = "ms"}
-            angle1 = {column = "a", unit = "deg"}
-            angle2 = {column = "b", unit = "deg"}
+            angle1 = {column = "a", unit = "deg", hanging = 180, wrap = 360}
+            angle2 = {column = "b", unit = "deg", hanging = 180}
             absolute = true
-            hanging = 180
             piece = "part"
         """)
 
         def own(k, row):
             a = 180 + math.degrees(row[1])
-            return [k // 1001, 1000 * row[0], a, a + math.degrees(row[2])]
+            return [k // 1001, 1000 * row[0], a % 360, a + math.degrees(row[2])]
 
         text = log(own, ["part", "t", "a", "b"])
         self.assertEqual(self.faults(text, "--columns", "columns.toml"), {})

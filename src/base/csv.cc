@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "base/error.h"
 #include "base/text.h"
@@ -16,16 +17,17 @@ struct Line {
   std::string_view text;
   const std::string& where;
   int number = 0;
+  char separator = ',';  // of the cells
 
   Error Bad(std::string_view what) const {
     return BadInput(Concat(where, ":", number, ": ", what));
   }
 };
 
-/// The end of the cell that begins at `at`: a comma outside quotes, or the end of the line.
+/// The end of the cell that begins at `at`: a separator outside quotes, or the end of the line.
 size_t EndOfCell(const Line& line, size_t at) {
   bool quoted = false;
-  for (; at < line.text.size() && (quoted || line.text[at] != ','); ++at) {
+  for (; at < line.text.size() && (quoted || line.text[at] != line.separator); ++at) {
     if (line.text[at] == '"') quoted = !quoted;  // two quotes in a row change nothing
   }
   if (quoted) throw line.Bad(Concat("expected a closing quote, got \"", line.text, "\""));
@@ -66,15 +68,38 @@ bool FindLine(std::string_view& rest, Line& line) {
   while (!rest.empty()) {
     line.text = TakeLine(rest);
     ++line.number;
-    if (!line.text.empty() && !line.text.starts_with('#')) return true;
+    const bool is_comment = line.text.starts_with('#') || line.text.starts_with('%') ||
+                            line.text.starts_with("//") ||
+                            (line.text.starts_with(';') && line.separator != ';');
+    if (!line.text.empty() && !is_comment) return true;
   }
   return false;
 }
 
-std::string_view WithoutByteOrderMark(std::string_view text) {
+/// Moves to the line of names, and finds out the separator; false if there is none. Skips a
+/// byte-order mark, and the line `sep=;` of spreadsheets.
+bool FindNames(std::string_view& rest, Line& line) {
   constexpr std::string_view kMark = "\xef\xbb\xbf";
-  if (text.starts_with(kMark)) text.remove_prefix(kMark.size());
-  return text;
+  if (rest.starts_with("\xff\xfe") || rest.starts_with("\xfe\xff")) {
+    throw BadInput(Concat(line.where, ": expected text in UTF-8, got UTF-16: save it as UTF-8"));
+  }
+  if (rest.starts_with(kMark)) rest.remove_prefix(kMark.size());
+  do {
+    if (!FindLine(rest, line)) return false;
+  } while (line.text.starts_with("sep=") && line.text.size() <= 5);
+  for (const char separator : {',', ';', '\t'}) {
+    line.separator = separator;
+    if (EndOfCell(line, 0) < line.text.size()) return true;
+  }
+  line.separator = ',';
+  return true;
+}
+
+/// The number in a cell. Where commas do not separate cells, one may stand before the decimals.
+std::optional<double> NumberIn(std::string_view cell, const Line& line) {
+  const bool has_comma = line.separator != ',' && cell.find(',') != cell.npos;
+  const auto number = ParseNumber(has_comma ? Replaced(std::string(cell), ",", ".") : cell);
+  return number && std::isfinite(*number) ? number : std::nullopt;
 }
 
 /// A text as a cell: Printable, which keeps the row on one line, and in quotes if necessary.
@@ -87,10 +112,9 @@ std::string CellOf(std::string_view given) {
 }  // namespace
 
 std::vector<std::string> CsvNames(std::string_view text, const std::string& where) {
-  text = WithoutByteOrderMark(text);
   Line line{{}, where};
   std::vector<std::string_view> cells;
-  if (FindLine(text, line)) FindCells(line, cells);
+  if (FindNames(text, line)) FindCells(line, cells);
   std::vector<std::string> names;
   for (const std::string_view cell : cells) names.push_back(TextOf(cell));
   return names;
@@ -98,12 +122,11 @@ std::vector<std::string> CsvNames(std::string_view text, const std::string& wher
 
 std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::string>& names,
                                const std::string& where) {
-  text = WithoutByteOrderMark(text);
   std::vector<CsvColumn> columns;
   for (const std::string& name : names) columns.push_back({name, {}});
   Line line{{}, where};
   std::vector<std::string_view> cells;
-  if (!FindLine(text, line)) return columns;
+  if (!FindNames(text, line)) return columns;
   FindCells(line, cells);
   const size_t width = cells.size();
   std::vector<size_t> places;  // indices of the wanted columns in a row
@@ -118,15 +141,17 @@ std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::str
     }
     places.push_back(static_cast<size_t>(found - cells.begin()));
   }
+  const bool ends = text.ends_with('\n');
   while (FindLine(text, line)) {
     FindCells(line, cells);
     if (cells.size() != width) {
-      throw line.Bad(Concat("expected ", width, " columns, got ", cells.size()));
+      throw line.Bad(Concat("expected ", width, " columns, got ", cells.size(),
+                            text.empty() && !ends ? ": the last line is cut off; remove it" : ""));
     }
     for (size_t i = 0; i < places.size(); ++i) {
       const std::string_view cell = WithoutQuotes(cells[places[i]]);
-      const auto number = ParseNumber(cell);
-      if (!number || !std::isfinite(*number)) {
+      const auto number = NumberIn(cell, line);
+      if (!number) {
         throw line.Bad(Concat(names[i], ": expected a finite number, got \"", cell, "\""));
       }
       columns[i].values.push_back(*number);

@@ -17,9 +17,11 @@ struct CsvColumn {
 
 /// Reads the columns called `names` from a CSV text: a line of names, then rows of cells.
 ///
-/// A cell may be in double quotes. Within the quotes, a comma is part of the text and two quotes
-/// stand for one. The reader ignores a byte-order mark, empty lines, lines that begin with #, and
-/// the cells of other columns.
+/// Commas separate the cells; if the line of names has none, semicolons or tabs do, and a number may
+/// have a decimal comma. A cell may be in double quotes. Within the quotes, a separator is part of
+/// the text and two quotes stand for one. The reader ignores a byte-order mark, empty lines,
+/// comments (lines that begin with #, %, // or ;), the line `sep=;` of spreadsheets, and the cells
+/// of other columns.
 ///
 /// Throws BadInput if a column is missing or named twice, a quote is not closed in its line, or a
 /// cell is not a finite number. Also throws it if a row and the line of names differ in their

@@ -30,6 +30,18 @@ TEST(Csv, AsSpreadsheetsAndLibrariesWriteIt) {
             (std::vector<double>{4}));
 }
 
+TEST(Csv, SeparatorsDecimalCommasAndComments) {
+  const auto values = [](std::string_view text) {
+    return ReadCsv(text, {"b", "a"}, "t.csv").front().values;
+  };
+  const std::vector<double> expected{1.5, -2e-3};
+  EXPECT_EQ(values("a,b\n0,1.5\n0,-2e-3\n"), expected);
+  EXPECT_EQ(values("sep=;\r\na;b\r\n0;1,5\r\n0;-2e-3\r\n"), expected);
+  EXPECT_EQ(values("% logger\n// v2\n; of today\na\tb\n0\t1,5\n# half\n0\t-2,0e-3\n"), expected);
+  EXPECT_EQ(values("a;\"b\"\n0;\"1,5\"\n0;-0.002"), expected);
+  EXPECT_EQ(CsvNames("sep=\t\na\tb,c\n", "t.csv"), (std::vector<std::string>{"a\tb", "c"}));
+}
+
 TEST(Csv, NamesOfTheColumns) {
   using Names = std::vector<std::string>;
   EXPECT_EQ(CsvNames("\xef\xbb\xbf# by hand\r\n\n \"a\", b\r\n1,2\n", "t.csv"), (Names{"a", "b"}));
@@ -53,6 +65,13 @@ std::string Complaint(std::string_view text) {
 TEST(Csv, MessagesNameLineAndColumn) {
   EXPECT_EQ(Complaint("a,c\n1,2\n"), "t.csv:1: expected a column \"b\", got \"a,c\"");
   EXPECT_EQ(Complaint("a,b\n1,2\n3\n"), "t.csv:3: expected 2 columns, got 1");
+  EXPECT_EQ(Complaint("a,b\n1,2\n3"),
+            "t.csv:3: expected 2 columns, got 1: the last line is cut off; remove it");
+  EXPECT_EQ(Complaint("a,b\n1,2,5\n"), "t.csv:2: expected 2 columns, got 3");
+  EXPECT_EQ(Complaint("a;b\n1;2,5,1\n"), "t.csv:2: b: expected a finite number, got \"2,5,1\"");
+  EXPECT_EQ(Complaint("\xff\xfe"
+                      "a"),
+            "t.csv: expected text in UTF-8, got UTF-16: save it as UTF-8");
   EXPECT_EQ(Complaint("a,b\n# c\n1,x\n"), "t.csv:3: b: expected a finite number, got \"x\"");
   EXPECT_EQ(Complaint("a,b\n1,inf\n"), "t.csv:2: b: expected a finite number, got \"inf\"");
   EXPECT_EQ(Complaint("a,b\nx,1\n"), "none");
