@@ -1,0 +1,92 @@
+// Checks of the motion that the angles and torques describe.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "extras/machine/check.h"
+
+namespace upswing::machine {
+namespace {
+
+/// Rows without any torque.
+struct Unpowered {
+  const MachineLog* piece;
+  int first, last;
+};
+
+/// The longest rows of a piece in which all known torques are zero.
+Unpowered LongestUnpowered(const MachineLog& piece) {
+  constexpr double kSensor = 0.05;  // measured torque that may be noise, N·m
+  const auto torque = [](const std::vector<Joints>& values, int k) {
+    return values.empty() ? 0 : std::max(std::abs(values[k][0]), std::abs(values[k][1]));
+  };
+  Unpowered best{&piece, 0, -1};
+  int first = 0;
+  for (int k = 0; k < piece.rows(); ++k) {
+    if (torque(piece.commanded, k) > 0 || torque(piece.push, k) > 0 ||
+        torque(piece.measured, k) > kSensor) {
+      first = k + 1;
+    }
+    if (k - first > best.last - best.first) best = {&piece, first, k};
+  }
+  return best;
+}
+
+/// Largest height of a link above hanging, in its lengths, and largest speed of a joint, rad/s.
+struct Extent {
+  double height = 0, speed = 0;
+};
+
+Extent ExtentOf(const MachineLog& piece, int first, int last) {
+  Extent extent;
+  for (int k = std::max(first, 1); k <= std::min(last, piece.rows() - 2); ++k) {
+    const auto& [q1, q2] = piece.angle[k];
+    extent.height = std::max({extent.height, 1 - std::cos(q1), 1 - std::cos(q1 + q2)});
+    for (const int joint : {0, 1}) {
+      extent.speed = std::max(extent.speed, std::abs(CentralDifference(piece, k, joint)));
+    }
+  }
+  return extent;
+}
+
+void CheckGrowth(const MachineLog& piece, Findings& findings) {
+  constexpr double kLongEnough = 2;           // s
+  constexpr double kHeight = 0.3;             // of a swing within 45°
+  constexpr double kRest = 0.002, kGrow = 4;  // heights: amplitude 0.06 rad, and its double
+  const Unpowered rows = LongestUnpowered(piece);
+  if (rows.last <= rows.first) return;
+  const double seconds = piece.time[rows.last] - piece.time[rows.first];
+  if (seconds < kLongEnough) return;
+  const int middle = (rows.first + rows.last) / 2;
+  const Extent before = ExtentOf(piece, rows.first, middle);
+  const Extent after = ExtentOf(piece, middle, rows.last);
+  const bool grows = before.height < kHeight && after.height > kGrow * (before.height + kRest) &&
+                     after.speed > 2 * before.speed + 0.3;
+  if (!grows) return;
+  const bool known = !piece.commanded.empty() || !piece.measured.empty();
+  findings.push_back(
+      {Aspect::kMotion,
+       0,
+       known ? Severity::kFault : Severity::kWarning,
+       fmt::format("the swing grows from {:.2g} to {:.2g} rad/s {}", before.speed, after.speed,
+                   known ? "without torque" : "and the log has no torque"),
+       RangeOf(piece, rows.first, rows.last),
+       {{"speed_before", before.speed}, {"speed_after", after.speed}}});
+}
+
+}  // namespace
+
+void CheckMotion(Pieces pieces, Findings& findings) {
+  for (const int joint : {0, 1}) {
+    constexpr double kStill = 0.01;  // rad
+    if (AngleRange(pieces, joint) > kStill || AngleRange(pieces, 1 - joint) < kMoves) continue;
+    findings.push_back({Aspect::kMotion, joint + 1, Severity::kWarning,
+                        fmt::format("does not move although joint {} does: dry friction holds it, "
+                                    "or its encoder is dead",
+                                    2 - joint)});
+  }
+  for (const MachineLog& piece : pieces) CheckGrowth(piece, findings);
+}
+
+}  // namespace upswing::machine
