@@ -38,28 +38,28 @@ LogRows RangeOf(const Cycle& cycle) {
   return machine::RangeOf(*cycle.piece, cycle.row - 1, cycle.row);
 }
 
-void CheckClockUnit(double median, Findings& findings) {
+void CheckClockUnit(double usual, Findings& findings) {
   constexpr double kSlow = 0.5, kVerySlow = 50;  // s
-  if (median < kSlow) return;
+  if (usual < kSlow) return;
   findings.push_back({Aspect::kClock, 0, Severity::kFault,
-                      fmt::format("cycles of {:.4g} s: suspect a clock in {}", median,
-                                  median < kVerySlow ? "ms" : "µs")});
+                      fmt::format("cycles of {:.4g} s: suspect a clock in {}", usual,
+                                  usual < kVerySlow ? "ms" : "µs")});
 }
 
 /// Cycles that are longer count as gaps, s.
-double GapOf(double median) { return std::max(0.05, 20 * median); }
+double GapOf(double usual) { return std::max(0.05, 20 * usual); }
 
-void CheckLostCycles(const std::vector<Cycle>& cycles, double median, Findings& findings) {
-  constexpr double kLate = 1.5;  // medians; a longer cycle lost at least one
+void CheckLostCycles(const std::vector<Cycle>& cycles, double usual, Findings& findings) {
+  constexpr double kLate = 1.5;  // usual cycles; a longer cycle lost at least one
   int places = 0, standing = 0;
   double lost = 0;
   const Cycle *first_standing = nullptr, *longest = nullptr;
   for (const Cycle& cycle : cycles) {
     if (cycle.seconds <= 0 && standing++ == 0) first_standing = &cycle;
-    if (cycle.seconds <= kLate * median || cycle.seconds > GapOf(median)) continue;
+    if (cycle.seconds <= kLate * usual || cycle.seconds > GapOf(usual)) continue;
     if (!longest || cycle.seconds > longest->seconds) longest = &cycle;
     ++places;
-    lost += std::round(cycle.seconds / median) - 1;
+    lost += std::round(cycle.seconds / usual) - 1;
   }
   if (standing > 0) {
     findings.push_back({Aspect::kClock,
@@ -83,11 +83,11 @@ void CheckLostCycles(const std::vector<Cycle>& cycles, double median, Findings& 
                       {{"lost", lost}, {"places", places}}});
 }
 
-void CheckGaps(const std::vector<Cycle>& cycles, double median, Findings& findings) {
+void CheckGaps(const std::vector<Cycle>& cycles, double usual, Findings& findings) {
   constexpr int kMostGaps = 10;  // with a line each
   int gaps = 0;
   for (const Cycle& cycle : cycles) {
-    if (cycle.seconds <= GapOf(median) || ++gaps > kMostGaps) continue;
+    if (cycle.seconds <= GapOf(usual) || ++gaps > kMostGaps) continue;
     findings.push_back({Aspect::kClock,
                         0,
                         Severity::kFault,
@@ -115,10 +115,12 @@ LogRows RangeOf(const MachineLog& piece, int first, int last) {
   return {piece.first_row + first, piece.first_row + last, piece.time[first], piece.time[last]};
 }
 
-double MedianCycle(Pieces pieces) {
+double UsualCycle(Pieces pieces) {
   std::vector<double> seconds;
   for (const Cycle& cycle : CyclesOf(pieces)) seconds.push_back(cycle.seconds);
-  return QuartilesOf(std::move(seconds)).median;
+  std::ranges::sort(seconds);
+  const size_t quarter = seconds.size() / 4;
+  return MomentsOf(std::span(seconds).subspan(quarter, seconds.size() - 2 * quarter)).mean;
 }
 
 double CentralDifference(const MachineLog& log, int k, int joint) {
@@ -142,22 +144,22 @@ void CheckClock(Pieces pieces, Findings& findings) {
   std::vector<double> seconds;
   for (const Cycle& cycle : cycles) seconds.push_back(cycle.seconds);
   std::ranges::sort(seconds);
-  const double median = Quantile(seconds, 0.5), p99 = Quantile(seconds, 0.99);
-  if (median <= 0) {
+  const double usual = UsualCycle(pieces), p99 = Quantile(seconds, 0.99);
+  if (usual <= 0) {
     findings.push_back({Aspect::kClock, 0, Severity::kFault, "the clock hardly ever advances"});
     return;
   }
   findings.push_back({Aspect::kClock,
                       0,
                       Severity::kNote,
-                      fmt::format("{:.4g} Hz, cycles of {:.4g} ms (median), {:.4g} ms (99%), "
+                      fmt::format("{:.4g} Hz, cycles of {:.4g} ms (usual), {:.4g} ms (99%), "
                                   "{:.4g} ms (longest)",
-                                  1 / median, 1e3 * median, 1e3 * p99, 1e3 * seconds.back()),
+                                  1 / usual, 1e3 * usual, 1e3 * p99, 1e3 * seconds.back()),
                       {},
-                      {{"median", median}, {"p99", p99}, {"longest", seconds.back()}}});
-  CheckClockUnit(median, findings);
-  CheckLostCycles(cycles, median, findings);
-  CheckGaps(cycles, median, findings);
+                      {{"usual", usual}, {"p99", p99}, {"longest", seconds.back()}}});
+  CheckClockUnit(usual, findings);
+  CheckLostCycles(cycles, usual, findings);
+  CheckGaps(cycles, usual, findings);
 }
 
 bool LogCheck::faulty() const {

@@ -81,8 +81,10 @@ void CheckAngles(Pieces pieces, Findings& findings);
 void CheckVelocities(Pieces pieces, Findings& findings);
 /// Delay, lag, gain, unit and joint of the measured torque, compared with the commanded one.
 void CheckTorques(Pieces pieces, Findings& findings);
-/// Joints that do not move, and motion that grows without torque.
+/// Joints that do not move, motion that grows without torque, rest where nothing holds it.
 void CheckMotion(Pieces pieces, Findings& findings);
+/// Signs of the angle of joint 2 and of the motor's torque, by the equations of motion.
+void CheckSigns(Pieces pieces, Findings& findings);
 
 /// Whether the motor of a joint (0 or 1) reports torques without a command: more than idle motors
 /// do, including motors whose rotors the other joint accelerates.
@@ -91,8 +93,9 @@ bool ActsWithoutCommand(Pieces pieces, int joint);
 /// Rows `first` to `last` (indices) of a piece as rows of the file.
 LogRows RangeOf(const MachineLog& piece, int first, int last);
 
-/// Duration of the median cycle, s.
-double MedianCycle(Pieces pieces);
+/// Duration of a usual cycle, s: the mean of those between the quartiles. (Of a clock in whole
+/// milliseconds the median of 2 and 3 ms would be wrong.)
+double UsualCycle(Pieces pieces);
 
 /// Central difference of a joint's angle at row k, 0 < k < rows - 1, rad/s; 0 if the clock stands
 /// still.

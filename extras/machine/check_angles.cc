@@ -44,6 +44,7 @@ struct Repeat {
   int first, last;     // row indices
   double entry, exit;  // |changes of speed| at both ends, rad/s per cycle; 0 at the piece's ends
   double step;         // its first cycle, s
+  bool catches_up;     // whether the angle then jumps to where the joint is, or the piece ends
 };
 
 /// All repeats of at least five rows.
@@ -63,11 +64,13 @@ std::vector<Repeat> RepeatsOf(Pieces pieces, int joint) {
         ++last;
       }
       if (last - first + 1 >= kRows) {
+        constexpr double kJump = 2.5;  // cycles of the motion that follows
         // The change of speed may fall into two cycles.
-        repeats.push_back({&piece, first, last,
-                           std::max(difference(first), difference(first - 1) / 2),
-                           std::max(difference(last + 1), difference(last + 2) / 2),
-                           piece.time[first + 1] - piece.time[first]});
+        repeats.push_back(
+            {&piece, first, last, std::max(difference(first), difference(first - 1) / 2),
+             std::max(difference(last + 1), difference(last + 2) / 2),
+             piece.time[first + 1] - piece.time[first],
+             last + 2 >= piece.rows() || difference(last + 1) > kJump * difference(last + 2)});
       }
       first = last + 1;
     }
@@ -100,6 +103,7 @@ void CheckRepeats(Pieces pieces, int joint, double quantum, Findings& findings) 
     if (!IsSudden(repeat, quantum)) continue;
     const double q = repeat.piece->angle[repeat.first][joint];
     const int stuck = std::abs(q) > std::numbers::pi && (q == low || q == high) ? 0 : 1;
+    if (stuck && !repeat.catches_up) continue;  // dry friction holds the joint
     ++count[stuck];
     const Repeat*& best = longest[stuck];
     if (!best || repeat.last - repeat.first > best->last - best->first) best = &repeat;
@@ -116,6 +120,93 @@ void CheckRepeats(Pieces pieces, int joint, double quantum, Findings& findings) 
                      count[stuck] > 1 ? fmt::format("; {} times, longest", count[stuck]) : ""),
          RangeOf(*r.piece, r.first, r.last),
          {{"times", count[stuck]}}});
+  }
+}
+
+/// A row whose angle the motion before and after does not explain.
+struct Jump {
+  const MachineLog* piece;
+  int row;
+  double size;  // from the row before, rad
+};
+
+/// Speed of a joint, rad/s: the median of the three steps that end at `row` or begin there.
+double SpeedAt(const MachineLog& log, int joint, int row, bool ends) {
+  std::vector<double> speeds;
+  for (int k = ends ? row - 2 : row + 1; k <= (ends ? row : row + 3); ++k) {
+    if (k < 1 || k >= log.rows()) continue;
+    const double seconds = log.time[k] - log.time[k - 1];
+    const double move = std::abs(log.angle[k][joint] - log.angle[k - 1][joint]);
+    if (seconds > 0) speeds.push_back(move / seconds);
+  }
+  return speeds.empty() ? 0 : QuartilesOf(std::move(speeds)).median;
+}
+
+std::vector<Jump> JumpsOf(Pieces pieces, int joint) {
+  constexpr double kLeast = 0.15, kAcceleration = 1000;  // rad, rad/s²
+  constexpr double kJitter = 1.5;                        // of a cycle's length
+  constexpr int kRows = 4;                               // that repeat; CheckRepeats reports them
+  const double cycle = UsualCycle(pieces);
+  std::vector<Jump> jumps;
+  for (const MachineLog& log : pieces) {
+    const auto repeats = [&](int first) {
+      for (int k = std::max(first, 0); k < first + kRows; ++k) {
+        if (k + 1 >= log.rows() || log.angle[k + 1][joint] != log.angle[k][joint]) return false;
+      }
+      return first >= 0;
+    };
+    for (int k = 1; k < log.rows(); ++k) {
+      const double seconds = log.time[k] - log.time[k - 1];
+      const double size = log.angle[k][joint] - log.angle[k - 1][joint];
+      if (std::abs(size) < kLeast || seconds > 5 * cycle) continue;
+      const double speed =
+          std::max(SpeedAt(log, joint, k - 1, true), SpeedAt(log, joint, k, false));
+      const double step = std::max(seconds, cycle);
+      if (std::abs(size) < kLeast + kJitter * speed * step + kAcceleration * step * step) continue;
+      if (repeats(k) || (repeats(k - 1 - kRows) && speed > 0.5)) continue;
+      jumps.push_back({&log, k, size});
+    }
+  }
+  return jumps;
+}
+
+/// Reports wrapped angles, wrong samples, and encoders that slip.
+void CheckJumps(Pieces pieces, int joint, Findings& findings) {
+  constexpr int kShort = 3;      // rows of a wrong sample
+  constexpr double kNear = 0.5;  // rad
+  constexpr double kTurn = 2 * std::numbers::pi;
+  const std::vector<Jump> jumps = JumpsOf(pieces, joint);
+  std::vector<Jump> wraps, wrong, slips;
+  for (size_t i = 0; i < jumps.size(); ++i) {
+    const bool returns = i + 1 < jumps.size() && jumps[i + 1].piece == jumps[i].piece &&
+                         jumps[i + 1].row - jumps[i].row <= kShort &&
+                         std::abs(jumps[i + 1].size + jumps[i].size) < kNear;
+    const bool is_turn = std::abs(std::abs(jumps[i].size) - kTurn) < kNear;
+    (is_turn ? wraps : returns ? wrong : slips).push_back(jumps[i]);
+    if (!is_turn && returns) ++i;
+  }
+  const auto report = [&](const std::vector<Jump>& found, const std::string& text) {
+    if (found.empty()) return;
+    const Jump& first = found.front();
+    findings.push_back(
+        {Aspect::kAngle,
+         joint + 1,
+         Severity::kFault,
+         found.size() == 1 ? text : fmt::format("{}; {} times, first", text, found.size()),
+         RangeOf(*first.piece, first.row - 1, first.row),
+         {{"times", static_cast<double>(found.size())}, {"jump", first.size}}});
+  };
+  report(wraps,
+         "jumps by a turn: suspect a wrapped angle; name the turn by the key wrap of its column");
+  if (!wrong.empty()) {
+    const Jump& first = wrong.front();
+    report(wrong, fmt::format("a wrong sample: {:.4g} rad after {:.4g} rad",
+                              first.piece->angle[first.row][joint],
+                              first.piece->angle[first.row - 1][joint]));
+  }
+  if (!slips.empty()) {
+    report(slips, fmt::format("jumps by {:.3g} rad: suspect an encoder that slips or loses counts",
+                              slips.front().size));
   }
 }
 
@@ -155,6 +246,7 @@ void CheckAngles(Pieces pieces, Findings& findings) {
                           {{"quantum", *quantum}}});
     }
     CheckRepeats(pieces, joint, quantum.value_or(0), findings);
+    CheckJumps(pieces, joint, findings);
     CheckSpeeds(pieces, joint, findings);
   }
 }

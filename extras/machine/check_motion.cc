@@ -3,11 +3,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "extras/machine/check.h"
 
 namespace upswing::machine {
 namespace {
+
+/// Whether a torque of row k is other than 0.
+bool HasTorqueAt(const std::vector<Joints>& torque, int k) {
+  return !torque.empty() && (torque[k][0] != 0 || torque[k][1] != 0);
+}
 
 /// Rows without any torque.
 struct Unpowered {
@@ -75,6 +81,59 @@ void CheckGrowth(const MachineLog& piece, Findings& findings) {
        {{"speed_before", before.speed}, {"speed_after", after.speed}}});
 }
 
+/// The distance of an angle from another, in turns of its own, rad.
+double Distance(double angle, double from) {
+  return std::abs(std::remainder(angle - from, 2 * std::numbers::pi));
+}
+
+/// Rows of a piece at rest without torque, after which a torque moves it or the piece ends. (A hand
+/// may hold a pendulum that is released to swing.) Empty if they are shorter than 0.3 s.
+Unpowered RestOf(const MachineLog& piece) {
+  constexpr double kLong = 0.3, kStill = 0.01;  // s, rad
+  const auto powered = [&](int k) {
+    return HasTorqueAt(piece.commanded, k) || HasTorqueAt(piece.push, k);
+  };
+  for (int first = 0; first < piece.rows();) {
+    int last = first;
+    const auto rests = [&](int k) {
+      return !powered(k) && std::abs(piece.angle[k][0] - piece.angle[first][0]) < kStill &&
+             std::abs(piece.angle[k][1] - piece.angle[first][1]) < kStill;
+    };
+    while (last + 1 < piece.rows() && rests(last + 1)) ++last;
+    const bool counts = last + 1 == piece.rows() || powered(last + 1);
+    if (counts && rests(first) && piece.time[last] - piece.time[first] > kLong) {
+      return {&piece, first, last};
+    }
+    first = last + 1;
+  }
+  return {&piece, 0, -1};
+}
+
+/// Reports a rest where gravity would move a link: an angle with another zero or meaning.
+void CheckRest(const MachineLog& piece, Findings& findings) {
+  constexpr double kHeld = 0.35, kUpright = 0.1;  // rad; dry friction holds a link within
+  const Unpowered rest = RestOf(piece);
+  if (rest.last < rest.first) return;
+  const auto [q1, q2] = piece.angle[rest.first];
+  const double links[] = {q1, q1 + q2};
+  const auto near = [&](double from, double limit) {
+    return [=](double link) { return Distance(link, from) < limit; };
+  };
+  if (std::ranges::all_of(links, near(0, kHeld))) return;
+  const bool upright = std::ranges::all_of(links, [&](double link) {
+    return near(0, kHeld)(link) || near(std::numbers::pi, kUpright)(link);
+  });
+  const bool known = !piece.commanded.empty();
+  findings.push_back(
+      {Aspect::kMotion, 0, known && !upright ? Severity::kFault : Severity::kWarning,
+       fmt::format(
+           "rests at {:.3g} and {:.3g} rad {}, {}: suspect another zero (key hanging) or an "
+           "angle against the vertical (key absolute)",
+           q1, q2, known ? "without torque" : "and the log has no torque",
+           upright ? "with a link upright" : "where gravity moves a link"),
+       RangeOf(piece, rest.first, rest.last)});
+}
+
 }  // namespace
 
 void CheckMotion(Pieces pieces, Findings& findings) {
@@ -87,6 +146,12 @@ void CheckMotion(Pieces pieces, Findings& findings) {
                                     2 - joint)});
   }
   for (const MachineLog& piece : pieces) CheckGrowth(piece, findings);
+  for (const MachineLog& piece : pieces) {
+    const size_t before = findings.size();
+    CheckRest(piece, findings);
+    if (findings.size() > before) break;
+  }
+  CheckSigns(pieces, findings);
 }
 
 }  // namespace upswing::machine

@@ -10,6 +10,8 @@
 
 #include "base/rng.h"
 #include "extras/machine/testing.h"
+#include "pendulum/equations.h"
+#include "pendulum/runge_kutta.h"
 
 namespace upswing::machine {
 namespace {
@@ -70,7 +72,7 @@ TEST(MachineCheck, AGoodLogHasOnlyNotes) {
   const Findings found = Check(GoodLog());
   for (const Finding& f : found) EXPECT_EQ(f.severity, Severity::kNote) << f.text;
   ASSERT_EQ(found.size(), 5U);  // the clock, two velocities, two torques
-  EXPECT_EQ(found[0].text, "500 Hz, cycles of 2 ms (median), 2 ms (99%), 2 ms (longest)");
+  EXPECT_EQ(found[0].text, "500 Hz, cycles of 2 ms (usual), 2 ms (99%), 2 ms (longest)");
   const auto number = [&](size_t i, const std::string& name) {
     for (const auto& [key, value] : found[i].numbers) {
       if (key == name) return value;
@@ -326,6 +328,115 @@ TEST(MachineCheck, PiecesAreNotJoined) {
   ASSERT_NE(fault, findings.end());
   EXPECT_EQ((*fault)["rows"], (std::vector<int>{6000, 6001}));
   EXPECT_EQ((*fault)["aspect"], "clock");
+}
+
+/// A log of the equations of motion from a start, with torques at joint 1.
+MachineLog Simulated(const PendulumState& start, const std::function<double(double)>& torque,
+                     double seconds) {
+  const Manipulator plant = ManipulatorOf(Plant());
+  MachineLog log;
+  PendulumState x = start;
+  for (int k = 0; k < seconds * 500; ++k) {
+    const double t = 0.002 * k;
+    log.time.push_back(t);
+    log.angle.push_back({x.q1, x.q2});
+    log.commanded.push_back({torque(t), 0});
+    const auto acceleration = [&](const PendulumState& s, double share) {
+      return plant.Acceleration(s, {torque(t + 0.002 * share), 0});
+    };
+    x = RungeKuttaStep(x, acceleration(x, 0), 0.002, acceleration);
+  }
+  return log;
+}
+
+TEST(MachineCheck, SignsByTheEquationsOfMotion) {
+  const auto push = [](double t) { return 3 * std::sin(3 * t) + 2 * std::sin(7 * t); };
+  const auto change = [&](double angle1, double angle2, double torque) {
+    MachineLog log = Simulated({}, push, 10);
+    for (Joints& q : log.angle) q = {angle1 * q[0], angle2 * q[1]};
+    for (Joints& u : log.commanded) u[0] *= torque;
+    Findings found = Check(log);
+    std::erase_if(found, [](const Finding& f) { return f.severity == Severity::kNote; });
+    return found;
+  };
+  EXPECT_TRUE(change(1, 1, 1).empty());
+  EXPECT_TRUE(change(-1, -1, -1).empty());  // the mirror image
+  ASSERT_EQ(change(1, -1, 1).size(), 1U);
+  EXPECT_EQ(AboutText(change(1, -1, 1)[0]), "angle 2");
+  EXPECT_EQ(AboutText(change(-1, 1, 1)[0]), "angle 2");
+  ASSERT_EQ(change(1, 1, -1).size(), 1U);
+  EXPECT_EQ(AboutText(change(1, 1, -1)[0]), "torque 1");
+}
+
+TEST(MachineCheck, WrappedAnglesWrongSamplesAndSlips) {
+  const auto turns = [](MachineLog& log) {
+    log.velocity.clear();
+    for (int k = 0; k < log.rows(); ++k) log.angle[k][0] = 4 * log.time[k] + std::sin(log.time[k]);
+  };
+  MachineLog smooth = GoodLog();
+  turns(smooth);
+  for (const Finding& f : Check(smooth)) EXPECT_EQ(f.severity, Severity::kNote) << f.text;
+  const Finding wrapped = OnlyFinding(
+      [&](MachineLog& log) {
+        turns(log);
+        for (Joints& q : log.angle) q[0] = std::remainder(q[0], 2 * std::numbers::pi);
+      },
+      "suspect a wrapped angle");
+  EXPECT_EQ(wrapped.joint, 1);
+  const Finding wrong = OnlyFinding(
+      [&](MachineLog& log) {
+        turns(log);
+        log.angle[3000][0] = 0;
+      },
+      "a wrong sample: 0 rad after 23.");
+  EXPECT_EQ(wrong.rows->first, 3000);
+  OnlyFinding(
+      [&](MachineLog& log) {
+        turns(log);
+        for (int k = 2000; k < log.rows(); ++k) log.angle[k][0] += 0.5;
+      },
+      "jumps by 0.5");
+}
+
+TEST(MachineCheck, RestWhereGravityMovesALink) {
+  const auto rest = [](double q1, double q2, Severity severity) {
+    MachineLog log = Simulated(
+        {}, [](double t) { return t < 1 ? 0 : 2 * std::sin(4 * t); }, 5);
+    for (Joints& q : log.angle) q = {q[0] + q1, q[1] + q2};
+    Findings found = Check(log);
+    std::erase_if(found, [](const Finding& f) { return f.severity == Severity::kNote; });
+    ASSERT_FALSE(found.empty());
+    EXPECT_NE(found[0].text.find("another zero"), std::string::npos) << found[0].text;
+    EXPECT_EQ(found[0].severity, severity);
+  };
+  rest(-std::numbers::pi / 2, 0, Severity::kFault);  // from the horizontal
+  rest(-std::numbers::pi / 2, std::numbers::pi / 2, Severity::kFault);
+  rest(std::numbers::pi, 0, Severity::kWarning);  // zero upright
+}
+
+TEST(MachineCheck, DryFrictionIsNoStuckEncoder) {
+  MachineLog log = GoodLog();
+  log.velocity.clear();
+  // Joint 2 stops at once, rests for half a second and sets off gently.
+  for (int k = 0; k < log.rows(); ++k) {
+    const double t = std::fmod(log.time[k], 2.0);
+    log.angle[k][1] = t < 1 ? 2 * t : t < 1.5 ? 2 : 2 - 8 * (t - 1.5) * (t - 1.5);
+  }
+  for (const Finding& f : Check(log)) EXPECT_EQ(f.severity, Severity::kNote) << f.text;
+}
+
+TEST(MachineCheck, WholeMillisecondsAndPushesByHand) {
+  MachineLog log = GoodLog();
+  log.velocity.clear();
+  for (int k = 0; k < log.rows(); ++k) {
+    log.time[k] = std::floor(2.5 * k) / 1000;
+    log.push.push_back({std::sin(0.01 * k), 0});
+    log.commanded[k] = {};
+    log.measured[k] = {0.02 * std::sin(1.7 * k), 0};
+  }
+  const Findings found = Check(log);
+  EXPECT_EQ(found[0].text.substr(0, 34), "400 Hz, cycles of 2.5 ms (usual), ");
+  for (const Finding& f : found) EXPECT_EQ(f.severity, Severity::kNote) << f.text;
 }
 
 TEST(MachineCheck, TheMeasuredDataHaveNoFaults) {

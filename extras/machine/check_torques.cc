@@ -39,7 +39,7 @@ Response Respond(Pieces pieces, int from, int to, int rows, double lag) {
 
 /// The responses with the best fit of each delay.
 std::vector<Response> ResponsesOf(Pieces pieces, int from, int to) {
-  const double cycle = MedianCycle(pieces);
+  const double cycle = UsualCycle(pieces);
   const int most = std::clamp(static_cast<int>(std::ceil(0.05 / std::max(cycle, 1e-4))), 3, 25);
   std::vector<Response> responses;
   for (int rows = 0; rows <= most; ++rows) {
@@ -129,6 +129,9 @@ void CheckTorque(Pieces pieces, int joint, Findings& findings) {
                              2 - joint));
     }
   }
+  const bool is_commanded = std::ranges::any_of(
+      pieces, [&](const MachineLog& piece) { return HasTorque(piece.commanded, joint); });
+  if (r < kFollows && !is_commanded) return;  // pushed by hand
   if (r < kFollows) {
     const double now = responses.front().pairs.correlation();
     if (now < -kFollows) {

@@ -51,14 +51,23 @@ int RunCheck(const MachineArguments& a) {
     throw BadInput(Concat("--figure: expected one log with it, got ", a.logs.size()));
   }
   std::vector<LogCheck> checks;
+  bool all_read = true;
   for (const std::string& file : a.logs) {
-    const std::vector<MachineLog> pieces = ReadLog(file, a.columns);
-    checks.push_back(CheckLog(file, pieces));
-    if (!a.figure.empty()) DrawCheck(checks.back(), pieces, a.figure);
+    try {
+      const std::vector<MachineLog> pieces = ReadLog(file, a.columns);
+      checks.push_back(CheckLog(file, pieces));
+      if (!a.figure.empty()) DrawCheck(checks.back(), pieces, a.figure);
+    } catch (const Error& error) {
+      if (a.logs.size() == 1) throw;
+      SayError(error.what());
+      all_read = false;
+      continue;
+    }
     if (!a.as_json) PrintCheck(checks.back());
   }
   if (a.as_json) fmt::print("{}\n", CheckJson(checks));
   if (!a.figure.empty() && !a.as_json) fmt::print("written {}\n", Printable(a.figure));
+  if (!all_read) return 2;
   return std::ranges::any_of(checks, &LogCheck::faulty) ? 1 : 0;
 }
 

@@ -95,6 +95,14 @@ class Machine(ProgramTest):
                  {"torque 1": "measured 950 times commanded: suspect measured torque in mN·m"})):
             self.assertEqual(self.faults(log(change)), expected)
 
+    def test_one_bad_file_does_not_hide_the_others(self):
+        self.write("good.csv", log())
+        self.write("bad.csv", "time,pos_meas1,pos_meas2\n0,1,x\n")
+        done = self.run_here("machine", "check", "bad.csv", "good.csv", "none.csv")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("good.csv: 2000 rows", done.stdout)
+        self.assertEqual(len(done.stderr.splitlines()), 2, done.stderr)
+
     def test_own_columns(self):
         self.write("columns.toml", """
             time = {column = "t", unit = "ms"}

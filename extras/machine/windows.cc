@@ -78,7 +78,7 @@ std::vector<LogWindow> CutWindows(std::span<const MachineLog> logs, const Window
   for (int index = 0; index < static_cast<int>(logs.size()); ++index) {
     const MachineLog& log = logs[index];
     if (log.rows() < kCubicRows) continue;
-    const double longest_gap = 5 * MedianCycle(std::span(&log, 1));
+    const double longest_gap = 5 * UsualCycle(std::span(&log, 1));
     const double end = log.time.back() - kMargin;
     for (double start = log.time.front() + kMargin; start + rules.seconds < end;
          start += rules.hop) {
