@@ -107,7 +107,8 @@ class NumberTest(ProgramTest):
             (["doc", "train"], 'got "doc"'),
             (["--help", "doc"], 'got "doc"'),
             (["--version", "x"], 'got "x"'),
-            (["eval"], "eval: expected POLICY|RUN (policy.safetensors, a run folder or a controller "
+            (["eval"], "eval: expected POLICY|RUN (policy.safetensors, a run folder, a shipped "
+                       "policy such as sac, or a controller "
                        "(energy, hybrid, lqr, mpc, pfl, tvlqr)), got none"),
             (["compare"], "compare: expected RUN|FOLDER"),
             (["study"], "study: expected FILE.toml"),

@@ -142,7 +142,7 @@ class Lqr(ProgramTest):
     def test_bad_names(self):
         for command in ("eval", "simulate", "plot", "map", "info"):
             self.refuse([command, "lqrr"], "lqrr: no such file", "did you mean lqr?")
-        self.refuse(["export", "lqr", "--page", "page"], "lqr: no such file", "not a controller")
+        self.refuse(["export", "lqr", "--page", "page"], "lqr: expected a policy.safetensors", "got a controller")
 
     def test_a_file_of_that_name(self):
         self.write("lqr", "no policy")

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <optional>
@@ -27,6 +28,7 @@ class TrainView : public TrainObserver {
   /// Shows a training, which must outlive the view, from its current step on.
   explicit TrainView(const Training& training)
       : training_(training),
+        seconds_before_(training.state().seconds),
         begin_step_(training.state().steps),
         since_step_(training.state().steps),
         since_updates_(training.agent().updates()),
@@ -56,6 +58,12 @@ class TrainView : public TrainObserver {
   void OnMetrics(const TrainState& s, const Metrics& metrics) override {
     metrics_ = metrics;
     UpdateRates(s);
+  }
+
+  void OnConfirm(const TrainState& s) override {
+    if (line_.terminal() && IsScreened(training_.config())) {
+      line_.Show(Share(s), {"success 100%, confirming in MuJoCo"});
+    }
   }
 
   void OnEvaluation(const TrainState& s, const Evaluation& e) override {
@@ -93,8 +101,8 @@ class TrainView : public TrainObserver {
     }
     if (s.solved && !training_.config().learner().HasSoftValues() &&
         ValueIsOff(value_, discounted_return_)) {
-      Say("Warning: at the last evaluation the agent expected a discounted return of {:.4g} and\n"
-          "got {:.4g}; the estimate is off by more than a quarter.\n",
+      Say("Warning: the agent expected a discounted return of {:.4g} and got {:.4g}, more than a\n"
+          "quarter off. The success above is measured and does not depend on this estimate.\n",
           value_, discounted_return_);
     }
     if (Printable(run.string()) != run.string()) return;  // such a name cannot be typed
@@ -110,6 +118,11 @@ class TrainView : public TrainObserver {
   }
 
  private:
+  /// The share of the steps that are done.
+  double Share(const TrainState& s) const {
+    return static_cast<double>(s.steps) / static_cast<double>(training_.config().train.steps);
+  }
+
   void UpdateRates(const TrainState& s) {
     const double elapsed = s.seconds - since_seconds_;
     const bool is_long = elapsed >= 0.5;
@@ -156,7 +169,7 @@ class TrainView : public TrainObserver {
       fields.push_back(fmt::format("{} updates/s", UpdatesText()));
     }
     for (const std::string& text : AgentTexts()) fields.push_back(text);
-    line_.Show(static_cast<double>(s.steps) / static_cast<double>(steps_in_all), fields);
+    line_.Show(Share(s), fields);
   }
 
   /// Prints the outcome in one sentence.
@@ -173,17 +186,26 @@ class TrainView : public TrainObserver {
           "--no-stop-when-solved it continues to step {} (--steps).\n",
           FormatCount(s.streak_step), FormatDuration(s.streak_seconds), FormatCount(config.steps));
     } else if (s.solved) {
-      Say("Solved after {} of training, at step {} (in all {}, {} steps).\n",
-          FormatDuration(s.streak_seconds), FormatCount(s.streak_step), FormatDuration(s.seconds),
-          FormatCount(s.steps));
+      Say("Solved after {} of training, at step {} (in all {} steps, {} with evaluations).\n",
+          FormatDuration(s.streak_seconds), FormatCount(s.streak_step), FormatCount(s.steps),
+          Elapsed());
     } else {
-      Say("{} at step {} after {} of training; not solved yet.\n", finished ? "Done" : "Stopped",
-          FormatCount(s.steps), FormatDuration(s.seconds));
+      Say("{} at step {} after {} of training ({} with evaluations); not solved yet.\n",
+          finished ? "Done" : "Stopped", FormatCount(s.steps), FormatDuration(s.seconds),
+          Elapsed());
     }
+  }
+
+  /// Time by the clock: of earlier sessions without their evaluations.
+  std::string Elapsed() const {
+    const std::chrono::duration<double> session = std::chrono::steady_clock::now() - begin_;
+    return FormatDuration(seconds_before_ + session.count());
   }
 
   const Training& training_;
   ProgressLine line_;
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+  double seconds_before_;                     // training time at the begin of the view
   int64_t begin_step_;                        // of the training in this view
   Metrics metrics_;                           // last reported
   double value_ = 0, discounted_return_ = 0;  // of the last evaluation

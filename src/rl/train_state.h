@@ -58,6 +58,8 @@ class TrainObserver {
   virtual void OnEpisode(const TrainState&, const FinishedEpisode&) {}
   /// Receives the agent's metrics of the last log_every steps.
   virtual void OnMetrics(const TrainState&, const Metrics&) {}
+  /// Called before Evaluator::Confirm, which may take seconds.
+  virtual void OnConfirm(const TrainState&) {}
   virtual void OnEvaluation(const TrainState&, const Evaluation&) {}
   /// Receives the best policy so far. OnEvaluation follows with its evaluation.
   virtual void OnBest(const TrainState&, const Policy&) {}

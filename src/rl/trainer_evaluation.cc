@@ -17,6 +17,7 @@ void Trainer::Evaluate(bool scheduled) {
   const EvaluationRule& rule = env_.spec().evaluation;
   std::optional<Evaluation> confirmed;
   if (e.passed && (s.solved ? s.IsBest(e, rule) : scheduled && s.streak == 1)) {
+    for (TrainObserver* observer : observers_) observer->OnConfirm(s);
     confirmed = evaluator_.Confirm(*policy, s.steps);
     if (confirmed) e = *confirmed;
   }

@@ -81,9 +81,6 @@ void CheckSettings(const PolicyArguments& settings, const std::vector<std::strin
   }
 }
 
-/// What LoadPolicy takes.
-constexpr const char* kKinds = "a policy.safetensors, a run folder, a shipped policy";
-
 }  // namespace
 
 fs::path ShippedPolicy(const fs::path& name) {
@@ -173,13 +170,14 @@ LoadedPolicy LoadPolicy(const fs::path& path) {
     }
   }
   if (!fs::exists(file)) {
+    const std::string expected = "expected a policy.safetensors, a run folder or a shipped policy";
+    if (IsController(path.string())) {
+      throw BadInput(Concat(path.string(), ": ", expected, ", got a controller"));
+    }
     std::vector<std::string> names = ShippedPolicies();
     std::ranges::copy(ControllerNames(), std::back_inserter(names));
-    throw BadInput(IsController(path.string())
-                       ? Concat(path.string(), ": expected ", kKinds, ", got a controller")
-                       : Concat(file.string(), ": no such file; expected ", kKinds,
-                                " or a controller (", Join(names, ", "), ")",
-                                DidYouMean(path.string(), names)));
+    throw BadInput(Concat(file.string(), ": no such file; ", expected, " or controller (",
+                          Join(names, ", "), ")", DidYouMean(path.string(), names)));
   }
   return ReadPolicy(LoadTensors(file, kMostPolicyBytes));
 }
