@@ -16,7 +16,8 @@ Debian 12, whose glibc is the oldest that the packages then run with.
   --out FOLDER     folder for the packages and their checksums (default build/packages)
   --allow-changes  build with uncommitted changes, too
 
-Wheels need Python 3.11 and Python 3.12 or later, with headers. Debian 12 has only Python 3.11.
+There is a wheel for Python 3.11 and one for Python 3.12 and later, each built where such a Python with
+headers is on the PATH. Debian 12 has only Python 3.11.
 
 Examples:
   ./upswing package
@@ -56,6 +57,10 @@ package() {
   [ "$(uname -m)" = x86_64 ] || bad_input "expected an x86-64 machine, got $(uname -m)"
 
   packages="$packages $deb_packages $bench_packages python3-dev"
+  # Check before a build of ten minutes.
+  # shellcheck disable=SC2086  # lists of words
+  (install_packages $packages && cd "$root" &&
+    exec python3 -B tools/package/package.py $kinds --check $changes) </dev/null || exit 2
   set_up_docs
   # shellcheck disable=SC2046  # a list of words
   set_up release upswing $(extra_programs)

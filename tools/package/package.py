@@ -17,9 +17,7 @@ import sys
 import tarfile
 from pathlib import Path
 
-import notices
-from notices import ROOT
-
+ROOT = Path(__file__).resolve().parent.parent.parent
 KINDS = ["tarball", "deb", "wheels"]
 # Shared libraries that packages need not bring: the system has them (as for manylinux), or MuJoCo's wheel.
 SYSTEM_LIBRARIES = re.compile(r"lib(c|m|dl|rt|pthread|z|stdc\+\+|gcc_s|mujoco)\.so.*|ld-linux.*")
@@ -119,6 +117,7 @@ class Packager:
 
     def make_tree(self):
         """The installed program and library with everything that packages ship."""
+        import notices  # --check runs without its packages  # pylint: disable=import-outside-toplevel
         shutil.rmtree(self.work, ignore_errors=True)
         output("cmake", "--install", self.target.build, "--strip", "--prefix", self.tree)
         add_libraries(self.target, self.programs(), self.tree / "lib/upswing")
@@ -231,7 +230,7 @@ Description: controllers that swing up and balance a double pendulum
                         ignore=shutil.ignore_patterns("mujoco"))
         for name in ("NOTICE", "sbom.cdx.json"):
             shutil.copy2(self.tree / "share/doc/upswing" / name, files / name)
-        return [self.wheel(python, files) for python in find_pythons()]
+        return [self.wheel(python, files) for python in find_pythons()[0]]
 
     def wheel(self, python, files):
         """The wheel that `python` builds, checked by auditwheel."""
@@ -271,10 +270,11 @@ Description: controllers that swing up and balance a double pendulum
 
 
 def find_pythons():
-    """Pythons with headers: 3.11, and the newest from 3.12 on, whose wheel serves all later ones."""
+    """Pythons with headers: 3.11, and the newest from 3.12 on, whose wheel serves all later ones. Also
+    returns what is missing, in words."""
     check = ("import pathlib, sysconfig, sys, ensurepip; "
              "sys.exit(not pathlib.Path(sysconfig.get_path('include'), 'Python.h').exists())")
-    found = []
+    found, missing = [], []
     for minors, what in (((11,), "3.11"), (range(20, 11, -1), "3.12 or newer")):
         for minor in minors:
             paths = [shutil.which(f"python3.{minor}", path=folder)
@@ -286,8 +286,17 @@ def find_pythons():
                 found.append(works[0])
                 break
         else:
-            raise Refused(f"expected Python {what} with its headers on the PATH, found none")
-    return found
+            missing.append(what)
+    return found, missing
+
+
+def check_wheels(kinds):
+    """Says which wheels cannot be built. Refuses if there is nothing else to build."""
+    found, missing = find_pythons()
+    for what in missing:
+        say(f"no wheel for Python {what}: expected it with its headers on the PATH, found none")
+    if not found and kinds == ["wheels"]:
+        raise Refused("wheels: expected a Python to build for, found none")
 
 
 def check_source(allow_changes):
@@ -313,17 +322,25 @@ def main():
     parser.add_argument("--page", type=Path, default=ROOT / "build/web")
     parser.add_argument("--docs", type=Path, default=ROOT / "build/docs")
     parser.add_argument("--allow-changes", action="store_true")
+    parser.add_argument("--check", action="store_true", help="only check what can be built")
     arguments = parser.parse_args()
     arguments.out, arguments.work = arguments.out.absolute(), arguments.work.absolute()
     try:
         check_source(arguments.allow_changes)
+        kinds = arguments.kinds or KINDS
+        if "wheels" in kinds:
+            check_wheels(kinds)
+        if arguments.check:
+            return
         arguments.out.mkdir(parents=True, exist_ok=True)
         packager = Packager(TARGETS[arguments.arch], arguments)
         packager.make_tree()
-        for kind in arguments.kinds or KINDS:
-            for path in getattr(packager, kind)():
-                print(f"{path}: {path.stat().st_size / 1e6:.1f} MB")
-        write_checksums(arguments.out)
+        try:
+            for kind in kinds:
+                for path in getattr(packager, kind)():
+                    print(f"{path}: {path.stat().st_size / 1e6:.1f} MB")
+        finally:
+            write_checksums(arguments.out)
         target = packager.target
         print(f"The packages need Linux on {target.machine} with glibc {packager.glibc()} and libstdc++ with "
               f"GLIBCXX_{needed_version(target, packager.elves(), 'GLIBCXX')} or newer.")

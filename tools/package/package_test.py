@@ -147,6 +147,21 @@ class PackageTest(unittest.TestCase):
         self.assertFalse((self.folder / "none").exists())
 
 
+class PythonsTest(unittest.TestCase):
+    def check(self, *kinds):
+        with tempfile.TemporaryDirectory() as folder:
+            (Path(folder) / "git").symlink_to(shutil.which("git"))
+            return call(sys.executable, "-B", FOLDER / "package.py", *kinds, "--check",
+                        "--allow-changes", env={"PATH": folder})
+
+    def test_missing_pythons_are_told_before_the_build(self):
+        done = self.check()
+        self.assertEqual((done.returncode, len(done.stderr.splitlines())), (0, 2), done.stderr)
+        self.assertIn("no wheel for Python 3.12 or newer: expected it with its headers", done.stderr)
+        self.assertEqual(self.check("tarball").stderr, "")
+        self.assertEqual(self.check("wheels").returncode, 2)
+
+
 class VersionTest(unittest.TestCase):
     def test_files_agree_with_cmake(self):
         def found(pattern, name):
