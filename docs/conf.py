@@ -12,6 +12,8 @@ import re
 import sys
 from pathlib import Path
 
+from sphinx import addnodes
+
 root = Path(os.environ["UPSWING_ROOT"])
 sys.path.insert(0, str(root / "python"))
 
@@ -28,7 +30,7 @@ myst_heading_anchors = 4
 breathe_projects = {"upswing": os.environ["UPSWING_DOXYGEN_XML"]}
 breathe_default_project = "upswing"
 breathe_show_include = False
-toc_object_entries = False  # with every C++ name in the contents, the build takes 60% longer
+toc_object_entries = False  # with names in the contents of each page, the build takes twice as long
 smartquotes = False  # an s' in a formula is no quotation
 default_role = "literal"  # docstrings have names in single backticks
 
@@ -51,3 +53,17 @@ html_show_sourcelink = False
 html_copy_source = False
 html_show_sphinx = False
 html_theme_options = {"light_logo": "icon.svg", "dark_logo": "icon.svg"}
+
+
+def setup(app):
+    app.connect("doctree-read", simplify, priority=0)  # before Sphinx collects the contents
+
+
+def simplify(app, doctree):
+    """Removes from a page of the C++ API what takes most of the build's time: names in the contents,
+    which Breathe adds in spite of `toc_object_entries`, and the search for links to `std`."""
+    for described in doctree.findall(addnodes.desc):
+        described["no-contents-entry"] = True
+    for link in list(doctree.findall(addnodes.pending_xref)):
+        if link["refdomain"] == "cpp" and link["reftarget"].split("::")[0] == "std":
+            link.replace_self(link.children)
