@@ -82,7 +82,7 @@ def run(*arguments, cwd=None, stdout=subprocess.PIPE, **more):
     done = subprocess.run([*emulator, UPSWING, *map(str, arguments)], cwd=cwd, check=False,
                           stdin=subprocess.DEVNULL, stdout=stdout,
                           stderr=subprocess.PIPE, encoding="utf-8", **more)
-    done.stderr = re.sub(r"(?m)^upswing: \d+%  \S+ episodes/s  .+ left\n", "", done.stderr)
+    done.stderr = re.sub(r"(?m)^upswing: \d+%  \S+ \w+/s  .+ left\n", "", done.stderr)
     return done
 
 
