@@ -109,7 +109,8 @@ class Packager:
         self.page, self.docs = arguments.page, arguments.docs
         self.version = project_version()
         self.epoch = int(output("git", "-C", ROOT, "log", "-1", "--format=%ct"))
-        self.environment = os.environ | {"SOURCE_DATE_EPOCH": str(self.epoch)}
+        self.environment = {"DPKG_DEB_COMPRESSOR_TYPE": "xz"} | os.environ | {
+            "SOURCE_DATE_EPOCH": str(self.epoch)}
         self.name = f"upswing-{self.version}-linux-{target.machine}"
         self.venvs = arguments.work
         self.work = arguments.work / target.machine
@@ -185,7 +186,7 @@ class Packager:
         (root / "DEBIAN/md5sums").write_text(sums, encoding="utf-8")
         normalise(root, self.epoch)
         path = self.out / f"upswing_{self.version}_{self.target.debian}.deb"
-        run("dpkg-deb", "--root-owner-group", "--threads-max=1", "-Zxz", "--build", root, path,
+        run("dpkg-deb", "--root-owner-group", "--threads-max=1", "--build", root, path,
             env=self.environment)
         return [path]
 
