@@ -60,8 +60,8 @@ def setup(app):
 
 
 def simplify(app, doctree):
-    """Removes from a page of the C++ API what takes most of the build's time: names in the contents,
-    which Breathe adds in spite of `toc_object_entries`, and the search for links to `std`."""
+    """Shortens the build. Breathe adds C++ names to the contents of a page in spite of
+    `toc_object_entries`, and Sphinx searches all names for links to `std`."""
     for described in doctree.findall(addnodes.desc):
         described["no-contents-entry"] = True
     for link in list(doctree.findall(addnodes.pending_xref)):
