@@ -129,7 +129,7 @@ def map(  # pylint: disable=redefined-builtin
     *,
     episodes: int | None = None,
     seed: int = 0,
-    physics: str = "closed-form",
+    physics: str | None = None,
     check: float = 0.02,
     plant: str | os.PathLike[str] | None = None,
     unknown_plant: bool = False,
@@ -149,7 +149,8 @@ def map(  # pylint: disable=redefined-builtin
             start: q1, q2 [°], w1, w2 [rad/s]. Defaults: mass2 and length2 within ±50%
         episodes: number of episodes per cell (default 10; 1 if the start is given)
         seed: seed of starts and noise
-        physics: "closed-form" or "mujoco"
+        physics: "closed-form" or "mujoco" (default closed-form; mujoco for a policy with its own
+            model)
         check: share of cells to repeat in MuJoCo
         plant: plant file or shipped plant, as for `evaluate`
         unknown_plant: scale observed energy and height by the training's plant, not the cell's
@@ -161,7 +162,9 @@ def map(  # pylint: disable=redefined-builtin
 
     >>> result = upswing.map("runs/d3qn-seed1", x="q1=-180:180:73", y="q2=-180:180:73")
     """
-    arguments = {"seed": seed, "threads": threads, "physics": physics, "check": check}
+    arguments = {"seed": seed, "threads": threads, "check": check}
+    if physics is not None:
+        arguments["physics"] = physics
     if episodes is not None:
         arguments["episodes"] = episodes
     figures, successes, swing_up_seconds = _upswing.map(

@@ -14,8 +14,10 @@ void DescribeThreads(Options& o, int64_t* threads) {
 }
 
 void DescribePhysics(Options& o, std::string* physics) {
-  o.AddChoice(physics, "physics", EngineNames(),
-              "physics engine; closed-form is faster than mujoco, with the same physics");
+  Option& option =
+      o.AddChoice(physics, "physics", EngineNames(),
+                  "physics engine; closed-form is faster than mujoco, with the same physics");
+  if (physics->empty()) option.usual = "closed-form; mujoco for a policy with its own model";
 }
 
 void DescribeEvalEpisodes(Options& o, int64_t* episodes) {

@@ -251,8 +251,9 @@ class MapTest(ProgramTest):
         self.write("model.xml", MODEL)
         self.succeed(*small(model="model.xml", out="run", steps=2000))
         grid = ("--x", "mass2=0.9:1.1:2", "--y", "gravity=9:10:2", "--episodes", 1)
-        self.refuse(["map", "run", *grid, "--out", "map"], "closed-form", "another MJCF model")
-        self.succeed("map", "run", *grid, "--physics", "mujoco", "--out", "map")
+        self.refuse(["map", "run", *grid, "--out", "map", "--physics", "closed-form"],
+                    "closed-form", "another MJCF model")
+        self.assertIn("physics mujoco", self.succeed("map", "run", *grid, "--out", "map"))
 
 
 if __name__ == "__main__":

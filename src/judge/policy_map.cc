@@ -94,6 +94,7 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
   MapConfig config;
   TrialArguments trial = a.trial;
   trial.set.clear();  // `set` changes config.point, not the environments
+  if (trial.physics.empty()) trial.physics = (loaded.mjcf.empty() ? kClosedForm : kMuJoCo).name;
   config.env = TrialEnvironments(trial, &loaded);
   config.point.plant = config.env.plants.front();
   config.point.disturbance = config.env.disturbance(0);

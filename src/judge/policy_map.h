@@ -18,7 +18,8 @@ struct MapArguments {
   int64_t episodes = 0;  // per cell; 0: the usual number
   double check = 0.02;   // share of the cells to repeat in MuJoCo
 
-  MapArguments() { trial.physics = kClosedForm.name; }
+  /// No physics: the closed form, or MuJoCo for a policy that has its own model.
+  MapArguments() { trial.physics.clear(); }
 
   /// Declares the numeric settings in `options`: name, range, unit, help.
   void Describe(Options& options);
