@@ -107,7 +107,7 @@ MuJoCoPhysics::MuJoCoPhysics(const PhysicsConfig& config)
   // Compile the model with the common plant, or with the first of several.
   const ModelPtr model = config_.mjcf.empty()
                              ? CompileModel(Mjcf(Superset(config_.plants)), "model")
-                             : LoadModel(config_.mjcf, "model");
+                             : LoadModel(config_.mjcf, "model").model;
   WritePlant(config_.plant(0), FieldsOf(*model, config_.mjcf.empty()));
   rotors_ = HasRotors(*model);
   dry_friction_ = HasDryFriction(*model);

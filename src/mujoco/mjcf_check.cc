@@ -27,50 +27,63 @@ struct Element {
 /// Attributes that hold a name. Other attributes hold numbers and kKeywords; MuJoCo checks which
 /// ones and how many.
 constexpr std::string_view kNames =
-    "name class childclass model joint actuator body1 body2 target eulerseq";
+    "name class childclass model joint jointinparent body1 body2 material eulerseq meshdir "
+    "texturedir "
+    "assetdir memory nstack njmax nconmax nkey";
 constexpr std::string_view kKeywords =
     "false true auto enable disable degree radian local Euler RK4 implicit implicitfast PGS CG "
     "Newton dense sparse pyramidal elliptic hinge slide ball free capsule sphere ellipsoid "
-    "cylinder box plane fixed track trackcom targetbody targetbodycom spot directional point";
+    "cylinder box plane none fixed affine";
 
-/// The elements that a model may contain.
+/// The elements that a model may contain. "*": anything, because it is not compiled.
 std::vector<Element> MakeElements() {
   const std::string named = "name class ", place = "pos quat axisangle xyaxes zaxis euler ",
-                    shape = named + place + "type size fromto rgba group ";
-  return {
-      {"mujoco", "model", "compiler option default worldbody actuator sensor contact keyframe"},
-      {"compiler", "angle autolimits coordinate inertiafromgeom eulerseq"},
+                    in_body = "body frame geom light camera site ";
+  const std::string motor = named +
+                            "group joint jointinparent gear ctrllimited ctrlrange "
+                            "forcelimited forcerange ";
+  std::vector<Element> elements{
+      {"mujoco", "model",
+       "compiler option size default worldbody actuator contact asset visual statistic custom "
+       "sensor keyframe"},
+      {"compiler",
+       "angle autolimits coordinate eulerseq inertiafromgeom inertiagrouprange balanceinertia "
+       "boundmass boundinertia settotalmass discardvisual fusestatic alignfree saveinertial "
+       "usethread convexhull fitaabb strippath meshdir texturedir assetdir"},
       {"option",
-       "timestep gravity integrator iterations ls_iterations tolerance ls_tolerance solver "
-       "jacobian cone density viscosity",
+       "timestep gravity wind magnetic density viscosity integrator solver iterations tolerance "
+       "ls_iterations ls_tolerance noslip_iterations noslip_tolerance ccd_iterations ccd_tolerance "
+       "jacobian cone impratio",
        "flag"},
-      // The flags that switch off gravity, springs, damping, the motor or its limit are left out.
       {"flag",
        "contact constraint equality frictionloss limit warmstart eulerdamp refsafe midphase "
-       "nativeccd island energy sensor"},
-      {"default", "class", "default joint geom site motor"},
-      {"worldbody", "", "body light camera site"},
-      {"body", "name childclass " + place, "joint geom body inertial light camera site"},
+       "nativeccd island energy sensor filterparent gravity spring damper actuation clampctrl "
+       "fwdinv invdiscrete multiccd autoreset"},
+      {"size", "memory nstack njmax nconmax nkey"},
+      {"default", "class", "default joint geom site camera light material motor general"},
+      {"worldbody", "", in_body},
+      {"frame", "name childclass " + place, in_body},
+      {"body", "name childclass gravcomp " + place, in_body + "joint inertial"},
       {"inertial", "mass diaginertia fullinertia " + place},
-      {"joint", named +
-                    "type axis pos ref springref stiffness damping armature frictionloss limited "
-                    "range solreflimit solimplimit solreffriction solimpfriction margin group"},
-      {"geom", shape + "mass density contype conaffinity condim friction margin solref solimp"},
-      {"site", shape},
-      {"camera", named + place + "mode target fovy"},
-      {"light", named + "mode target type directional castshadow active pos dir diffuse ambient "
-                        "specular attenuation cutoff exponent"},
-      {"actuator", "", "motor"},
-      {"motor", named + "joint gear ctrllimited ctrlrange group"},
-      {"sensor", "", "jointpos jointvel actuatorfrc"},
-      {"jointpos", "name joint"},
-      {"jointvel", "name joint"},
-      {"actuatorfrc", "name actuator"},
+      {"joint", named + "group type axis pos ref springref stiffness springdamper damping armature "
+                        "frictionloss limited range margin solreflimit solimplimit solreffriction "
+                        "solimpfriction actuatorfrclimited actuatorfrcrange"},
+      {"geom",
+       named + place +
+           "group type size fromto rgba material mass density shellinertia contype "
+           "conaffinity condim priority friction solmix solref solimp margin gap fluidshape "
+           "fluidcoef"},
+      {"actuator", "", "motor general"},
+      {"motor", motor},
+      {"general", motor + "dyntype gaintype biastype dynprm gainprm biasprm"},
       {"contact", "", "exclude"},
       {"exclude", "name body1 body2"},
-      {"keyframe", "", "key"},
-      {"key", "name time qpos qvel ctrl"},
-  };
+      {"asset", "", "texture material"}};
+  for (const char* name : {"visual", "statistic", "custom", "sensor", "keyframe", "texture",
+                           "material", "light", "camera", "site"}) {
+    elements.push_back({name, "*", "*"});
+  }
+  return elements;
 }
 
 /// The words of `text`, separated by whitespace.
@@ -104,7 +117,11 @@ class Checker {
       Refuse(document.ErrorLineNum(), Concat("not well-formed XML: ", ErrorText(document)));
     }
     for (const auto* node = document.FirstChild(); node != nullptr; node = node->NextSibling()) {
-      if (node->ToDeclaration() == nullptr) CheckNode(*node, nullptr, 1);
+      if (node->ToDeclaration() != nullptr) continue;
+      if (count_ > 0 && node->ToElement() != nullptr) {
+        Refuse(node->GetLineNum(), Concat("expected one <mujoco>, got ", Quoted(node->Value())));
+      }
+      CheckNode(*node, nullptr, 1);
     }
     if (count_ == 0) Refuse(1, "expected <mujoco>, got an empty XML document");
   }
@@ -138,9 +155,11 @@ class Checker {
       Refuse(line, Concat("expected at most ", kMostElements, " elements, nested at most ",
                           kMostLevels, " deep"));
     }
-    const Element& known = Find(*element, parent);
+    const bool ignored = parent != nullptr && parent->children == "*";
+    if (ignored && element->Name() == std::string_view("include")) Find(*element, nullptr);
+    const Element& known = ignored ? *parent : Find(*element, parent);
     for (const auto* a = element->FirstAttribute(); a != nullptr; a = a->Next()) {
-      CheckAttribute(*a, known);
+      if (known.attributes != "*") CheckAttribute(*a, known);
     }
     for (const auto* child = node.FirstChild(); child != nullptr; child = child->NextSibling()) {
       CheckNode(*child, &known, level + 1);
@@ -149,6 +168,10 @@ class Checker {
 
   const Element& Find(const tinyxml2::XMLElement& element, const Element* parent) const {
     const std::string name = element.Name();
+    if (name == "include") {
+      Refuse(element.GetLineNum(),
+             "expected one file without <include>; MuJoCo's mj_saveLastXML writes one");
+    }
     const std::vector<std::string> expected = Words(parent ? parent->children : "mujoco");
     if (std::ranges::find(expected, name) == expected.end()) {
       const std::string place = parent ? Concat(" in <", parent->name, ">") : "";

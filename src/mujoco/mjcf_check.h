@@ -12,14 +12,12 @@ inline constexpr size_t kMostMjcfBytes = 65536;
 
 /// Throws BadInput, with `where` (a file's name) and the line, unless `mjcf` is a safe model. It
 /// must be well-formed XML in UTF-8 of at most kMostMjcfBytes. It may contain only the elements and
-/// attributes that describe a double pendulum: links, joints, a motor, options of the simulation,
-/// and harmless extras (lights, cameras, sites, sensors of joints, key frames). Each number must be
-/// finite and within 1e6.
+/// attributes of bodies, joints, geoms, a motor and options of the simulation, each number finite
+/// and within 1e6, and anything that CompileModel leaves out.
 ///
-/// Refused are attributes that read files, repeat elements or set a size. Also refused are
-/// attributes that change the motion in ways that the plant's parameters do not describe (wind,
-/// gravity compensation, limits of forces). MuJoCo then checks the values, and LoadModel checks
-/// that the model is a double pendulum.
+/// Refused are attributes that read files, repeat elements or set a size, delays, and sleep or
+/// disabled groups, which LoadModel cannot see. MuJoCo then checks the values,
+/// and LoadModel checks that the model moves as a double pendulum.
 void CheckMjcf(const std::string& mjcf, const std::string& where);
 
 }  // namespace upswing

@@ -3,6 +3,7 @@
 #include <mujoco/mjbatch.h>
 #include <mujoco/mujoco.h>
 
+#include <array>
 #include <memory>
 #include <string>
 #include <vector>
@@ -26,25 +27,42 @@ using BatchPtr = std::unique_ptr<mjBatch, MuJoCoDeleter>;
 std::string MuJoCoVersion();
 
 /// Compiles MJCF. Throws BadInput with `where` (a file's name) and MuJoCo's own message.
-ModelPtr CompileModel(const std::string& mjcf, const std::string& where);
+/// `only_motion`: leaves out elements without an effect on the motion, such as textures, cameras,
+/// sensors and key frames.
+ModelPtr CompileModel(const std::string& mjcf, const std::string& where, bool only_motion = false);
 
-/// Compiles untrusted MJCF after CheckMjcf. Throws BadInput unless the model has the structure of
-/// the built-in one:
-/// - two capsules hanging on hinges about +y, whose mass may have its own distribution (`inertial`)
-///   with the centre on the link's axis
+/// How an angle of the program (rad, from hanging) follows from the angle of a joint in a file:
+/// q = sign · joint + offset.
+struct JointAngle {
+  std::string joint;  // its name in the file
+  double sign = 1, offset = 0;
+
+  double Of(double joint_angle) const { return sign * joint_angle + offset; }
+  double Back(double q) const { return sign * (q - offset); }
+};
+
+/// The built-in model with the numbers of a file, and the angles of the file's joints.
+struct LoadedModel {
+  ModelPtr model;
+  std::array<JointAngle, 2> angles;
+};
+
+/// Compiles untrusted MJCF after CheckMjcf, and translates it into the built-in model. Both then
+/// move alike: they are compared at random states. The file may have any base, shapes, hinge axes,
+/// joint angles, gear and extras. Throws BadInput, with the cause, unless the file has
+/// - two links on two parallel hinges, across which gravity acts
+/// - the centre of mass of link 1 on the line from its hinge to the second one
 /// - a motor at one hinge, with the same limit both ways
-/// - gravity along -z
+/// - no contact within reach of the links
 /// - springs at rest when hanging, and joint limits that are the same both ways
 /// - a timestep that divides the control period
 /// - a plant within the ranges of its settings
-///
-/// Armature, friction, stiffness, the capsules' radius and the integrator may differ.
-ModelPtr LoadModel(const std::string& mjcf, const std::string& where);
+LoadedModel LoadModel(const std::string& mjcf, const std::string& where);
 
 /// Differences of a loaded model from the built-in one that affect the motion, without the plant's
 /// parameters; such as "armature1 0.02 kg·m²". A limit or friction that a flag of the model
-/// switches off is one of them, and says so.
-std::vector<std::string> DifferencesFromBuiltIn(const mjModel& model);
+/// switches off is one of them, and says so. Also angles that the file counts in another way.
+std::vector<std::string> DifferencesFromBuiltIn(const LoadedModel& loaded);
 
 /// The plant that a loaded model describes. It has own centres of mass and inertias where the links
 /// are not solid capsules. It has no rotors, no dry friction and the default armature, which only

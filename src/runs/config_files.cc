@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 ModelFile ReadModel(const std::string& path) {
   ModelFile model{path, ReadOwnFile(path, kMostMjcfBytes), {}};
-  model.plant = PlantOf(*LoadModel(model.mjcf, path));
+  model.plant = PlantOf(*LoadModel(model.mjcf, path).model);
   return model;
 }
 

@@ -26,8 +26,8 @@ nlohmann::ordered_json ModelInfo::Json() const {
 
 std::optional<ModelInfo> InfoOfModel(const std::string& mjcf, const std::string& file) {
   if (mjcf.empty()) return std::nullopt;
-  const ModelPtr model = LoadModel(mjcf, file.empty() ? "model" : file);
-  return ModelInfo{file, ModelContent(mjcf), DifferencesFromBuiltIn(*model)};
+  const LoadedModel model = LoadModel(mjcf, file.empty() ? "model" : file);
+  return ModelInfo{file, ModelContent(mjcf), DifferencesFromBuiltIn(model)};
 }
 
 std::string WithModel(const std::string& title, const std::optional<ModelInfo>& model) {
