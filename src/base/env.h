@@ -83,6 +83,9 @@ class VectorEnv {
 
   /// Saves or loads the whole state of the environments.
   virtual void State(const Archive& archive) = 0;
+  /// After State has loaded: the last observations (N × D) of the saved episodes, if the
+  /// environments cannot continue them and began new ones; else empty.
+  virtual Matrix<const float> broken_off() const { return {}; }
 
   StepResult MakeResult() const { return StepResult(spec()); }
 };

@@ -44,6 +44,10 @@ class Agent {
   /// its values.
   virtual std::unique_ptr<NetworkPolicy> ExportPolicy(PolicyInfo info) const = 0;
 
+  /// Ends all running episodes by a truncation at the observations (N × D) that followed the last
+  /// Act.
+  virtual void Truncate(Matrix<const float> obs) = 0;
+
   /// Saves or loads the whole state of the agent.
   virtual void State(const Archive& archive) = 0;
 };

@@ -28,6 +28,15 @@ void NStep::Push(int env, const Transition& step, bool done, Replay& replay) {
   std::ranges::copy(step.action,
                     waiting_action.begin() + static_cast<ptrdiff_t>(last * action_size_));
   waiting_reward[last] = step.reward;
+  Complete(env, step.next_obs, step.discount == 0, done, replay);
+}
+
+void NStep::Complete(int env, std::span<const float> next_obs, bool terminal, bool done,
+                     Replay& replay) {
+  const auto e = static_cast<size_t>(env);
+  const auto waiting_obs = std::span(obs_).subspan(e * n_ * obs_size_, n_ * obs_size_);
+  const auto waiting_action = std::span(action_).subspan(e * n_ * action_size_, n_ * action_size_);
+  const auto waiting_reward = std::span(reward_).subspan(e * n_, n_);
 
   // A full window adds its oldest step. The end of an episode adds all waiting steps.
   auto k = static_cast<size_t>(count_[e]);
@@ -35,8 +44,8 @@ void NStep::Push(int env, const Transition& step, bool done, Replay& replay) {
   for (; k == n_ || (done && k > 0); --k, ++first) {
     double sum = 0;
     for (size_t i = k; i-- > 0;) sum = waiting_reward[first + i] + gamma_ * sum;
-    const double discount = step.discount == 0 ? 0.0 : std::pow(gamma_, static_cast<double>(k));
-    replay.Add({waiting_obs.subspan(first * obs_size_, obs_size_), step.next_obs,
+    const double discount = terminal ? 0.0 : std::pow(gamma_, static_cast<double>(k));
+    replay.Add({waiting_obs.subspan(first * obs_size_, obs_size_), next_obs,
                 waiting_action.subspan(first * action_size_, action_size_), sum, discount});
   }
 

@@ -18,6 +18,11 @@ class NStep {
   /// transition that is now complete to `replay`. `done` ends the episode.
   void Push(int env, const Transition& step, bool done, Replay& replay);
 
+  /// Ends the episode of environment `env` by a truncation at `next_obs` (D).
+  void Truncate(int env, std::span<const float> next_obs, Replay& replay) {
+    Complete(env, next_obs, false, true, replay);
+  }
+
   /// Number of steps, over all environments, that are not yet part of a transition.
   int64_t waiting() const;
 
@@ -25,6 +30,9 @@ class NStep {
   void State(const Archive& archive);
 
  private:
+  /// Adds every complete transition of the waiting steps to `replay`; with `done` all of them.
+  void Complete(int env, std::span<const float> next_obs, bool terminal, bool done, Replay& replay);
+
   size_t n_, obs_size_, action_size_;
   double gamma_;
   ActionSpace actions_;

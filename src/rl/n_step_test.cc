@@ -65,6 +65,23 @@ TEST(NStep, ATerminationBootstrapsFromNothing) {
   EXPECT_EQ(out, (std::vector<Emitted>{{0, 2, 0, 2, 0}, {1, 2, 1, 2, 0}}));
 }
 
+TEST(NStep, ALateTruncationEqualsOneAtTheLastStep) {
+  NStep late(1, 3, 0.5, 1, kNine), at_once(1, 3, 0.5, 1, kNine);
+  std::vector<Emitted> out;
+  for (int i = 0; i < 2; ++i) PushStep(late, 0, i, false, false, out);
+  const float next = 2;
+  Replay replay(10, 1, kNine);
+  late.Truncate(0, std::span(&next, 1), replay);
+  for (int64_t k = 0; k < replay.size(); ++k) {
+    const Transition t = replay.at(k);
+    out.push_back({t.obs[0], t.next_obs[0], t.action[0], t.reward, t.discount});
+  }
+  std::vector<Emitted> expected;
+  for (int i = 0; i < 2; ++i) PushStep(at_once, 0, i, false, i == 1, expected);
+  EXPECT_EQ(out, expected);
+  EXPECT_EQ(late.waiting(), 0);
+}
+
 TEST(NStep, EpisodesAndEnvironmentsDoNotMix) {
   NStep n_step(2, 2, 0.5, 1, kNine);
   std::vector<Emitted> out;

@@ -51,6 +51,10 @@ void OffPolicyAgent::Store(int env, const Transition& step, bool done) {
   if (done) ++episodes_;
 }
 
+void OffPolicyAgent::Truncate(Matrix<const float> obs) {
+  for (int env = 0; env < obs.rows(); ++env) n_step_.Truncate(env, obs.row(env), replay_);
+}
+
 int64_t OffPolicyAgent::updates_due() const {
   const int64_t learning_steps = steps_ - settings_.learning_starts;
   if (learning_steps <= 0 || replay_.size() == 0) return 0;

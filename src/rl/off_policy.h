@@ -20,6 +20,7 @@ class OffPolicyAgent : public Agent {
  public:
   int64_t steps() const override { return steps_; }
   int64_t updates() const override { return updates_; }
+  void Truncate(Matrix<const float> obs) override;
 
   const Replay& replay() const { return replay_; }
   double learning_rate() const;

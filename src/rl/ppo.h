@@ -40,6 +40,7 @@ class Ppo : public Agent {
   void State(const Archive& archive) override;
 
   int64_t steps() const override { return steps_; }
+  void Truncate(Matrix<const float> /*obs*/) override { rollout_.Truncate(); }
   int64_t updates() const override { return updates_; }
   /// Learning rate of the actor: the scheduled rate times the factor of the KL target.
   double learning_rate() const { return scheduled_rate() * rate_factor_; }

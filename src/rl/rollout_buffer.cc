@@ -33,6 +33,13 @@ void RolloutBuffer::Add(const StepResult& result, double reward_scale) {
   ++filled_;
 }
 
+void RolloutBuffer::Truncate() {
+  const auto rows = static_cast<size_t>(filled_ * num_envs_);
+  for (size_t i = rows - std::min<size_t>(rows, num_envs_); i < rows; ++i) {
+    truncated_[i] = terminated_[i] == 0 ? 1 : 0;
+  }
+}
+
 void RolloutBuffer::State(const Archive& archive, Bounds<float> action_bounds, bool whole) {
   archive.Scalar("filled", filled_, {0, steps_ - 1});
   const auto rows = static_cast<size_t>(filled_ * num_envs_);

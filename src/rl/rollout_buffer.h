@@ -32,6 +32,9 @@ class RolloutBuffer {
   /// Adds the result of the step. Multiplies rewards by `reward_scale`.
   void Add(const StepResult& result, double reward_scale);
 
+  /// Marks the last step of each environment as truncated, unless it terminated.
+  void Truncate();
+
   // The whole rollout, once it is full.
   Matrix<const float> all_obs() const { return All(obs_, obs_size_); }  // (T·N × D)
   /// (T·N × D) true successors

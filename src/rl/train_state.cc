@@ -53,6 +53,12 @@ std::optional<FinishedEpisode> TrainState::AddStep(const StepResult& result, siz
   return episode;
 }
 
+void TrainState::DropEpisodes() {
+  std::ranges::fill(episode_return, 0);
+  std::ranges::fill(episode_terms, 0);
+  std::ranges::fill(episode_length, 0);
+}
+
 bool TrainState::IsBest(const Evaluation& e, const EvaluationRule& rule) const {
   return best_step == 0 || rule.Score(e.success_rate(), e.reward_sum.mean) >
                                rule.Score(best_success_rate, best_return);
@@ -95,6 +101,10 @@ void Trainer::State(const Archive& archive) {
   state_.State(archive.In("train"));
   archive.Check(agent_.steps() == state_.steps, "agent/steps",
                 Concat(state_.steps, ", the steps of the training"));
+  const Matrix<const float> broken_off = env_.broken_off();
+  if (!archive.loading() || broken_off.rows() == 0) return;
+  agent_.Truncate(broken_off);
+  state_.DropEpisodes();
 }
 
 }  // namespace upswing

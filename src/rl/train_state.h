@@ -44,6 +44,8 @@ struct TrainState {
   /// Adds the step of environment `env` to its running episode. Returns the episode if it has
   /// ended.
   std::optional<FinishedEpisode> AddStep(const StepResult& result, size_t env);
+  /// Forgets the running episodes.
+  void DropEpisodes();
   /// Whether the policy of this evaluation is better than the best so far, by the task's rule.
   bool IsBest(const Evaluation& e, const EvaluationRule& rule) const;
   /// Counts passed evaluations in a row. Two of them solve the task.

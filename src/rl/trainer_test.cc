@@ -2,9 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <functional>
+
 #include "base/error.h"
 #include "base/safetensors.h"
 #include "rl/dqn.h"
+#include "rl/ppo.h"
 #include "rl/toy_env.h"
 
 namespace upswing {
@@ -190,6 +194,57 @@ TEST_F(TrainerTest, StoppedAndResumedEqualsNeverStopped) {
   for (const auto& [name, tensor] : a.all()) {
     if (name == "train/seconds" || name == "train/streak_seconds") continue;
     EXPECT_TRUE(std::ranges::equal(tensor.bytes, b.all().at(name).bytes)) << name;
+  }
+}
+
+/// A toy environment that cannot continue saved episodes.
+class Forgetful : public ToyEnv {
+ public:
+  using ToyEnv::ToyEnv;
+  Matrix<const float> broken_off() const override {
+    return {last_.data(), static_cast<int>(last_.size()), 1};
+  }
+  void State(const Archive& archive) override {
+    ToyEnv::State(archive);
+    if (archive.loading()) last_.assign(obs().data(), obs().data() + num_envs());
+  }
+
+ private:
+  std::vector<float> last_;
+};
+
+TEST_F(TrainerTest, EpisodesThatAnEnvironmentCannotContinueAreTruncated) {
+  ThreadPool pool(1);
+  dqn_.n_step = 3;
+  PpoConfig ppo;
+  ppo.hidden = {8};
+  ppo.horizon = 16;
+  ppo.batch = 8;
+  const EnvSpec spec = ToyEnv::Spec(4);
+  const std::vector<std::function<std::unique_ptr<Agent>()>> agents{
+      [&] { return std::make_unique<Dqn>(dqn_, spec, 1, pool); },
+      [&] { return std::make_unique<Ppo>(ppo, spec, 1, pool); }};
+  for (const auto& make : agents) {
+    Forgetful env(4), again(4);
+    const auto agent = make(), resumed = make();
+    Trainer trainer(config_, *agent, env, *this), other(config_, *resumed, again, *this);
+    while (trainer.state().steps < 100) trainer.Step();  // episodes and rollout are unfinished
+    Tensors saved;
+    trainer.State(Archive::Saver(saved));
+    other.State(Archive::Loader(saved));
+    EXPECT_EQ(other.state().episode_length, std::vector<int64_t>(4, 0));
+    EXPECT_EQ(other.state().episode_return, std::vector<double>(4, 0));
+    Tensors after;
+    other.State(Archive::Saver(after));
+    if (&make == &agents.front()) {
+      const auto& waiting = after.all().at("agent/n_step/count").bytes;
+      EXPECT_TRUE(std::ranges::all_of(waiting, [](std::byte b) { return b == std::byte{0}; }));
+    } else {
+      const auto& truncated = after.all().at("agent/rollout/truncated").bytes;
+      EXPECT_EQ(std::ranges::count(truncated.last(4), std::byte{1}), 4);
+    }
+    while (other.state().steps < 200) other.Step();
+    EXPECT_EQ(other.state().steps, 200);
   }
 }
 
