@@ -267,6 +267,9 @@ std::string ShellQuoted(std::string_view text) {
 std::string DidYouMean(std::string_view word, const std::vector<std::string>& names) {
   constexpr size_t kLongest = 64;  // bytes; no name is longer, and distances take long
   if (word.size() > kLongest) return "";
+  std::string lower(word);
+  for (char& c : lower) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  word = lower;
   const auto nearest =
       std::min_element(names.begin(), names.end(), [&](const std::string& a, const std::string& b) {
         const size_t to_a = EditDistance(word, a), to_b = EditDistance(word, b);

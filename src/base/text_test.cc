@@ -62,6 +62,7 @@ TEST(Text, SplitTrimsAndKeepsEmptyPieces) {
 TEST(Text, SuggestsTheNearestNameOnlyIfItIsNear) {
   const std::vector<std::string> names{"gamma", "batch", "eval_every"};
   EXPECT_EQ(DidYouMean("gama", names), " (did you mean gamma?)");
+  EXPECT_EQ(DidYouMean("PPO", {"sac", "ppo"}), " (did you mean ppo?)");
   EXPECT_EQ(DidYouMean("mas2", {"mass", "mass1", "mass2"}), " (did you mean mass2?)");
   EXPECT_EQ(DidYouMean("eval-evry", names), " (did you mean eval_every?)");
   EXPECT_EQ(DidYouMean("--lr", {"--layers", "--learning-rate"}),
