@@ -4,6 +4,7 @@
 Run by the build with the extension module's folder on the PYTHONPATH.
 """
 
+import keyword
 import sys
 from pathlib import Path
 
@@ -27,7 +28,7 @@ def python_type(option):
     if option["choices"]:
         return f"Literal[{', '.join(map(repr, option['choices']))}]"
     if option["name"] in ("model", "plant"):
-        return "Union[str, os.PathLike[str]]"
+        return "Union[str, bytes, os.PathLike[str], os.PathLike[bytes]]"
     return PYTHON_TYPES[option["type"]]
 
 
@@ -41,6 +42,7 @@ def about(option):
 
 def typed_dict(name, what, options, aliases):
     """The lines of one class."""
+    options = [option for option in options if not keyword.iskeyword(option["name"])]
     known = {option["name"]: option for option in options}
     lines = ["", "", f"class {name}(TypedDict, total=False):", f'    """{what}"""', ""]
     for option in options:

@@ -10,16 +10,43 @@
 #include <memory>
 #include <mutex>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include "agents/loaded_policy.h"
+#include "base/error.h"
 #include "judge/trial.h"
 
 /// Shared parts of the extension module. Only the package's Python code (python/upswing) uses its
 /// classes and functions.
+/// Texts are bytes in UTF-8. Others, such as names of files, are str with surrogates in Python, as
+/// os.fsdecode makes them.
+template <>
+struct nanobind::detail::type_caster<std::string> {
+  NB_TYPE_CASTER(std::string, const_name("str"))
+
+  bool from_python(handle source, uint8_t /*flags*/, cleanup_list* /*list*/) noexcept {
+    if (!PyUnicode_Check(source.ptr())) return false;
+    // A lone surrogate that stands for no byte becomes an escape sequence.
+    PyObject* bytes = nullptr;
+    for (const char* errors : {"surrogateescape", "backslashreplace"}) {
+      if (bytes == nullptr) bytes = PyUnicode_AsEncodedString(source.ptr(), "utf-8", errors);
+      if (bytes == nullptr) PyErr_Clear();
+    }
+    if (bytes == nullptr) return false;
+    value.assign(PyBytes_AsString(bytes), static_cast<size_t>(PyBytes_Size(bytes)));
+    Py_DECREF(bytes);
+    return true;
+  }
+  static handle from_cpp(const std::string& text, rv_policy, cleanup_list* /*list*/) noexcept {
+    return PyUnicode_DecodeUTF8(text.data(), static_cast<Py_ssize_t>(text.size()),
+                                "surrogateescape");
+  }
+};
+
 namespace upswing {
 
 /// Settings from Python: name and text of each.
@@ -91,6 +118,9 @@ LoadedPolicy MakeFunctionPolicy(nanobind::callable function, int memory);
 /// A maker of environments that Python makes and steps, by a function in Python (CallbackEnv). The
 /// function must outlive the maker and its environments. None: an empty maker.
 ForeignMaker MakerOf(const nanobind::object& make);
+
+/// The error of one of the package's own exceptions: upswing.InputError or upswing.Failure.
+std::optional<Error> OwnError(const nanobind::python_error& error);
 
 /// Throws the Python exception of a pending signal, such as Ctrl-C. Needs the interpreter's lock.
 void CheckSignals();

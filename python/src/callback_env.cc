@@ -1,13 +1,14 @@
 // Environments that Python makes and steps, such as Gymnasium's.
-#include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "base/error.h"
 #include "base/rng.h"
+#include "base/steps.h"
 #include "base/text.h"
 #include "python/src/bindings.h"
 
@@ -24,17 +25,16 @@ std::span<T> ValuesOf(const Array<T>& array) {
   return {array.data(), array.size()};
 }
 
-/// Runs `call`, which needs the interpreter's lock. An exception of Python becomes an error with
-/// its message: upswing.InputError, the only ValueError that arrives here, BadInput, others a
-/// Failure. KeyboardInterrupt and the like pass through.
+/// Runs `call`, which needs the interpreter's lock. The package's own exceptions become errors, to
+/// which a run adds its step and checkpoint. Exceptions of the user's environment pass unchanged.
 template <typename Call>
 auto CallPython(const Call& call) -> decltype(call()) {
   try {
     return call();
   } catch (const nb::python_error& error) {
-    if (!error.matches(PyExc_Exception)) throw;
-    const std::string message = Printable(nb::cast<std::string>(nb::str(error.value())));
-    throw error.matches(PyExc_ValueError) ? BadInput(message) : Failure(message);
+    const std::optional<Error> own = OwnError(error);
+    if (!own) throw;
+    throw *own;
   }
 }
 
@@ -42,22 +42,20 @@ auto CallPython(const Call& call) -> decltype(call()) {
 /// object: it reads the actions (N × A) and writes the other arrays. Letters as in base/env.h.
 class CallbackEnv final : public VectorEnv {
  public:
-  /// `make` is the function make(seeds, for_evaluation, arrays) in Python, which resets the
-  /// environments and returns the function that steps them. Needs the interpreter's lock.
+  /// `make` is the function make(for_evaluation, count, arrays) in Python, which returns an object
+  /// with the methods begin(seeds) and step(). Needs the interpreter's lock.
   CallbackEnv(const nb::object& make, const EnvConfig& config)
       : spec_(SpecOf(config)),
+        seed_(config.seed),
+        first_index_(config.first_index),
+        stream_(config.stream),
         action_(NewArray<double>({rows(), static_cast<size_t>(spec_.action_size())})),
-        obs_(NewArray<float>({rows(), static_cast<size_t>(spec_.obs_size)})),
-        next_obs_(NewArray<float>({rows(), static_cast<size_t>(spec_.obs_size)})),
+        obs_(NewArray<double>({rows(), static_cast<size_t>(spec_.obs_size)})),
+        next_obs_(NewArray<double>({rows(), static_cast<size_t>(spec_.obs_size)})),
         reward_(NewArray<double>({rows()})),
         terminated_(NewArray<uint8_t>({rows()})),
-        truncated_(NewArray<uint8_t>({rows()})) {
-    std::vector<int64_t> seeds;
-    for (size_t i = 0; i < rows(); ++i) {
-      constexpr uint64_t kSeeds = uint64_t{1} << 31;
-      Rng rng(config.seed, config.stream, config.first_index + i);
-      seeds.push_back(static_cast<int64_t>(rng.Below(kSeeds)));
-    }
+        truncated_(NewArray<uint8_t>({rows()})),
+        float_obs_(obs_.size()) {
     nb::dict arrays;
     arrays["action"] = action_;
     arrays["obs"] = obs_;
@@ -65,21 +63,25 @@ class CallbackEnv final : public VectorEnv {
     arrays["reward"] = reward_;
     arrays["terminated"] = terminated_;
     arrays["truncated"] = truncated_;
-    step_ = CallPython([&] { return make(seeds, config.for_evaluation, arrays); });
-    CheckFinite(ValuesOf(obs_), "observation of a reset");
+    lanes_ = CallPython([&] { return make(config.for_evaluation, rows(), arrays); });
+    Begin(stream_);
   }
   CallbackEnv(const CallbackEnv&) = delete;
   CallbackEnv& operator=(const CallbackEnv&) = delete;
   ~CallbackEnv() override {
     const nb::gil_scoped_acquire lock;
-    step_.reset();
-    for (auto* array : {&obs_, &next_obs_}) *array = {};
-    for (auto* array : {&action_, &reward_}) *array = {};
+    lanes_.reset();
+    for (auto* array : {&action_, &obs_, &next_obs_, &reward_}) *array = {};
     for (auto* array : {&terminated_, &truncated_}) *array = {};
   }
 
   const EnvSpec& spec() const override { return spec_; }
-  Matrix<const float> obs() const override { return {obs_.data(), spec_.num_envs, spec_.obs_size}; }
+  Matrix<const float> obs() const override {
+    return {float_obs_.data(), spec_.num_envs, spec_.obs_size};
+  }
+  Matrix<const float> broken_off() const override {
+    return {broken_off_.data(), broken_off_.empty() ? 0 : spec_.num_envs, spec_.obs_size};
+  }
 
   void Step(Matrix<const double> action, StepResult& result) override {
     for (int i = 0; i < action.rows(); ++i) {
@@ -92,12 +94,14 @@ class CallbackEnv final : public VectorEnv {
     }
     {
       const nb::gil_scoped_acquire lock;
-      CallPython([&] { step_(); });
+      CallPython([&] { lanes_.attr("step")(); });
     }
-    CheckFinite(ValuesOf(obs_), "observation");
+    ++steps_;
+    TakeObs("observation");
     CheckFinite(ValuesOf(next_obs_), "observation");
     CheckFinite(ValuesOf(reward_), "reward");
-    std::ranges::copy(ValuesOf(next_obs_), result.next_obs.begin());
+    std::ranges::transform(ValuesOf(next_obs_), result.next_obs.begin(),
+                           [](double x) { return static_cast<float>(x); });
     std::ranges::copy(ValuesOf(reward_), result.reward.begin());
     std::ranges::copy(ValuesOf(terminated_), result.terminated.begin());
     std::ranges::copy(ValuesOf(truncated_), result.truncated.begin());
@@ -108,33 +112,59 @@ class CallbackEnv final : public VectorEnv {
   void SetState(int /*env*/, std::span<const double> /*state*/) override {
     throw NoForeignEnvironment(spec_.task);
   }
-  /// Saves nothing, so that a run cannot resume.
+  /// Saves the observations only. Loading begins new episodes.
   void State(const Archive& archive) override {
-    if (archive.loading()) throw NoForeignEnvironment(spec_.task);
+    archive.Array("obs", std::span(float_obs_));
+    archive.Scalar("steps", steps_, {0, kMostSteps});
+    if (!archive.loading()) return;
+    broken_off_ = float_obs_;
+    const nb::gil_scoped_acquire lock;
+    Begin(Concat(stream_, " after ", steps_, " steps"));
   }
 
  private:
   size_t rows() const { return static_cast<size_t>(spec_.num_envs); }
 
-  /// Throws Failure unless these numbers, the same count for each environment, are finite float32
+  /// Begins an episode in each environment, with seeds of this stream. Needs the interpreter's
+  /// lock.
+  void Begin(const std::string& stream) {
+    std::vector<int64_t> seeds;
+    for (size_t i = 0; i < rows(); ++i) {
+      constexpr uint64_t kSeeds = uint64_t{1} << 31;
+      Rng rng(seed_, stream, first_index_ + i);
+      seeds.push_back(static_cast<int64_t>(rng.Below(kSeeds)));
+    }
+    CallPython([&] { lanes_.attr("begin")(seeds); });
+    TakeObs("observation of a reset");
+  }
+
+  void TakeObs(const char* what) {
+    CheckFinite(ValuesOf(obs_), what);
+    std::ranges::transform(ValuesOf(obs_), float_obs_.begin(),
+                           [](double x) { return static_cast<float>(x); });
+  }
+
+  /// Throws BadInput unless these numbers, the same count for each environment, are finite float32
   /// numbers.
-  template <typename T>
-  void CheckFinite(std::span<T> values, const char* what) const {
+  void CheckFinite(std::span<const double> values, const char* what) const {
     for (size_t i = 0; i < values.size(); ++i) {
       if (std::abs(values[i]) <= std::numeric_limits<float>::max()) continue;
       const size_t size = values.size() / rows();
-      throw Failure(Concat("environment ", i / size, ": expected finite float32 numbers, got ",
-                           values[i], " in the ", what,
-                           size > 1 ? Concat(", component ", i % size) : std::string()));
+      throw BadInput(Concat("environment ", i / size, ": expected finite float32 numbers, got ",
+                            values[i], " in the ", what,
+                            size > 1 ? Concat(", component ", i % size) : std::string()));
     }
   }
 
   EnvSpec spec_;
-  Array<double> action_;  // (N × A)
-  Array<float> obs_, next_obs_;
-  Array<double> reward_;
-  Array<uint8_t> terminated_, truncated_;
-  nb::object step_;
+  uint64_t seed_, first_index_;
+  std::string stream_;
+  // Shared with Python. Observations are double, so that messages name what Python returned.
+  Array<double> action_, obs_, next_obs_, reward_;  // (N × A), (N × D), (N × D), (N)
+  Array<uint8_t> terminated_, truncated_;           // (N)
+  nb::object lanes_;
+  std::vector<float> float_obs_, broken_off_;  // (N × D)
+  int64_t steps_ = 0;
 };
 
 }  // namespace

@@ -17,8 +17,8 @@ PyObject* input_error_class = nullptr;
 PyObject* failure_class = nullptr;
 
 PyObject* MakeClass(nb::module_& m, const char* name, const char* doc, PyObject* bases) {
-  PyObject* made =
-      PyErr_NewExceptionWithDoc((std::string("upswing.") + name).c_str(), doc, bases, nullptr);
+  const auto full = nb::cast<std::string>(m.attr("__name__")) + "." + name;
+  PyObject* made = PyErr_NewExceptionWithDoc(full.c_str(), doc, bases, nullptr);
   if (made == nullptr) throw nb::python_error();
   m.attr(name) = nb::handle(made);
   return made;
@@ -54,6 +54,12 @@ bool Interrupts::due() {
   if (now - last_ < kBetween) return false;
   last_ = now;
   return true;
+}
+
+std::optional<Error> OwnError(const nb::python_error& error) {
+  if (!error.matches(error_class)) return std::nullopt;
+  const auto message = Printable(nb::cast<std::string>(nb::str(error.value())));
+  return error.matches(input_error_class) ? BadInput(message) : Failure(message);
 }
 
 void CheckSignals() {

@@ -1,6 +1,5 @@
 // Evaluations and maps for Python.
 #include <nanobind/stl/pair.h>
-#include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>

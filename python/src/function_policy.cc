@@ -1,5 +1,4 @@
 // A Python function as a policy.
-#include <nanobind/stl/string.h>
 
 #include <algorithm>
 #include <cmath>
@@ -43,8 +42,14 @@ class FunctionPolicy final : public Policy {
     for (int i = 0; i < obs.rows(); ++i) {
       std::ranges::copy(obs.row(i), array.data() + static_cast<ptrdiff_t>(i) * obs.cols());
     }
-    const nb::object result =
-        nb::module_::import_("numpy").attr("ascontiguousarray")(function_(array), "float64");
+    const nb::module_ numpy = nb::module_::import_("numpy");
+    const nb::object returned = function_(array), numbers = numpy.attr("asarray")(returned);
+    const auto kind = nb::cast<std::string>(numbers.attr("dtype").attr("kind"));
+    if (std::string_view("fiub").find(kind) == std::string_view::npos) {
+      throw BadInput(Concat("policy: expected numbers, got ",
+                            nb::cast<std::string>(returned.type().attr("__name__"))));
+    }
+    const nb::object result = numpy.attr("ascontiguousarray")(numbers, "float64");
     const auto torque = nb::cast<nb::ndarray<const double, nb::c_contig, nb::device::cpu>>(result);
     const bool fits = torque.size() == n && torque.ndim() >= 1 && torque.ndim() <= 2;
     if (!fits) {

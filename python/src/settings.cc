@@ -1,6 +1,5 @@
 // Settings for Python, with the names, ranges and messages of the program.
 #include <nanobind/stl/pair.h>
-#include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>

@@ -1,6 +1,5 @@
 // Trainings controlled from Python, in a run folder or in memory.
 #include <nanobind/stl/pair.h>
-#include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
@@ -59,6 +58,8 @@ class PythonDriver final : public TrainObserver {
   void Begin(const Training& training) { training_ = &training; }
   /// The exception in Python that stopped the training.
   std::exception_ptr error() const { return error_; }
+  /// Whether that exception is KeyboardInterrupt.
+  bool interrupted() const { return interrupted_; }
   const PolicyPointer& best() const { return best_; }
 
   void OnEpisode(const TrainState& s, const FinishedEpisode& episode) override {
@@ -81,11 +82,16 @@ class PythonDriver final : public TrainObserver {
     if (events_.empty() && now - last_ < kBetween) return TrainRequest::kGoOn;
     last_ = now;
     try {
-      return Tell() ? TrainRequest::kGoOn : TrainRequest::kStop;
-    } catch (...) {  // the training must end in order, with its checkpoint
+      if (Tell()) return TrainRequest::kGoOn;
+    } catch (
+        const nb::python_error& error) {  // the training must end in order, with its checkpoint
+      const nb::gil_scoped_acquire lock;
+      interrupted_ = error.matches(PyExc_KeyboardInterrupt);
       error_ = std::current_exception();
-      return TrainRequest::kStop;
+    } catch (...) {
+      error_ = std::current_exception();
     }
+    return TrainRequest::kStop;
   }
 
  private:
@@ -114,6 +120,7 @@ class PythonDriver final : public TrainObserver {
   std::vector<std::pair<std::string, Row>> events_;
   PolicyPointer best_;
   std::exception_ptr error_;
+  bool interrupted_ = false;
   std::chrono::steady_clock::time_point last_{};
 };
 
@@ -169,7 +176,7 @@ Driven Make(const std::vector<FlagValue>& flags, const std::string& config_file,
             const std::function<void(const Config&)>& about) {
   Driven driven;
   if (!resume.empty()) {
-    driven.run = TrainingRun::Resume(resume, flags);
+    driven.run = TrainingRun::Resume(resume, flags, make_foreign);
     about(driven.its().config());
     return driven;
   }
@@ -201,7 +208,7 @@ nb::dict Train(const SettingTexts& settings, const std::string& config, const st
     const nb::gil_scoped_release unlocked;
     driven = Make(flags, config, out, resume, maker, warn_about);
     driven.Train(driver);
-    if (driver.error()) std::rethrow_exception(driver.error());
+    if (driver.error() && !driver.interrupted()) std::rethrow_exception(driver.error());
     last = CopyOf(*driven.its().policy(), "the last policy of this training");
     best = driver.best();
     // A resumed run may have its best policy from an earlier part.
@@ -209,8 +216,10 @@ nb::dict Train(const SettingTexts& settings, const std::string& config, const st
       best = std::make_shared<PolicyHandle>(LoadPolicy(driven.run->path()));
     }
   }
-  return ResultOf(driven.its(), driven.finished, driven.run ? driven.run->path().string() : "",
-                  last, best);
+  nb::dict result = ResultOf(driven.its(), driven.finished,
+                             driven.run ? driven.run->path().string() : "", last, best);
+  result["interrupted"] = driver.interrupted();
+  return result;
 }
 
 }  // namespace

@@ -53,6 +53,24 @@ class Environments(unittest.TestCase):
                 said = [str(warning.message) for warning in caught]
                 self.assertEqual([text for text in said if "Box" not in text], [])
 
+    def test_the_task_of_evaluations_is_registered(self):
+        name = "upswing/DoublePendulumSwingUp-v0"
+        env = gym.make(name)
+        self.assertEqual(env.spec.max_episode_steps, 1000)
+        check_env(env.unwrapped, skip_render_check=True)
+        hanging = env.reset(seed=1)[0]
+        np.testing.assert_allclose(hanging[[0, 3, 7]], [1, 1, -1], atol=0.1)
+        self.assertEqual(len(play(env, [np.zeros(1, np.float32)] * 2000, seed=1)[1]), 1000)
+        for limit in (None, 30):
+            more = {} if limit is None else {"max_episode_steps": limit}
+            for vector in (gym.make_vec(name, 2, **more),
+                           gym.make_vec(name, 2, vectorization_mode="sync", **more)):
+                np.testing.assert_array_equal(vector.reset(seed=1)[0][0], hanging)
+                steps = 0
+                while not vector.step(np.zeros((2, 1), np.float32))[3].all():
+                    steps += 1
+                self.assertEqual(steps + 1, limit or 1000)
+
     def test_spaces_are_of_the_settings(self):
         env = gym.make(ID, torque_limit=3, memory=2)
         self.assertEqual(env.observation_space.shape, (14,))

@@ -12,6 +12,7 @@ import threading
 import unittest
 from pathlib import Path
 
+import gymnasium as gym
 import numpy as np
 
 import upswing
@@ -42,6 +43,44 @@ class Evaluations(BadInputTest):
             expected = [float(row[name]) if row[name] else np.nan for row in rows]
             np.testing.assert_array_equal(column, expected)
         self.assertIn("of 20 episodes succeed", repr(ours))
+
+    def test_gymnasium_environments(self):
+        name = "upswing/DoublePendulumSwingUp-v0"
+        policy = upswing.load_policy(POLICY)
+        env = gym.make(name, physics="closed-form")
+        # The return of each episode, by Gymnasium's own loop.
+        returns = []
+        for seed in (5, 6):
+            obs, total, ended = env.reset(seed=seed)[0], 0.0, False
+            while not ended:
+                obs, reward, terminated, truncated, _ = env.step(policy.act(obs).astype(np.float32))
+                total, ended = total + reward, terminated or truncated
+            returns.append(total)
+        for given in (lambda: gym.make(name, physics="closed-form"), env,
+                      gym.wrappers.RecordEpisodeStatistics(env)):
+            for acts in (POLICY, policy, policy.act, lambda obs: policy.act(obs)[:, 0]):
+                result = upswing.evaluate(acts, env=given, episodes=2, seed=5)
+                np.testing.assert_allclose(result.per_episode["return"], returns, rtol=1e-12)
+        self.assertEqual(result["return"]["mean"], np.mean(result.per_episode["return"]))
+        self.assertEqual(result["length"], {"mean": 1000, "deviation": 0})
+        self.assertIn("2 episodes, mean return", repr(result))
+        short = upswing.evaluate(policy, env=name, episodes=1, max_episode_steps=7)
+        self.assertEqual(short["length"]["mean"], 7)
+        for what, arguments in (
+                ("policy: expected one for observations", {"env": "CartPole-v1"}),
+                ("mass2: expected none with env", {"env": name, "mass2": 2}),
+                ("threads: expected none with env", {"env": name, "threads": 2}),
+                ("env: expected a single environment", {"env": gym.make_vec(name, 2)}),
+                ("episodes: expected 1 or more, got 0", {"env": name, "episodes": 0}),
+                ("max_episode_steps: expected env with it", {"max_episode_steps": 7})):
+            self.refuse(what, upswing.evaluate, policy, **arguments)
+        for wrong in ([1, 2], "x", None, np.nan):
+            self.refuse(f"policy: expected an action of 1 finite number, got {wrong}",
+                        upswing.evaluate, lambda obs, wrong=wrong: wrong, env=name)
+        for wrong in (2, 0.5):
+            self.refuse(f"policy: expected an action of Discrete(2), got {wrong}",
+                        upswing.evaluate, lambda obs, wrong=wrong: wrong, env="CartPole-v1")
+        self.refuse("policy: expected a Policy, a path or a function", upswing.evaluate, 3, env=name)
 
     def test_mujoco_is_usual_and_a_policy_will_do(self):
         policy = upswing.load_policy(POLICY)

@@ -10,8 +10,10 @@ import sys
 import tempfile
 import threading
 import tomllib
+import types
 import typing
 import unittest
+import unittest.mock
 import warnings
 from pathlib import Path
 
@@ -125,7 +127,8 @@ class Callbacks(InFolder):
                                      on_metrics=lambda row: np.bool_(row["step"] < 1000))
             self.assertFalse(training.finished)
             self.assertEqual(training.steps, 1000)
-            self.assertIsNone(training.best)
+            self.assertIsNone(training.best_step)
+            np.testing.assert_array_equal(training.best.act(np.eye(8)), training.last.act(np.eye(8)))
         # The run folder has a checkpoint of step 4000.
         self.assertEqual(upswing.train(resume=self.path / "run").steps, 4000)
 
@@ -161,11 +164,44 @@ class Callbacks(InFolder):
         self.assertIn("step", steps)
         self.assertTrue(any(run.glob("checkpoint*.safetensors")))
 
-    def test_signals_reach_a_training_in_memory(self):
-        threading.Timer(0.5, _thread.interrupt_main).start()
-        with self.assertRaises(KeyboardInterrupt):
-            upswing.train("fast", stop_when_solved=False, steps=10**9, threads=1,
-                          eval_every=10**9)
+    def test_an_interrupted_training_is_kept(self):
+        def train():
+            threading.Timer(0.5, _thread.interrupt_main).start()
+            return upswing.train("fast", stop_when_solved=False, steps=10**9, threads=1,
+                                 eval_every=10**9)
+
+        # A script gets KeyboardInterrupt, so that loops end. A prompt gets the training.
+        with self.assertRaisesRegex(KeyboardInterrupt, "interrupted at step") as caught:
+            train()
+        self.assertFalse(caught.exception.training.finished)
+        sys.ps1 = ">>> "
+        self.addCleanup(delattr, sys, "ps1")
+        with self.assertWarnsRegex(UserWarning, "interrupted at step"):
+            training = train()
+        self.assertGreater(training.steps, 0)
+        self.assertFalse(training.finished)
+
+    def test_a_notebook_has_a_bar(self):
+        shown = []
+
+        class Handle:
+            def update(self, data, raw):
+                shown.append(data)
+
+        def display(data, raw, display_id):
+            shown.append(data)
+            return Handle()
+
+        python = types.ModuleType("IPython")
+        python.get_ipython = lambda: types.SimpleNamespace(kernel=None)
+        python.display = types.ModuleType("IPython.display")
+        python.display.display = display
+        modules = {"IPython": python, "IPython.display": python.display}
+        with unittest.mock.patch.dict(sys.modules, modules):
+            upswing.train("fast", **SMALL)
+        self.assertIn("<progress value=4000 max=4000>", shown[-1]["text/html"])
+        self.assertIn("4,000 of 4,000 steps", shown[-1]["text/plain"])
+        self.assertIn("at step 4,000", shown[-1]["text/plain"])
 
     def test_the_interpreter_runs_meanwhile_and_trainings_run_side_by_side(self):
         results = {}
@@ -192,6 +228,32 @@ class Callbacks(InFolder):
             self.assertEqual(done.stdout, "")
 
 
+class Paths(InFolder):
+    def test_names_that_are_not_utf8(self):
+        class Named:
+            def __init__(self, path):
+                self.path = path
+
+            def __fspath__(self):
+                return self.path
+
+        raw = os.fsencode(self.path)
+        (self.path / "p\udcff.toml").write_text("[plant]\nmass2 = 1.1\n")
+        for k, path in enumerate((raw + b"/r\xff0", os.fsdecode(raw + b"/r\xff1"),
+                                  self.path / "r\udcff2", Named(raw + b"/r\xff3"),
+                                  Named(f"{self.path}/é4"))):
+            training = upswing.train("fast", out=path, plant=raw + b"/p\xff.toml", **SMALL)
+            self.assertEqual(training.path, os.fsdecode(path))
+            self.assertTrue(os.path.isdir(path))
+            policy = upswing.load_policy(path)
+            self.assertEqual(policy.info["plant"]["mass2"], 1.1)
+            copy = raw + b"/copy\xff%d" % k
+            policy.save(copy)
+            self.assertEqual(upswing.load_policy(copy).name, os.fsdecode(copy))
+            self.assertIn("copy", upswing.evaluate(copy, episodes=1)["policy"])
+            self.assertEqual(upswing.train(resume=path, steps=4400).steps, 4400)
+
+
 class BadInput(InFolder, BadInputTest):
     def refuse_training(self, what, *agent, **settings):
         self.refuse(what, upswing.train, *agent, **settings)
@@ -208,6 +270,15 @@ class BadInput(InFolder, BadInputTest):
         self.refuse_training("nothing.toml", config="nothing.toml")
         self.refuse_training('steps: expected', steps=None)
 
+    def test_names_of_others(self):
+        for name, instead in (("task", "use env"), ("total_timesteps", "use steps"),
+                              ("n_envs", "use num_envs"), ("net_arch", "use hidden"),
+                              ("buffer_size", "use replay"), ("callback", "use on_evaluation")):
+            self.refuse_training(f"{name}: expected a setting, got '{name}'; {instead}",
+                                 **{name: 3})
+        for name in ("PPO", "SAC", "DQN"):
+            self.refuse_training(f'got "{name}" (did you mean {name.lower()}?)', name)
+
     def test_folders(self):
         (self.path / "full").mkdir()
         (self.path / "full/file").write_text("mine")
@@ -216,6 +287,11 @@ class BadInput(InFolder, BadInputTest):
         self.refuse_training("resume", resume=self.path / "nothing")
         self.refuse_training("resume: expected neither out nor config", resume="x", out="y")
         self.refuse_training("out: expected a path, got an empty text", out="")
+        self.refuse_training("out: expected a path, got 3", out=3)
+        self.refuse_training("out: expected a path, got 'a\\x00b'", out="a\0b")
+        self.refuse_training("plant: expected a text without null characters", plant="a\0b")
+        self.refuse_training('got "\\xff"', plant=b"\xff")
+        self.refuse_training('g\\xff: expected a setting', **{"g\udcff": 1})
 
     def test_useless_settings_give_a_warning(self):
         with warnings.catch_warnings(record=True) as caught:
@@ -246,6 +322,7 @@ class Settings(unittest.TestCase):
         self.assertEqual(settings["agent"].choices, list(upswing.agents()))
         self.assertIsInstance(settings["batch"].high, int)
         self.assertIn("seed", typing.get_type_hints(upswing.train))
+        self.assertIs(typing.get_type_hints(upswing.Training)["best"], upswing.Policy)
 
 
 if __name__ == "__main__":

@@ -44,8 +44,19 @@ __all__ = [
     "train",
 ]
 
+for _error in (Error, Failure, InputError):
+    _error.__module__ = __name__  # the name of the class in messages and pickles
+
 _register(
     id="upswing/DoublePendulum-v0",
     entry_point="upswing.envs:DoublePendulumEnv",
     vector_entry_point="upswing.envs:DoublePendulumVectorEnv",
+)
+# The task of evaluations: 20 s from hanging.
+_register(
+    id="upswing/DoublePendulumSwingUp-v0",
+    entry_point="upswing.envs:DoublePendulumEnv",
+    vector_entry_point="upswing.envs:DoublePendulumVectorEnv",
+    max_episode_steps=1000,
+    kwargs={"episode_seconds": 20, "random_start_share": 0},
 )

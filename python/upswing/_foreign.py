@@ -13,6 +13,7 @@ from typing import Any, Union
 
 import gymnasium as gym
 import numpy as np
+import numpy.typing as npt
 from gymnasium import spaces
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv, VectorEnv, VectorWrapper
 from gymnasium.wrappers import NormalizeObservation, NormalizeReward, RescaleAction
@@ -23,7 +24,8 @@ from gymnasium.wrappers.vector import RescaleAction as RescaleVectorAction
 from . import _upswing
 from ._lanes import Arrays, Lanes, VectorLanes, check_apart, check_reset
 from ._settings import whole_number
-from ._spaces import Spaces, brief, one_line
+from .policy import Policy
+from ._spaces import Spaces, brief, check_finite, one_line
 
 Env = gym.Env[Any, Any]
 VecEnv = VectorEnv[Any, Any, Any]
@@ -34,10 +36,10 @@ class Source:
     """The environments of a training and its evaluations.
 
     Attributes:
+        space, limit: spaces and largest length of an episode
         num_envs: number of training environments
         description: the setting `environment` of the C++ code
         discrete: whether the actions are discrete
-        cause: exception of an environment that stopped the training
     """
 
     def __init__(self, env: EnvLike, num_envs: int | None, eval_env: EnvLike | None,
@@ -65,15 +67,14 @@ class Source:
         _check_statistics(trial, eval_env)
         self._evaluation: list[Env] = [trial]
         self.space = Spaces(_single(first, "observation_space"), _single(first, "action_space"))
-        evaluated = Spaces(trial.observation_space, trial.action_space)
+        evaluated = Spaces(_single(trial, "observation_space"), _single(trial, "action_space"))
         if evaluated != self.space or (
                 eval_env is not None and not evaluated.bounded_as(self.space)):
             raise _upswing.InputError(
                 f"eval_env: expected the spaces of env, {self.space}, got {evaluated}; pass an "
                 "environment with the same spaces")
         self.discrete = bool(self.space.choices)
-        self._limit = _limit_of(first, trial, max_episode_steps)
-        self.cause: BaseException | None = None
+        self.limit = Limit(first, trial, max_episode_steps)
         self._try(trial)
         if isinstance(first, VectorEnv):
             check_reset(first)
@@ -83,47 +84,20 @@ class Source:
             self._add_evaluation()
         self.description = self._describe(solved_return)
 
-    def make(self, seeds: list[int], for_evaluation: bool, arrays: Arrays) -> Callable[[], None]:
-        """Resets environments for the C++ code; returns the function that steps them."""
-        try:
-            lanes: Lanes | VectorLanes
-            if for_evaluation:
-                while len(self._evaluation) < len(seeds):
-                    self._add_evaluation()
-                lanes = Lanes(self._evaluation[:len(seeds)], self, arrays, once=True)
-            elif isinstance(self._first, VectorEnv):
-                check_apart(self._evaluation[0], [*self._evaluation[1:], self._first], self.space)
-                lanes = VectorLanes(self._first, self, arrays)
-            else:
-                more = [self._own(self._make_more(), None, "env") for _ in seeds[1:]]
-                check_apart(self._evaluation[0], [*self._evaluation[1:], self._first], self.space)
-                if more:
-                    check_apart(more[0], [self._first], self.space)
-                lanes = Lanes([self._first, *more], self, arrays, once=False)
-            lanes.begin(seeds)
-        except _upswing.Error:
-            raise
-        except Exception as error:
-            raise self.failure("reset", error) from error
-
-        def step() -> None:
-            try:
-                lanes.step()
-            except _upswing.InputError as error:
-                raise _upswing.Failure(str(error)) from error
-        return step
-
-    @property
-    def limit(self) -> int:
-        """Largest number of steps of an episode."""
-        return self._limit
-
-    def failure(self, what: str, error: BaseException, index: int | None = None) -> RuntimeError:
-        """The error for an exception of an environment in `what`, "reset" or "step"."""
-        self.cause = error
-        where = "" if index is None else f"environment {index}: "
-        failure: RuntimeError = _upswing.Failure(f"{where}{what} raised {one_line(error)}")
-        return failure
+    def make(self, for_evaluation: bool, count: int, arrays: Arrays) -> Lanes | VectorLanes:
+        """The environments as the C++ code begins and steps them."""
+        if for_evaluation:
+            while len(self._evaluation) < count:
+                self._add_evaluation()
+            return Lanes(self._evaluation[:count], self.space, self.limit, arrays, once=True)
+        if isinstance(self._first, VectorEnv):
+            check_apart(self._evaluation[0], [*self._evaluation[1:], self._first], self.space)
+            return VectorLanes(self._first, self.space, self.limit, arrays)
+        more = [self._own(self._make_more(), None, "env") for _ in range(1, count)]
+        check_apart(self._evaluation[0], [*self._evaluation[1:], self._first], self.space)
+        if more:
+            check_apart(more[0], [self._first], self.space)
+        return Lanes([self._first, *more], self.space, self.limit, arrays, once=False)
 
     def close(self) -> None:
         """Closes the environments that this object made."""
@@ -154,38 +128,20 @@ class Source:
     def _try(self, env: Env | VecEnv) -> None:
         """Makes a reset and a step, before anything is written. Raises InputError."""
         vector, n = isinstance(env, VectorEnv), getattr(env, "num_envs", 1)
-        shape = (n, *self.space.obs_shape)
-        arrays: Arrays = {"obs": np.zeros(shape), "next_obs": np.zeros(shape)}
-        arrays |= {name: np.zeros(n) for name in ("reward", "terminated", "truncated")}
-        arrays["action"] = self.space.any_actions(n)
-        lanes = (VectorLanes(env, self, arrays) if vector  # type: ignore[arg-type]
-                 else Lanes([env], self, arrays, once=True))
-        for call, act in (("reset", lambda: lanes.begin(list(range(n)))), ("step", lanes.step)):
-            try:
-                act()
-            except _upswing.Failure as failure:
-                if failure.__cause__ is None:
-                    raise
-                raise _upswing.InputError(
-                    f"env: expected an environment that works, but its {call} raised "
-                    f"{one_line(failure.__cause__)}") from failure.__cause__
-            for name in ("obs", "next_obs", "reward"):
-                values = arrays[name].ravel()
-                with np.errstate(over="ignore"):
-                    wrong = values[~np.isfinite(values.astype(np.float32))]
-                if wrong.size > 0:
-                    raise _upswing.InputError(
-                        f"env: {call}: expected finite float32 numbers as "
-                        f"{'rewards' if name == 'reward' else 'observations'}, got {wrong[0]}")
+        arrays = self.space.arrays(n)
+        lanes = (VectorLanes(env, self.space, self.limit, arrays) if vector  # type: ignore[arg-type]
+                 else Lanes([env], self.space, self.limit, arrays, once=True))
+        lanes.begin(list(range(n)))
+        check_finite(arrays, "reset")
+        lanes.step()
+        check_finite(arrays, "step")
 
     def _describe(self, solved_return: float | None) -> str:
-        env = self._evaluation[0]
-        name = env.spec.id if env.spec is not None else type(env.unwrapped).__name__
         description: dict[str, Any] = {
-            "name": re.sub(r"[^A-Za-z0-9_./:-]", "-", name)[:50],
+            "name": _name_of(self._evaluation[0]),
             "observations": self.space.obs_shape[0],
             "action_limit": self.space.limits, "choices": self.space.choices,
-            "episode_steps": self._limit}
+            "episode_steps": self.limit.steps}
         if solved_return is not None:
             value = solved_return
             if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or (
@@ -201,19 +157,14 @@ def _make(env: EnvLike, name: str) -> Any:
     if isinstance(env, str):
         try:
             made: Any = gym.make(env)
-        except Exception as error:
+        except gym.error.Error as error:
             raise _upswing.InputError(
-                f"{name}: expected the id of an environment that gymnasium.make knows, got "
+                f"{name}: expected the id of an environment that gymnasium.make can make, got "
                 f"{env!r}: {one_line(error)}") from error
     elif isinstance(env, (gym.Env, VectorEnv)):
         made = env
     elif callable(env):
-        try:
-            made = env()
-        except Exception as error:
-            raise _upswing.InputError(
-                f"{name}: expected a function that makes an environment, but it raised "
-                f"{one_line(error)}") from error
+        made = env()
     else:
         made = env
     if not isinstance(made, (gym.Env, VectorEnv)):
@@ -237,7 +188,7 @@ def _symmetric(env: Any) -> Any:
     warnings.warn(
         f"env: the bounds of the actions are not symmetric about 0 ({brief(space)}); the policy "
         "acts within -1 and 1: use it with gymnasium.wrappers.RescaleAction(env, -1, 1)",
-        stacklevel=5)
+        stacklevel=6)
     low = np.full(space.shape, -1, space.dtype)
     return (RescaleVectorAction if isinstance(env, VectorEnv) else RescaleAction)(env, low, -low)
 
@@ -286,15 +237,9 @@ def _part_maker(env: VecEnv) -> Callable[[], Any]:
     in_turn = itertools.cycle(functions)
 
     def make() -> Any:
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                return _symmetric(next(in_turn)())
-        except Exception as error:
-            raise _upswing.InputError(
-                "eval_env: expected an environment or a function that makes one, because making a "
-                f"single environment of {type(base).__name__} raised {one_line(error)}, got none"
-            ) from error
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return _symmetric(next(in_turn)())
     return make
 
 
@@ -330,26 +275,78 @@ def _wrapped_limit(env: Any) -> int | None:
     return None
 
 
-def _limit_of(env: Any, single: Env, asked: int | None) -> int:
-    """Largest length of an episode in steps. `single` is an environment like `env`, which may be a
-    vector environment. Raises InputError."""
-    own = env.spec.max_episode_steps if env.spec is not None else None
-    if own is None and isinstance(env, VectorEnv) and single.spec is not None:
-        own = single.spec.max_episode_steps
-    if own is None:
-        own = _wrapped_limit(single)
-    if asked is None and own is None:
+class Limit:
+    """Largest length of an episode [steps]: of the environment and of the caller, else 10,000."""
+
+    def __init__(self, env: Any, single: Env, asked: int | None) -> None:
+        """`single` is an environment like `env`, which may be a vector environment. Raises
+        InputError."""
+        own = env.spec.max_episode_steps if env.spec is not None else None
+        if own is None and isinstance(env, VectorEnv) and single.spec is not None:
+            own = single.spec.max_episode_steps
+        if own is None:
+            own = _wrapped_limit(single)
+        limits = [limit for limit in (own, asked) if limit is not None]
+        self.steps = min((whole_number("max_episode_steps", limit) for limit in limits),
+                         default=10_000)
+        self._assumed = not limits
+        if self.steps < 1:
+            raise _upswing.InputError(f"max_episode_steps: expected 1 or more, got {self.steps}")
+
+    def reach(self) -> bool:
+        """Notes that the limit ends an episode. Warns once if it is the default. Returns True."""
+        if self._assumed:
+            self._assumed = False
+            warnings.warn(
+                f"env: an episode did not end within {self.steps:,} steps, the default of "
+                "max_episode_steps for an environment without a time limit; set max_episode_steps",
+                stacklevel=4)
+        return True
+
+
+def run_episodes(policy: Callable[[npt.NDArray[np.float32]], Any], env: EnvLike, episodes: int,
+                 seed: int, max_episode_steps: int | None, progress: Callable[[float], Any] | None
+                 ) -> tuple[str, dict[str, npt.NDArray[np.float64]]]:
+    """The name of an environment, and return, length and termination of each episode of a policy.
+    Raises InputError."""
+    made = _make(env, "env")
+    if isinstance(made, VectorEnv):
+        raise _upswing.InputError("env: expected a single environment, got a vector environment")
+    space = Spaces(_single(made, "observation_space"), _single(made, "action_space"))
+    limit = Limit(made, made, max_episode_steps)
+    if isinstance(policy, Policy) and (
+            (policy.obs_size, policy.action_size) != (space.obs_shape[0], len(space.limits))):
         raise _upswing.InputError(
-            "max_episode_steps: expected a number of steps, because "
-            f"{type(single.unwrapped).__name__} has no time limit of its own and an episode might "
-            "never end, got none")
-    limits = [limit for limit in (own, asked) if limit is not None]
-    limit = min(whole_number("max_episode_steps", value) for value in limits)
-    if limit < 1:
-        raise _upswing.InputError(f"max_episode_steps: expected 1 or more, got {limit}")
-    return limit
+            f"policy: expected one for {space}, got one of {policy.task} for {policy.obs_size} "
+            f"numbers of an observation and {policy.action_size} of an action")
+    arrays = space.arrays(1)
+    columns: dict[str, list[float]] = {"return": [], "length": [], "terminated": []}
+    try:
+        for k in range(episodes):
+            lanes, total = Lanes([made], space, limit, arrays, once=True), 0.0
+            lanes.begin([(seed + k) % 2**31])
+            check_finite(arrays, "reset")
+            while not lanes.ended:
+                arrays["action"][0] = space.row_of(policy(arrays["obs"].astype(np.float32)))
+                lanes.step()
+                check_finite(arrays, "step")
+                total += arrays["reward"][0]
+            columns["return"].append(total)
+            columns["length"].append(lanes.lengths[0])
+            columns["terminated"].append(arrays["terminated"][0])
+            if progress is not None:
+                progress((k + 1) / episodes)
+    finally:
+        if made.unwrapped is not getattr(env, "unwrapped", None):
+            made.close()
+    return _name_of(made), {name: np.array(column, np.float64) for name, column in columns.items()}
+
+
+def _name_of(env: Env) -> str:
+    name = env.spec.id if env.spec is not None else type(env.unwrapped).__name__
+    return re.sub(r"[^A-Za-z0-9_./:-]", "-", name)[:50]
 
 
 def _single(env: Any, name: str) -> Any:
     """A space of a single environment."""
-    return getattr(env, f"single_{name}" if isinstance(env, VectorEnv) else name)
+    return getattr(env, f"single_{name}" if isinstance(env, VectorEnv) else name, None)

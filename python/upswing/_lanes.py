@@ -16,11 +16,11 @@ from gymnasium.vector import (AsyncVectorEnv, AutoresetMode, SyncVectorEnv, Vect
                               VectorWrapper)
 
 from . import _upswing
-from ._spaces import Spaces, flags, numbers, one_line
+from ._spaces import RESET, STEP, Spaces, flags, numbers, one_line, unpacked
 from .envs import DoublePendulumVectorEnv
 
 if TYPE_CHECKING:
-    from ._foreign import Source
+    from ._foreign import Limit
 
 Env = gym.Env[Any, Any]
 VecEnv = VectorEnv[Any, Any, Any]
@@ -31,34 +31,38 @@ class Lanes:
     """Single environments, stepped one after the other. `once`: an environment whose episode has
     ended is not stepped again, as evaluations need only one episode of each."""
 
-    def __init__(self, envs: list[Any], source: Source, arrays: Arrays, once: bool) -> None:
-        self._envs, self._source, self._once = envs, source, once
+    def __init__(self, envs: list[Any], space: Spaces, limit: Limit, arrays: Arrays,
+                 once: bool) -> None:
+        self._envs, self._space, self._limit, self._once = envs, space, limit, once
         self._arrays = arrays
-        self._lengths = [0] * len(envs)
+        self.lengths = [0] * len(envs)  # steps of the running episodes
         self._ended = [False] * len(envs)
         self._wheres = [f"environment {i}: expected " for i in range(len(envs))]
+
+    @property
+    def ended(self) -> bool:
+        """Whether all episodes have ended; only with `once`."""
+        return all(self._ended)
 
     def begin(self, seeds: list[int]) -> None:
         for i, (env, seed) in enumerate(zip(self._envs, seeds)):
             self._reset(i, env, seed)
 
     def step(self) -> None:
-        source, limit = self._source, self._source.limit
-        a = self._arrays
+        a, limit = self._arrays, self._limit.steps
         for i, env in enumerate(self._envs):
             if self._ended[i]:
                 continue
-            try:
-                obs, reward, terminated, truncated, _ = env.step(source.space.action_of(a["action"][i]))
-            except Exception as error:
-                raise source.failure("step", error, i) from error
             where = self._wheres[i]
+            obs, reward, terminated, truncated, _ = unpacked(
+                env.step(self._space.action_of(a["action"][i])), STEP, where)
             self._store(i, obs, "next_obs")
             a["reward"][i] = numbers(reward, (), where + "a reward")
-            self._lengths[i] += 1
+            self.lengths[i] += 1
             done = bool(flags(terminated, (), where + "terminated"))
-            out = bool(flags(truncated, (), where + "truncated"))
-            out = not done and (out or self._lengths[i] >= limit)
+            out = bool(flags(truncated, (), where + "truncated")) and not done
+            if self.lengths[i] >= limit and not (done or out):
+                out = self._limit.reach()
             a["terminated"][i], a["truncated"][i] = done, out
             if not (done or out):
                 a["obs"][i] = a["next_obs"][i]
@@ -68,15 +72,12 @@ class Lanes:
                 self._reset(i, env, None)
 
     def _reset(self, i: int, env: Env, seed: int | None) -> None:
-        try:
-            obs, _ = env.reset(seed=seed) if seed is not None else env.reset()
-        except Exception as error:
-            raise self._source.failure("reset", error, i) from error
-        self._store(i, obs, "obs")
-        self._lengths[i] = 0
+        returned = env.reset(seed=seed) if seed is not None else env.reset()
+        self._store(i, unpacked(returned, RESET, self._wheres[i])[0], "obs")
+        self.lengths[i] = 0
 
     def _store(self, i: int, obs: Any, name: str) -> None:
-        self._arrays[name][i] = numbers(obs, self._source.space.obs_shape,
+        self._arrays[name][i] = numbers(obs, self._space.obs_shape,
                                         self._wheres[i] + "observations")
 
 
@@ -89,8 +90,8 @@ def check_reset(env: VecEnv) -> None:
     if _resets_itself(env) or env.num_envs == 1:
         return
     mask = np.arange(env.num_envs) == 0
+    before = np.array(unpacked(env.reset(seed=0), RESET, "env: expected ")[0])
     try:
-        before = np.array(env.reset(seed=0)[0])
         after = np.array(env.reset(options={"reset_mask": mask})[0])
         knows = np.array_equal(before[1:], after[1:], equal_nan=True)
     except Exception as error:
@@ -110,8 +111,8 @@ class VectorLanes:
     """The environments of a VectorEnv. Ended episodes begin again in the step that ends them: by
     the environment itself with AutoresetMode.SAME_STEP, else by a reset with a mask."""
 
-    def __init__(self, env: VecEnv, source: Source, arrays: Arrays) -> None:
-        self._env, self._source, self._arrays = env, source, arrays
+    def __init__(self, env: VecEnv, space: Spaces, limit: Limit, arrays: Arrays) -> None:
+        self._env, self._space, self._limit, self._arrays = env, space, limit, arrays
         self._same_step = _resets_itself(env)
         self._lengths = np.zeros(env.num_envs, np.int64)
 
@@ -122,37 +123,34 @@ class VectorLanes:
                 type(inner).reset.__module__.startswith("gymnasium.")):
             inner = inner.env
         each = isinstance(inner, (SyncVectorEnv, AsyncVectorEnv, DoublePendulumVectorEnv))
-        try:
-            obs, _ = self._env.reset(seed=seeds if each else seeds[0])  # type: ignore[arg-type]
-        except Exception as error:
-            raise self._source.failure("reset", error) from error
-        self._store(obs, "obs")
+        returned = self._env.reset(seed=seeds if each else seeds[0])  # type: ignore[arg-type]
+        self._store(unpacked(returned, RESET, "env: expected ")[0], "obs")
+        self._lengths[:] = 0
 
     def step(self) -> None:
-        try:
-            self._step()
-        except _upswing.Error:
-            raise
-        except Exception as error:
-            raise self._source.failure("step", error) from error
-
-    def _step(self) -> None:
         a, count = self._arrays, (self._env.num_envs,)
-        actions = self._source.space.batch_of(a["action"])
-        obs, reward, terminated, truncated, info = self._env.step(actions)
+        actions = self._space.batch_of(a["action"])
+        obs, reward, terminated, truncated, info = unpacked(self._env.step(actions), STEP,
+                                                            "env: expected ")
         self._store(obs, "next_obs")
         self._store(obs, "obs")
         a["reward"][:] = numbers(reward, count, "env: expected rewards")
         dead = flags(terminated, count, "env: expected terminated").copy()
         done = dead | flags(truncated, count, "env: expected truncated")
         self._lengths += 1
-        late = ~done & (self._lengths >= self._source.limit)
+        late = ~done & (self._lengths >= self._limit.steps)
+        if late.any():
+            self._limit.reach()
         a["terminated"][:] = dead
         a["truncated"][:] = (done | late) & ~dead
         self._lengths[done | late] = 0
         if self._same_step:
             for i in np.flatnonzero(done):
-                a["next_obs"][i] = numbers(info["final_obs"][i], self._source.space.obs_shape,
+                try:
+                    final = info["final_obs"][i]
+                except (KeyError, IndexError, TypeError):
+                    final = None
+                a["next_obs"][i] = numbers(final, self._space.obs_shape,
                                            f"environment {i}: expected infos[\"final_obs\"]")
         again = late if self._same_step else done | late
         if again.any():
@@ -160,7 +158,7 @@ class VectorLanes:
 
     def _begin_again(self, mask: npt.NDArray[np.bool_]) -> None:
         """Begins episodes where `mask` is set. Raises Failure if others begin too."""
-        obs, _ = self._env.reset(options={"reset_mask": mask})
+        obs = unpacked(self._env.reset(options={"reset_mask": mask}), RESET, "env: expected ")[0]
         before = self._arrays["obs"].copy()
         self._store(obs, "obs")
         if not np.array_equal(before[~mask], self._arrays["obs"][~mask]):
@@ -195,7 +193,7 @@ def check_apart(one: Env, others: list[Any], space: Spaces) -> None:
         warnings.warn(
             "env: two episodes after reset(seed=0) differ, so that trainings do not repeat and "
             "returns depend on eval_every; draw random numbers from self.np_random after "
-            "super().reset(seed=seed), and let reset clear all other state", stacklevel=5)
+            "super().reset(seed=seed), and let reset clear all other state", stacklevel=4)
     elif not same(alone, returned(True)):
         raise _upswing.InputError(
             f"env: expected environments that share no state, got {type(one.unwrapped).__name__}, "
@@ -220,8 +218,6 @@ class Interrupts:
                  trace: TracebackType | None) -> None:
         if self._before is not None:
             signal.signal(signal.SIGINT, self._before)
-        if self._pending and kind is None:
-            raise KeyboardInterrupt
 
     def check(self) -> None:
         """Raises KeyboardInterrupt after Ctrl-C."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import operator
 import os
-from typing import Any
+from typing import Any, Union
 
 import numpy as np
 
@@ -93,11 +93,50 @@ def text_of(value: Any) -> str:
         return repr(value)
     if isinstance(value, (list, tuple, np.ndarray)):
         return ",".join(text_of(item) for item in value)
-    if isinstance(value, os.PathLike):
-        return os.fspath(value)
+    if isinstance(value, (bytes, os.PathLike)):
+        return os.fsdecode(value)
     return str(value)
 
 
+# Names of earlier versions and of Stable-Baselines3, and what replaces them.
+_OTHER_NAMES = {
+    "task": "env in train and evaluate, which are for the double pendulum without it",
+    "total_timesteps": "steps", "n_envs": "num_envs with env, else envs", "net_arch": "hidden",
+    "policy_kwargs": "hidden", "buffer_size": "replay", "batch_size": "batch",
+    "callback": "on_evaluation, on_metrics, on_episode or on_best", "verbose": "progress",
+    "tensorboard_log": "out, a run folder with TensorBoard events", "eval_freq": "eval_every",
+    "n_eval_episodes": "eval_episodes", "n_steps": "horizon", "n_epochs": "epochs",
+    "gae_lambda": "**{\"lambda\": 0.95}", "clip_range": "clip", "train_freq": "updates_per_step",
+    "gradient_steps": "updates_per_step", "target_update_interval": "target_period",
+    "ent_coef": "entropy_bonus (PPO) or alpha (SAC)", "exploration_final_eps": "epsilon_end",
+    "exploration_initial_eps": "epsilon_start", "exploration_fraction": "epsilon_decay",
+    "max_grad_norm": "max_gradient_norm", "device": "threads"}
+
+
 def texts_of(values: dict[str, Any]) -> list[tuple[str, str]]:
-    """Name and text of each setting."""
-    return [(name, text_of(value)) for name, value in values.items()]
+    """Name and text of each setting. Raises InputError."""
+    for name in values:
+        if name in _OTHER_NAMES:
+            raise _upswing.InputError(
+                f"{name}: expected a setting, got {name!r}; use {_OTHER_NAMES[name]}")
+    texts = [(name, text_of(value)) for name, value in values.items()]
+    for name, text in texts:
+        if "\0" in text:
+            raise _upswing.InputError(f"{name}: expected a text without null characters, got {text!r}")
+    return texts
+
+
+PathLike = Union[str, bytes, os.PathLike[str], os.PathLike[bytes]]
+
+
+def path_of(name: str, path: PathLike | None) -> str:
+    """The path in an argument; empty for None. Raises InputError."""
+    if path is None:
+        return ""
+    if not isinstance(path, (str, bytes, os.PathLike)):
+        raise _upswing.InputError(f"{name}: expected a path, got {path!r}")
+    text = os.fsdecode(path)
+    if not text or "\0" in text:
+        raise _upswing.InputError(
+            f"{name}: expected a path, got {repr(text) if text else 'an empty text'}")
+    return text

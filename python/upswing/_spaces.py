@@ -11,6 +11,7 @@ from gymnasium import spaces
 from . import _upswing
 
 MOST_CHOICES = 1001  # discrete actions
+MOST_ACTION = 1e6
 _SCALARS = (float, np.float64, np.float32, int)  # usual types of a reward
 
 
@@ -31,6 +32,7 @@ class Spaces:
                 raise _upswing.InputError(
                     f"env: expected 2 to {MOST_CHOICES} discrete actions, got {n}")
             self.choices = [float(action.start) + i for i in range(n)]
+            self._number: Any = (action.dtype or np.dtype(np.int64)).type
             self.limits = [max(1.0, *map(abs, self.choices))]
         elif isinstance(action, spaces.Box):
             if action.dtype is None or action.dtype.kind != "f" or action.low.size == 0:
@@ -48,21 +50,44 @@ class Spaces:
         else:
             raise _upswing.InputError(
                 f"env: expected a Box or Discrete action space, got {brief(action)}")
+        if max(self.limits) > MOST_ACTION:
+            raise _upswing.InputError(
+                f"env: expected actions within ±{MOST_ACTION:g}, got {brief(action)}")
 
     def action_of(self, row: npt.NDArray[np.float64]) -> Any:
         """The environment's action for a row (A) of the C++ code."""
         if self.choices:
-            return int(row[0])
+            return self._number(row[0])
         return row.astype(self.action.dtype).reshape(self.action.shape)
+
+    def row_of(self, action: Any) -> npt.NDArray[Any]:
+        """A policy's action as a row (A) of the C++ code. Raises InputError."""
+        row = np.asarray(action).ravel()
+        size = len(self.limits)
+        if row.size != size or row.dtype.kind not in "fiub" or not np.isfinite(row).all():
+            raise _upswing.InputError(
+                f"policy: expected an action of {size} finite number{'s' if size > 1 else ''}, got "
+                f"{brief(action)}")
+        if self.choices and float(row[0]) not in self.choices:
+            raise _upswing.InputError(
+                f"policy: expected an action of {brief(self.action)}, got {row[0]}")
+        return row
 
     def any_actions(self, n: int) -> npt.NDArray[np.float64]:
         """Actions (N, A) for a trial, as the C++ code gives them."""
         return np.full((n, len(self.limits)), self.choices[0] if self.choices else 0.0)
 
+    def arrays(self, n: int) -> dict[str, npt.NDArray[Any]]:
+        """Arrays of n environments, as the C++ code makes them, with actions for a trial."""
+        shape: tuple[int, ...] = (n, *self.obs_shape)
+        arrays: dict[str, npt.NDArray[Any]] = {"obs": np.zeros(shape), "next_obs": np.zeros(shape)}
+        arrays |= {name: np.zeros(n) for name in ("reward", "terminated", "truncated")}
+        return arrays | {"action": self.any_actions(n)}
+
     def batch_of(self, rows: npt.NDArray[np.float64]) -> Any:
         """A vector environment's actions for rows (N, A) of the C++ code."""
         if self.choices:
-            return rows[:, 0].astype(np.int64)
+            return rows[:, 0].astype(self._number)
         return rows.astype(self.action.dtype).reshape(len(rows), *(self.action.shape or ()))
 
     def __eq__(self, other: object) -> bool:
@@ -78,6 +103,24 @@ class Spaces:
         return f"observations {brief(self.obs)} and actions {brief(self.action)}"
 
 
+RESET, STEP = ("obs", "info"), ("obs", "reward", "terminated", "truncated", "info")
+
+
+def unpacked(returned: Any, names: tuple[str, ...], where: str) -> Any:
+    """What an environment's reset or step returned, if it has these parts. Raises InputError, whose
+    message begins with `where`."""
+    if isinstance(returned, (tuple, list)) and len(returned) == len(names):
+        return returned
+    got = type(returned).__name__
+    if isinstance(returned, (tuple, list)):
+        got += f" of {len(returned)}"
+    hint = ""
+    if names is STEP and got == "tuple of 4":
+        hint = "; Gym before 0.26 had \"done\" in place of terminated and truncated"
+    raise _upswing.InputError(f"{where}{'reset' if names is RESET else 'step'} to return "
+                              f"({', '.join(names)}), got {got}{hint}")
+
+
 def numbers(value: Any, shape: tuple[int, ...], what: str) -> Any:
     """An environment's numbers as an array of this shape. The shape () accepts any array of one
     number. Raises InputError, whose message begins with `what`."""
@@ -90,9 +133,23 @@ def numbers(value: Any, shape: tuple[int, ...], what: str) -> Any:
         raise _upswing.InputError(f"{wanted}, got no array: {one_line(error)}") from error
     if shape == () and array.size == 1:
         array = array.reshape(())
-    if array.shape != shape or array.dtype.kind not in "fiub":
-        raise _upswing.InputError(f"{wanted}, got {array.dtype} of shape {array.shape}")
+    is_numeric = array.dtype.kind in "fiub"
+    if array.shape != shape or not is_numeric:
+        is_array = isinstance(value, np.ndarray)
+        got = (f"{array.dtype} of shape {array.shape}" if is_array or is_numeric
+               else type(value).__name__)
+        raise _upswing.InputError(f"{wanted}, got {got}")
     return array
+
+
+def check_finite(arrays: dict[str, npt.NDArray[Any]], call: str) -> None:
+    """Raises InputError unless what "reset" or "step" returned is finite as float32."""
+    for name, what in (("obs", "observations"), ("next_obs", "observations"), ("reward", "rewards")):
+        values = arrays[name].ravel()
+        wrong = values[~(np.abs(values) <= np.finfo(np.float32).max)]
+        if wrong.size > 0:
+            raise _upswing.InputError(
+                f"env: {call}: expected finite float32 numbers as {what}, got {wrong[0]}")
 
 
 def flags(value: Any, shape: tuple[int, ...], what: str) -> Any:
@@ -100,8 +157,9 @@ def flags(value: Any, shape: tuple[int, ...], what: str) -> Any:
     if type(value) is bool and not shape:  # fast, as each step needs it
         return value
     array = np.asarray(numbers(value, shape, what))
-    if array.dtype.kind != "b" and not ((array == 0) | (array == 1)).all():
-        raise _upswing.InputError(f"{what} of True or False, got others")
+    wrong = array[(array != 0) & (array != 1)]
+    if wrong.size > 0:
+        raise _upswing.InputError(f"{what} of True or False, got {wrong.flat[0]}")
     return array.astype(np.bool_, copy=False)
 
 

@@ -15,6 +15,7 @@ from typing_extensions import Unpack
 
 from . import _upswing
 from ._environments import Core, Pictures, check_render_mode, seed_of
+from ._settings import settings as settings_of, whole_number
 from ._types import EnvironmentSettings
 
 
@@ -192,6 +193,7 @@ class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArra
             step overwrites
         render_mode: "rgb_array" or None
         width, height: size of pictures [pixels]
+        max_episode_steps: largest length of an episode [steps of 0.02 s]; None: episode_seconds
     """
 
     metadata: dict[str, Any] = {
@@ -211,8 +213,14 @@ class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArra
         render_mode: str | None = None,
         width: int = 640,
         height: int = 480,
+        max_episode_steps: int | None = None,
         **settings: Unpack[EnvironmentSettings],
     ) -> None:
+        if max_episode_steps is not None:
+            usual = settings_of(settings.get("agent", "d3qn"))["episode_seconds"].default
+            settings["episode_seconds"] = min(
+                settings.get("episode_seconds", usual),
+                round(0.02 * whole_number("max_episode_steps", max_episode_steps), 2))
         EzPickle.__init__(self, num_envs, actions=actions, levels=levels,
                           autoreset_mode=autoreset_mode, copy=copy, render_mode=render_mode,
                           width=width, height=height, **settings)

@@ -14,8 +14,10 @@ import numpy.typing as npt
 from typing_extensions import Unpack
 
 from . import _upswing
-from .policy import PolicyLike, handle_of
-from ._settings import texts_of
+from ._environments import seed_of
+from ._foreign import EnvLike, run_episodes
+from .policy import Policy, PolicyLike, handle_of, load_policy
+from ._settings import PathLike, path_of, texts_of, whole_number
 from ._types import MapSettings, TrialSettings
 
 
@@ -35,19 +37,21 @@ class Evaluation(dict[str, Any]):
         self.per_episode = per_episode
 
     def __repr__(self) -> str:
-        return (f"<upswing.Evaluation {self['policy']}: {self['successes']} of "
-                f"{self['episodes']} episodes succeed, mean return "
-                f"{self['return']['mean']:.4g}>")
+        succeed = f"{self['successes']} of " if "successes" in self else ""
+        return (f"<upswing.Evaluation {self['policy']}: {succeed}{self['episodes']} episodes"
+                f"{' succeed' if succeed else ''}, mean return {self['return']['mean']:.4g}>")
 
 
 def evaluate(
     policy: PolicyLike,
     *,
+    env: EnvLike | None = None,
+    max_episode_steps: int | None = None,
     episodes: int = 100,
     seed: int = 0,
     physics: str = "mujoco",
-    plant: str | os.PathLike[str] | None = None,
-    model: str | os.PathLike[str] | None = None,
+    plant: PathLike | None = None,
+    model: PathLike | None = None,
     unknown_plant: bool = False,
     threads: int = 0,
     memory: int = 0,
@@ -65,6 +69,11 @@ def evaluate(
         policy: a `Policy`, the path of a policy file or run folder, the name of a controller, or a
             function from observations (N, D), float32, to torques (N,) or (N, 1) [N·m], such as an
             agent of another library; calls may come from any thread, one at a time
+        env: Gymnasium environment in place of the double pendulum: its id, itself, or a function
+            that makes it. Only `episodes`, `seed` (episode k has seed + k), `max_episode_steps` and
+            `progress` go with it. The figures are "return" and "length" (mean and standard
+            deviation), the columns "return", "length" [steps] and "terminated"
+        max_episode_steps: largest length of an episode of `env`, as for `train`
         episodes: number of episodes
         seed: seed of start states, noise and random plants
         physics: "mujoco" or "closed-form"
@@ -82,10 +91,42 @@ def evaluate(
     >>> upswing.evaluate("runs/d3qn-seed1", episodes=1000, randomize=0.1)["success_rate"]
     """
     arguments = {"episodes": episodes, "seed": seed, "threads": threads, "physics": physics}
+    if env is not None:
+        others = arguments | {"plant": plant, "model": model, "unknown_plant": unknown_plant,
+                              "memory": memory}
+        usual = {"threads": 0, "physics": "mujoco", "plant": None, "model": None,
+                 "unknown_plant": False, "memory": 0}
+        wrong = [*settings, *(name for name, value in usual.items() if others[name] != value)]
+        if wrong:
+            raise _upswing.InputError(f"{wrong[0]}: expected none with env")
+        return _evaluate_env(policy, env, max_episode_steps, whole_number("episodes", episodes),
+                             seed_of(seed), progress)
+    if max_episode_steps is not None:
+        raise _upswing.InputError("max_episode_steps: expected env with it, got none")
     figures, table = _upswing.evaluate(
         handle_of(policy, memory), texts_of(dict(settings)), texts_of(arguments),
-        "" if plant is None else os.fspath(plant), "" if model is None else os.fspath(model), bool(unknown_plant), progress)
+        path_of("plant", plant), path_of("model", model), bool(unknown_plant), progress)
     return Evaluation(json.loads(figures), _columns(table))
+
+
+def _evaluate_env(policy: PolicyLike, env: EnvLike, max_episode_steps: int | None, episodes: int,
+                  seed: int, progress: Callable[[float], Any] | None) -> Evaluation:
+    if episodes < 1:
+        raise _upswing.InputError(f"episodes: expected 1 or more, got {episodes}")
+    if isinstance(policy, (str, bytes, os.PathLike)):
+        policy = load_policy(policy)
+    if not callable(policy):
+        raise _upswing.InputError(f"policy: expected a Policy, a path or a function of observations, "
+                                  f"got {type(policy).__name__}")
+    task, columns = run_episodes(policy, env, episodes, seed, max_episode_steps, progress)
+    name = policy.name if isinstance(policy, Policy) else getattr(policy, "__name__", "a function")
+    figures: dict[str, Any] = {"policy": name, "task": f"gymnasium/{task}", "episodes": episodes,
+                               "seed": seed}
+    for column in ("return", "length"):
+        values = columns[column]
+        figures[column] = {"mean": float(values.mean()),
+                           "deviation": float(values.std(ddof=1)) if episodes > 1 else 0.0}
+    return Evaluation(figures, columns)
 
 
 def _columns(table: str) -> dict[str, npt.NDArray[np.float64]]:
@@ -131,11 +172,11 @@ def map(  # pylint: disable=redefined-builtin
     seed: int = 0,
     physics: str | None = None,
     check: float = 0.02,
-    plant: str | os.PathLike[str] | None = None,
+    plant: PathLike | None = None,
     unknown_plant: bool = False,
     threads: int = 0,
     memory: int = 0,
-    out: str | os.PathLike[str] | None = None,
+    out: PathLike | None = None,
     progress: Callable[[float], Any] | None = None,
     **settings: Unpack[MapSettings],
 ) -> Map:
@@ -169,5 +210,5 @@ def map(  # pylint: disable=redefined-builtin
         arguments["episodes"] = episodes
     figures, successes, swing_up_seconds = _upswing.map(
         handle_of(policy, memory), texts_of(dict(settings)), texts_of(arguments), x or "", y or "",
-        "" if plant is None else os.fspath(plant), bool(unknown_plant), "" if out is None else os.fspath(out), progress)
+        path_of("plant", plant), bool(unknown_plant), path_of("out", out), progress)
     return Map(json.loads(figures), successes, swing_up_seconds)

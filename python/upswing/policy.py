@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _upswing
-from ._settings import text_of, texts_of, whole_number
+from ._settings import PathLike, path_of, text_of, texts_of, whole_number
 
 
 class Policy:
@@ -103,9 +103,9 @@ class Policy:
         self._handle.spread(rows, low, high)
         return (low[0], high[0]) if one else (low, high)
 
-    def save(self, path: str | os.PathLike[str]) -> None:
+    def save(self, path: PathLike) -> None:
         """Writes the policy to a file, in the program's format."""
-        self._handle.save(os.fspath(path))
+        self._handle.save(path_of("path", path))
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self._made_by:
@@ -126,13 +126,13 @@ class Policy:
         return f"<upswing.Policy {self.name}: {self.description}>"
 
 
-PolicyLike = Union[Policy, str, "os.PathLike[str]", Callable[[npt.NDArray[np.float32]], Any]]
+PolicyLike = Union[Policy, PathLike, Callable[[npt.NDArray[np.float32]], Any]]
 
 
 def load_policy(
-    path: str | os.PathLike[str],
+    path: PathLike,
     *,
-    made_for: Mapping[str, float] | str | os.PathLike[str] | None = None,
+    made_for: Mapping[str, float] | PathLike | None = None,
     **settings: Any,
 ) -> Policy:
     """Loads a policy.
@@ -147,11 +147,11 @@ def load_policy(
     Raises:
         InputError: the policy does not exist, or its file is broken or of another kind
     """
-    if isinstance(made_for, (str, os.PathLike)):
-        changes = [os.fspath(made_for)]
+    if isinstance(made_for, (str, bytes, os.PathLike)):
+        changes = [path_of("made_for", made_for)]
     else:
         changes = [f"{name}={text_of(value)}" for name, value in (made_for or {}).items()]
-    return _load(os.fspath(path), texts_of(settings), changes)
+    return _load(path_of("path", path), texts_of(settings), changes)
 
 
 def _load(name: str, settings: list[tuple[str, str]], made_for: list[str]) -> Policy:
@@ -166,7 +166,7 @@ def _of_bytes(file: bytes, name: str) -> Policy:
 def handle_of(policy: PolicyLike, memory: int = 0) -> _upswing.PolicyHandle:
     """The C++ object of a policy, a path, a controller's name or a function."""
     memory = whole_number("memory", memory)
-    if isinstance(policy, (str, os.PathLike)):
+    if isinstance(policy, (str, bytes, os.PathLike)):
         policy = load_policy(policy)
     if isinstance(policy, Policy):
         if memory != 0:

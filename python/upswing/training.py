@@ -18,7 +18,7 @@ from . import _upswing
 from ._foreign import EnvLike, Source
 from ._lanes import Interrupts
 from .policy import Policy
-from ._settings import text_of, texts_of
+from ._settings import PathLike, path_of, texts_of
 from ._types import TrainingSettings
 
 Row = dict[str, Any]
@@ -29,10 +29,12 @@ class Training:
     """Result of a training.
 
     Attributes:
-        best: policy with the best evaluation, as in policy.safetensors; None without an evaluation
+        best: policy with the best evaluation, as in policy.safetensors; `last` if the training
+            stopped before its first evaluation, and `best_step` is then None
         last: policy at the end of the training
         solved: whether two evaluations in a row passed
-        finished: whether the training ended by itself: solved, or at its last step
+        finished: whether the training ended by itself: solved, or at its last step; not by a
+            callback or Ctrl-C
         solved_step, solved_seconds: steps and training time until solved; None if not solved
         steps, episodes, updates: number of control steps, episodes and updates
         seconds: training time without evaluations [s]
@@ -43,7 +45,7 @@ class Training:
         evaluations, metrics: rows of evals.csv and metrics.csv
     """
 
-    best: Policy | None
+    best: Policy
     last: Policy
     solved: bool
     finished: bool
@@ -74,9 +76,9 @@ def train(
     max_episode_steps: int | None = None,
     solved_return: float | None = None,
     seed: int | None = None,
-    out: str | os.PathLike[str] | None = None,
-    config: str | os.PathLike[str] | None = None,
-    resume: str | os.PathLike[str] | None = None,
+    out: PathLike | None = None,
+    config: PathLike | None = None,
+    resume: PathLike | None = None,
     progress: bool | None = None,
     on_episode: Callable[[Row], Any] | None = None,
     on_metrics: Callable[[Row], Any] | None = None,
@@ -86,17 +88,17 @@ def train(
 ) -> Training:
     """Trains an agent until it solves the task, bit for bit as `upswing train` does.
 
-    The training writes no files without `out`. Ctrl-C raises KeyboardInterrupt after the current
-    step; a run folder then has a checkpoint for `resume`.
+    The training writes no files without `out`. Ctrl-C ends it after the current step; a run folder
+    then has a checkpoint for `resume`. At a prompt and in a notebook `train` returns the training so
+    far. A script gets KeyboardInterrupt, whose attribute `training` is the training so far.
 
     With `env` the task is a Gymnasium environment: Python steps it, the C++ code learns. The
     observations are a Box of one dimension. The actions are a Box (agents of SAC and PPO; agents
     of DQN if it has one component) or Discrete (agents of DQN and PPO). The agent gives its
-    algorithm and its network; other settings have the defaults in docs/howto/gymnasium.md. Such a
-    run cannot resume.
+    algorithm and its network; other settings have the defaults in docs/howto/gymnasium.md.
 
     Args:
-        agent: named agent, see `upswing.agents` (default "d3qn"; with `env` "fast" for Discrete
+        agent: named agent, see `upswing.agents` (default "d3qn"; with `env` "ppo" for Discrete
             actions and "sac" for a Box)
         env: id of a Gymnasium environment, an environment (copied for more), a vector environment,
             or a function that makes a new environment in each call
@@ -104,15 +106,18 @@ def train(
             own number)
         eval_env: environment for evaluations, or a function that makes it, apart from `env` and with
             its spaces (default: a copy of `env`)
-        max_episode_steps: largest number of steps of an episode (default: of the environment)
+        max_episode_steps: largest number of steps of an episode (default: of the environment, or
+            10,000 if it has no time limit)
         solved_return: mean return of an evaluation that passes; two passed evaluations in a row
             end the training (default: train to the last step)
         seed: seed of all random numbers
         out: new run folder, as the program writes it
         config: TOML file of settings; keyword arguments override it
         resume: run folder to resume; only `steps`, `threads`, `checkpoint_every` and
-            `stop_when_solved` may change
-        progress: show progress on standard error (default: in a terminal)
+            `stop_when_solved` may change. A run with `env` needs the same `env`,
+            `max_episode_steps` and `solved_return` again. It continues with new episodes
+        progress: show progress on standard error, or as a bar in a notebook (default: in a terminal
+            and in a notebook)
         on_episode, on_metrics, on_evaluation: functions that get a row of episodes.csv, metrics.csv
             or evals.csv as a dictionary; the training stops if one returns False
         on_best: function that gets the best policy so far, at its evaluation; the training stops if
@@ -124,33 +129,36 @@ def train(
         Training: result of the training
 
     Raises:
-        InputError: a setting is out of range, or settings contradict each other
+        InputError: a setting is out of range, settings contradict each other, or an environment
+            returned something else than Gymnasium's interface has
         Failure: a number is not finite, or a file cannot be written
+        Exception: any exception of `env` and of the callbacks, unchanged
 
     >>> training = upswing.train(agent="fast", seed=1, hidden=[64, 64], mass2=1.1)
     >>> training.best.save("policy.safetensors")
     >>> upswing.train("ppo", env="LunarLander-v3", steps=500_000, num_envs=16, out="runs/lander")
     """
+    own = texts_of(dict(settings))
+    config_path, out_path, resume_path = (path_of(name, path) for name, path in (
+        ("config", config), ("out", out), ("resume", resume)))
     source, of_env = _source_of(agent, env, num_envs, eval_env, max_episode_steps, solved_return,
-                                resume, config, dict(settings))
+                                resume is None and config is None, dict(settings))
     named: dict[str, Any] = {"agent": agent, "seed": seed} | of_env
     if resume is not None and (out is not None or config is not None):
         raise _upswing.InputError(
             "resume: expected neither out nor config with it: the run has its own settings and "
             "folder")
-    texts = texts_of({name: value for name, value in named.items() if value is not None}
-                     | dict(settings))
-    for name, path in (("out", out), ("config", config), ("resume", resume)):
-        if path is not None and not text_of(path):
-            raise _upswing.InputError(f"{name}: expected a path, got an empty text")
+    texts = texts_of({name: value for name, value in named.items() if value is not None}) + own
     for name, function in (("on_episode", on_episode), ("on_metrics", on_metrics),
                            ("on_evaluation", on_evaluation), ("on_best", on_best)):
         if function is not None and not callable(function):
             raise _upswing.InputError(f"{name}: expected a function, got {function!r}")
     judged = source is None or solved_return is not None
-    line = _ProgressLine(sys.stderr, judged) if progress or progress is None else None
-    if line is not None and progress is None and not line.terminal:
-        line = None
+    line: _ProgressLine | None = None
+    if progress or progress is None:
+        line = _NotebookBar(judged) if _in_notebook() else _ProgressLine(sys.stderr, judged)
+        if progress is None and not line.terminal:
+            line = None
     rows: dict[str, list[Row]] = {"evaluation": [], "metrics": []}
     listeners = {"episode": on_episode, "metrics": on_metrics, "evaluation": on_evaluation}
 
@@ -182,26 +190,41 @@ def train(
     make = source.make if source is not None else None
     try:
         with interrupts or contextlib.nullcontext():
-            result = _upswing.train(texts, _path(config), _path(out), _path(resume), make, tick,
+            result = _upswing.train(texts, config_path, out_path, resume_path, make, tick,
                                     warn)
-    except _upswing.Failure as failure:
-        if source is None or source.cause is None:
-            raise
-        raise failure from source.cause
+    except Exception as error:
+        folder = out_path or resume_path
+        # Before Python 3.11 an exception has no notes. The package's own errors say it themselves.
+        if (os.path.isdir(folder) and hasattr(error, "add_note")
+                and not isinstance(error, _upswing.Error)):
+            error.add_note(f"upswing: {folder} keeps the last checkpoint; train(resume={folder!r}) "
+                           "continues from there")
+        raise
     finally:
         if line is not None:
             line.clear()
         if source is not None:
             source.close()
     best, last = result.pop("best"), result.pop("last")
-    return Training(best=Policy(best) if best is not None else None, last=Policy(last),
-                    evaluations=rows["evaluation"], metrics=rows["metrics"], **result)
+    interrupted = result.pop("interrupted")
+    training = Training(best=Policy(last if best is None else best), last=Policy(last),
+                        evaluations=rows["evaluation"], metrics=rows["metrics"], **result)
+    if not interrupted:
+        return training
+    what = f"training interrupted at step {training.steps:,}"
+    if training.path is not None:
+        what += f"; train(resume={training.path!r}) continues"
+    if not hasattr(sys, "ps1"):  # a script
+        interrupt = KeyboardInterrupt(what)
+        interrupt.training = training  # type: ignore[attr-defined]
+        raise interrupt
+    warn(what)
+    return training
 
 
 def _source_of(agent: str | None, env: EnvLike | None, num_envs: int | None,
                eval_env: EnvLike | None, max_episode_steps: int | None,
-               solved_return: float | None, resume: Any, config: Any,
-               settings: dict[str, Any]) -> tuple[Source | None, dict[str, Any]]:
+               solved_return: float | None, choose_agent: bool, settings: dict[str, Any]) -> tuple[Source | None, dict[str, Any]]:
     """The environments of `env`, and the settings that follow from it. Raises InputError."""
     arguments = {"num_envs": num_envs, "eval_env": eval_env,
                  "max_episode_steps": max_episode_steps, "solved_return": solved_return}
@@ -210,10 +233,6 @@ def _source_of(agent: str | None, env: EnvLike | None, num_envs: int | None,
             if value is not None:
                 raise _upswing.InputError(f"{name}: expected env with it, got none")
         return None, {}
-    if resume is not None:
-        raise _upswing.InputError(
-            "resume: expected none with env: the state of its environments cannot be saved, so "
-            "that their runs cannot resume")
     for name, instead in (("envs", "num_envs"), ("environment", "env")):
         if name in settings:
             raise _upswing.InputError(f"{name}: expected none with env; set {instead}")
@@ -225,13 +244,9 @@ def _source_of(agent: str | None, env: EnvLike | None, num_envs: int | None,
     found: dict[str, Any] = {"environment": source.description}
     if source.num_envs > 0 or num_envs is not None:
         found["envs"] = source.num_envs
-    if agent is None and config is None:
-        found["agent"] = "fast" if source.discrete else "sac"
+    if agent is None and choose_agent:
+        found["agent"] = "ppo" if source.discrete else "sac"
     return source, found
-
-
-def _path(path: str | os.PathLike[str] | None) -> str:
-    return "" if path is None else os.fspath(path)
 
 
 class _ProgressLine:
@@ -248,19 +263,65 @@ class _ProgressLine:
         for kind, what in events:
             if kind == "evaluation":
                 self.clear()
-                success = f"  success {100 * what['success_rate']:>4.0f}%" if self._judged else ""
-                print(f"{what['step']:>12,} steps {state['seconds']:>10.1f} s  return "
-                      f"{what['mean_return']:>6.0f}{success}", file=self._file, flush=True)
+                print(f"{what['step']:>12,} steps {state['seconds']:>10.1f} s  "
+                      f"{self._result(what)}", file=self._file, flush=True)
         now = time.monotonic()
         if not self.terminal or now - self._last < 0.2:
             return
         self._last = now
-        rate = state["steps"] / state["seconds"] if state["seconds"] > 0 else 0
-        print(f"\r\033[K{state['steps']:>12,} of {state['total_steps']:,} steps, {rate:,.0f}/s",
-              end="", file=self._file, flush=True)
+        print(f"\r\033[K{self._status(state)}", end="", file=self._file, flush=True)
         self._shown = True
+
+    def _result(self, row: Row) -> str:
+        success = f"  success {100 * row['success_rate']:>4.0f}%" if self._judged else ""
+        return f"return {row['mean_return']:>6.0f}{success}"
+
+    @staticmethod
+    def _status(state: Row) -> str:
+        rate = state["steps"] / state["seconds"] if state["seconds"] > 0 else 0
+        return f"{state['steps']:>12,} of {state['total_steps']:,} steps, {rate:,.0f}/s"
 
     def clear(self) -> None:
         if self._shown:
             print("\r\033[K", end="", file=self._file, flush=True)
         self._shown = False
+
+
+def _in_notebook() -> bool:
+    """Whether output goes to a notebook of Jupyter."""
+    interactive = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    return hasattr(interactive, "kernel")
+
+
+class _NotebookBar(_ProgressLine):
+    """A bar with the progress of a training and its last evaluation, for a notebook."""
+
+    def __init__(self, judged: bool) -> None:
+        super().__init__(sys.stderr, judged)
+        self.terminal = True  # wanted by default
+        self._handle: Any = None
+        self._evaluated = self._text = ""
+        self._value, self._max = 0, 1
+
+    def show(self, events: list[tuple[str, Any]], state: Row) -> None:
+        for kind, what in events:
+            if kind == "evaluation":
+                self._evaluated = f", {' '.join(self._result(what).split())} at step {what['step']:,}"
+        self._value, self._max = state["steps"], state["total_steps"]
+        self._text = self._status(state).strip() + self._evaluated
+        now = time.monotonic()
+        if now - self._last >= 0.2:
+            self._last = now
+            self._draw()
+
+    def clear(self) -> None:
+        self._draw()  # the last numbers stay
+
+    def _draw(self) -> None:
+        from IPython.display import display  # pylint: disable=import-outside-toplevel
+        shown = {"text/plain": self._text, "text/html":
+                 f"<progress value={self._value} max={self._max}></progress> {self._text}"}
+        if self._handle is None:
+            self._handle = display(shown, raw=True, display_id=True)
+        else:
+            self._handle.update(shown, raw=True)

@@ -78,8 +78,8 @@ bool IsForeign(std::string_view task) { return task.starts_with(kBeginning); }
 
 Error NoForeignEnvironment(const std::string& task) {
   return BadInput(Concat(task, ": expected a task of the program, got an environment of ",
-                         "Gymnasium, which only Python makes and steps (upswing.train, "
-                         "Policy.act)"));
+                         "Gymnasium, which only Python makes and steps (upswing.train and "
+                         "upswing.evaluate with env)"));
 }
 
 std::string ReplacementOf(std::string_view name) {

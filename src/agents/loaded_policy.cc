@@ -104,7 +104,7 @@ void ExpectPendulum(const LoadedPolicy& loaded) {
   if (!loaded.is_foreign()) return;
   throw BadInput(Concat(Printable(loaded.name), ": expected a policy of ", kDoublePendulum,
                         ", got one of ", loaded.task,
-                        ", an environment that only Python steps (Policy.act)"));
+                        ", an environment that only Python steps (upswing.evaluate with env)"));
 }
 
 int LoadedPolicy::memory() const {

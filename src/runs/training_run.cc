@@ -63,7 +63,8 @@ std::unique_ptr<TrainingRun> TrainingRun::Make(const fs::path& out, Config confi
 }
 
 std::unique_ptr<TrainingRun> TrainingRun::Resume(const fs::path& path,
-                                                 const std::vector<FlagValue>& flags) {
+                                                 const std::vector<FlagValue>& flags,
+                                                 ForeignMaker make_foreign) {
   if (!fs::exists(path / RunFolder::kConfig)) {
     throw BadInput(
         Concat("--resume ", path.string(), ": expected a run folder with a config.toml"));
@@ -71,7 +72,7 @@ std::unique_ptr<TrainingRun> TrainingRun::Resume(const fs::path& path,
   FolderLock lock(path);  // taken before the run is read
   Config config = ReadRunConfig(path, flags);
   NameModelCopy(config);
-  std::unique_ptr<TrainingRun> run(new TrainingRun(path, config));
+  std::unique_ptr<TrainingRun> run(new TrainingRun(path, config, std::move(make_foreign)));
   run->lock_.emplace(std::move(lock));
   Training& training = run->training_;
   const Tensors checkpoint = LoadTensors(RunFolder::CheckpointPath(path));
@@ -102,6 +103,9 @@ bool TrainingRun::Train(TrainObserver& view, const std::function<TrainRequest()>
                                          " is kept in ", path_.string()));
     LogIfPossible(failure.what());
     throw failure;
+  } catch (...) {  // from an environment in Python
+    LogIfPossible(Concat("stopped by an exception at step ", s.steps));
+    throw;
   }
   folder_->Log(Concat(finished ? "finished" : "stopped", " at step ", s.steps, " ",
                       EndFacts(clock.seconds(), clock.busy(training_.threads()))));

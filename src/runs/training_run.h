@@ -30,7 +30,8 @@ class TrainingRun : private TrainObserver {
   /// Opens the run in a folder and changes some settings. Throws BadInput and changes nothing if
   /// another process works there, or if the run is incomplete or from another version.
   static std::unique_ptr<TrainingRun> Resume(const std::filesystem::path& path,
-                                             const std::vector<FlagValue>& flags = {});
+                                             const std::vector<FlagValue>& flags = {},
+                                             ForeignMaker make_foreign = {});
 
   const Training& training() const { return training_; }
   const std::filesystem::path& path() const { return path_; }
