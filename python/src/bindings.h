@@ -20,10 +20,8 @@
 #include "base/error.h"
 #include "judge/trial.h"
 
-/// Shared parts of the extension module. Only the package's Python code (python/upswing) uses its
-/// classes and functions.
-/// Texts are bytes in UTF-8. Others, such as names of files, are str with surrogates in Python, as
-/// os.fsdecode makes them.
+/// Python's str and the library's texts. Bytes that are not UTF-8, such as in names of files, are
+/// surrogates in Python, as os.fsdecode makes them.
 template <>
 struct nanobind::detail::type_caster<std::string> {
   NB_TYPE_CASTER(std::string, const_name("str"))
@@ -47,6 +45,8 @@ struct nanobind::detail::type_caster<std::string> {
   }
 };
 
+/// Shared parts of the extension module. Only the package's Python code (python/upswing) uses its
+/// classes and functions.
 namespace upswing {
 
 /// Settings from Python: name and text of each.

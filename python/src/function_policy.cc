@@ -1,7 +1,7 @@
 // A Python function as a policy.
-
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 #include <utility>
 
 #include "base/error.h"

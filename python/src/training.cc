@@ -81,10 +81,10 @@ class PythonDriver final : public TrainObserver {
     const auto now = std::chrono::steady_clock::now();
     if (events_.empty() && now - last_ < kBetween) return TrainRequest::kGoOn;
     last_ = now;
+    // After an exception the training must end in order, with its checkpoint.
     try {
       if (Tell()) return TrainRequest::kGoOn;
-    } catch (
-        const nb::python_error& error) {  // the training must end in order, with its checkpoint
+    } catch (const nb::python_error& error) {
       const nb::gil_scoped_acquire lock;
       interrupted_ = error.matches(PyExc_KeyboardInterrupt);
       error_ = std::current_exception();
