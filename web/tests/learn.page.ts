@@ -62,8 +62,8 @@ function filmTitle(page: Page): Promise<string[]> {
 }
 
 /// Makes the next page report the real training of a seed as solved from tellSolved() on.
-function solveWhenTold(page: Page, solved: number): Promise<void> {
-  return page.addInitScript((solved) => {
+async function solveWhenTold(page: Page, solved: number): Promise<void> {
+  await page.addInitScript((solved) => {
     globalThis.Worker = class extends Worker {
       private seed = 0;
       override postMessage(order: Order): void {
