@@ -315,7 +315,7 @@ test('a policy learned while you were elsewhere is on the stage when you return'
   await expect(page.locator('#learn-where')).toHaveText('on the stage: as it is now');
   const [agent, progress] = await filmTitle(page);
   expect(agent).toBe(`a small Dueling Double DQN, seed ${SEED}`);
-  expect(progress).toMatch(/^after [\d,]+ steps, success \d+%$/);
+  expect(progress).toMatch(/^after [\d,]+ steps(, success \d+%)?$/);
 });
 
 test('the view has one pause, for the training', async ({ stage: page }) => {
