@@ -152,7 +152,8 @@ std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::str
       const std::string_view cell = WithoutQuotes(cells[places[i]]);
       const auto number = NumberIn(cell, line);
       if (!number) {
-        throw line.Bad(Concat(names[i], ": expected a finite number, got \"", cell, "\""));
+        throw line.Bad(
+            Concat(names[i], ": expected a finite number, got \"", Printable(cell), "\""));
       }
       columns[i].values.push_back(*number);
     }

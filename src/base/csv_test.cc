@@ -73,6 +73,8 @@ TEST(Csv, MessagesNameLineAndColumn) {
                       "a"),
             "t.csv: expected text in UTF-8, got UTF-16: save it as UTF-8");
   EXPECT_EQ(Complaint("a,b\n# c\n1,x\n"), "t.csv:3: b: expected a finite number, got \"x\"");
+  EXPECT_EQ(Complaint(std::string("a,b\n1,2\0003\n", 10)),
+            "t.csv:2: b: expected a finite number, got \"2\\x003\"");
   EXPECT_EQ(Complaint("a,b\n1,inf\n"), "t.csv:2: b: expected a finite number, got \"inf\"");
   EXPECT_EQ(Complaint("a,b\nx,1\n"), "none");
   EXPECT_EQ(Complaint("a,b\n\"x,1\n"), "t.csv:2: expected a closing quote, got \"\"x,1\"");
