@@ -34,20 +34,19 @@ class Translator {
     CheckStructure();
     ReadLinks();
     ReadMotor();
-    ModelPtr ours = CompileModel(Mjcf(plant_), where_);
-    CopyOptions(*ours);
-    for (const int j : {0, 1}) CopyJoint(j, *ours);
-    Plant plant = PlantOf(*ours);
-    const Options options = OptionsOf(plant);
+    const Options options = OptionsOf(plant_);
     for (const Option& option : options.all()) {
       option.Set(FormatNumber(option.number()), Concat(where_, ": ", option.name));
     }
-    WritePlant(plant, FieldsOf(*ours, false));
+    ModelPtr ours = CompileModel(Mjcf(plant_), where_);
+    CopyOptions(*ours);
+    for (const int j : {0, 1}) CopyJoint(j, *ours);
+    WritePlant(plant_, FieldsOf(*ours, false));
     const DataPtr data(mj_makeData(ours.get()));
     mj_setConst(ours.get(), data.get());
     CheckContacts();
     Compare(*ours, *data);
-    return {std::move(ours), angles_};
+    return {std::move(ours), plant_, angles_};
   }
 
  private:
@@ -136,22 +135,20 @@ class Translator {
     Expect(std::abs(along1.imag()) < 1e-6 && along1.real() > 1e-9,
            Concat("the centre of mass of link 1 on the line from its hinge to the second, got ",
                   along1.real(), " m along it and ", along1.imag(), " m next to it"));
-    plant_.center1 = along1.real();
-    plant_.center2 = std::abs(center2);
-    Expect(plant_.center2 > 1e-9, "a distance from the hinge to the centre of mass of link 2");
-    const Point direction2 = center2 / plant_.center2;
+    const double c2 = std::abs(center2);
+    Expect(c2 > 1e-9, "a distance from the hinge to the centre of mass of link 2");
+    const Point direction2 = center2 / c2;
     plant_.length2 = EndOf(hinge2, direction2);
     Expect(plant_.length2 > 1e-9, "a geom on link 2, whose end gives the link's length");
 
     // Moments about the centres of mass, from the mass matrix.
     std::array<mjtNum, 4> M{};
     mj_fullM(&m, data_.get(), M.data());
-    const double least = 1e-12;  // of a point mass; 0 would mean a capsule
     const double I2 = M[3] - m.dof_armature[1] - mass[1] * std::norm(center2);
     const double I1 = M[0] - m.dof_armature[0] - mass[0] * std::norm(center1) - I2 -
                       mass[1] * std::norm(hinge2 + center2 - hinge1);
-    plant_.inertia1 = std::max(I1, least);
-    plant_.inertia2 = std::max(I2, least);
+    SetOwn(0, {mass[0], plant_.length1, along1.real(), I1}, &plant_.center1, &plant_.inertia1);
+    SetOwn(1, {mass[1], plant_.length2, c2, I2}, &plant_.center2, &plant_.inertia2);
 
     angles_[1].sign = parallel > 0 ? 1 : -1;
     const std::array q{std::arg(direction1), std::arg(direction2 / direction1)};
@@ -161,6 +158,21 @@ class Translator {
     }
   }
 
+  /// Sets a link's centre of mass and inertia, unless they are those of a solid capsule with the
+  /// radius of the link's first capsule.
+  void SetOwn(int j, const Link& link, double* center, double* inertia) {
+    const mjModel& m = *given_;
+    for (int g = m.ngeom - 1; g >= 0; --g) {
+      const bool capsule = m.geom_type[g] == mjGEOM_CAPSULE && IsPart(m.geom_bodyid[g], j);
+      if (capsule) radius_[j] = m.geom_size[3 * g];
+    }
+    constexpr double kRounding = 1e-9;  // m, and share of an inertia
+    const double capsule = CapsuleInertia(link.m, radius_[j], link.l).across;
+    if (std::abs(link.c - link.l / 2) > kRounding) *center = link.c;
+    // A point mass has at least a little, because 0 means a capsule.
+    if (std::abs(link.I - capsule) > kRounding * capsule) *inertia = std::max(link.I, 1e-12);
+  }
+
   /// Distance (m) from the second hinge to the end of link 2's geoms in a direction. A capsule ends
   /// at the centre of its half sphere.
   double EndOf(Point hinge, Point direction) const {
@@ -168,18 +180,16 @@ class Translator {
     double end = 0;
     for (int g = 0; g < m.ngeom; ++g) {
       if (!IsPart(m.geom_bodyid[g], 1)) continue;
-      const mjtNum *R = data_->geom_xmat + 9 * g, *size = m.geom_size + 3 * g;
-      const auto half = [&](int k, double length) {
-        const mjtNum axis[3] = {R[k], R[3 + k], R[6 + k]};
-        return std::abs((At(axis) / direction).real()) * length;
-      };
-      double reach = 0;  // of a sphere
-      if (m.geom_type[g] == mjGEOM_CAPSULE || m.geom_type[g] == mjGEOM_CYLINDER) {
-        reach = half(2, size[1]);
-      } else if (m.geom_type[g] != mjGEOM_SPHERE) {
-        reach = half(0, size[0]) + half(1, size[1]) + half(2, size[2]);
+      const int type = m.geom_type[g];
+      const bool rod = type == mjGEOM_CAPSULE || type == mjGEOM_CYLINDER;
+      double reach = ((At(data_->geom_xpos + 3 * g) - hinge) / direction).real();
+      for (int k = 0; k < 3 && type != mjGEOM_SPHERE; ++k) {
+        const mjtNum* R = data_->geom_xmat + 9 * g + k;
+        const mjtNum axis[3] = {R[0], R[3], R[6]};
+        const double half = !rod ? m.geom_size[3 * g + k] : k == 2 ? m.geom_size[3 * g + 1] : 0;
+        reach += std::abs((At(axis) / direction).real()) * half;
       }
-      end = std::max(end, ((At(data_->geom_xpos + 3 * g) - hinge) / direction).real() + reach);
+      end = std::max(end, reach);
     }
     return end;
   }
@@ -223,14 +233,11 @@ class Translator {
     ours.opt.enableflags = 0;
   }
 
-  /// Copies what the plant does not describe: armature, friction, spring, limit, a capsule's
-  /// radius.
+  /// Copies the numbers that are no part of the plant: armature, friction, spring, limit, a
+  /// capsule's radius.
   void CopyJoint(int j, mjModel& ours) const {
     const mjModel& m = *given_;
-    for (int g = m.ngeom - 1; g >= 0; --g) {
-      const bool capsule = m.geom_type[g] == mjGEOM_CAPSULE && IsPart(m.geom_bodyid[g], j);
-      if (capsule) ours.geom_size[3 * j] = m.geom_size[3 * g];
-    }
+    ours.geom_size[3 * j] = radius_[j];
     const auto copy = [&](auto field, int width) {
       std::copy_n(m.*field + width * j, width, ours.*field + width * j);
     };
@@ -346,8 +353,9 @@ class Translator {
   DataPtr data_;
   Plant plant_;
   std::array<JointAngle, 2> angles_;
-  mjtNum down_[3]{}, side_[3]{};  // axes of the plane in the world
-  double torque_ = 0;             // of a control of 1, in the direction of our angle, N·m
+  mjtNum down_[3]{}, side_[3]{};                                  // axes of the plane in the world
+  std::array<double, 2> radius_{kCapsuleRadius, kCapsuleRadius};  // m
+  double torque_ = 0;  // of a control of 1, in the direction of our angle, N·m
 };
 
 }  // namespace

@@ -117,7 +117,7 @@ TEST(LoadModel, EveryFormOfAPendulumMovesAsInMuJoCoAndAsTheUsualForm) {
   for (const Same& same : SamePendulums()) {
     SCOPED_TRACE(same.name);
     const LoadedModel loaded = LoadModel(same.form.Mjcf(), "m.xml");
-    const Plant plant = PlantOf(*loaded.model);
+    const Plant plant = loaded.plant;
     EXPECT_NEAR(plant.torque_limit, 5, 1e-15);
     EXPECT_NEAR(plant.length2, 0.4, 1e-15);
     EXPECT_FALSE(plant.has_own_links());
@@ -144,8 +144,8 @@ TEST(LoadModel, TakesWhatMuJoCoWritesOfAModel) {
     std::string written(20000, '\0');
     ASSERT_EQ(mj_saveXMLString(spec.get(), written.data(), 20000, message.data(), 500), 0);
     written.resize(written.find('\0'));
-    const Plant before = PlantOf(*LoadModel(mjcf, "m.xml").model);
-    const Plant after = PlantOf(*LoadModel(written, "m.xml").model);
+    const Plant before = LoadModel(mjcf, "m.xml").plant;
+    const Plant after = LoadModel(written, "m.xml").plant;
     EXPECT_NEAR(before.mass2, after.mass2, 1e-6);
     EXPECT_NEAR(before.length2, after.length2, 1e-6);
     EXPECT_NEAR(before.torque_limit, after.torque_limit, 1e-6);
@@ -171,7 +171,7 @@ TEST(LoadModel, TakesLinksOfSeveralBodiesAndShapes) {
       "<geom type=\"box\" size=\"0.05 0.05 0.05\" pos=\"0 0 -0.5\" mass=\"0.2\"/>"
       "<body pos=\"0 0 -0.4\"><frame pos=\"0 0.2 0\"><geom size=\"0.05\" "
       "mass=\"0.3\"/></frame></body>";
-  const Plant plant = PlantOf(*LoadModel(form.Mjcf(), "m.xml").model);
+  const Plant plant = LoadModel(form.Mjcf(), "m.xml").plant;
   EXPECT_NEAR(plant.mass2, 1.3, 1e-15);
   EXPECT_NEAR(plant.length2, 0.55, 1e-15);
   EXPECT_NEAR(plant.center2, (0.8 * 0.2 + 0.2 * 0.5 + 0.3 * 0.4) / 1.3, 1e-15);

@@ -19,72 +19,67 @@ constexpr size_t kMostName = 100;   // bytes
 
 constexpr double kLargest = 1e6;  // largest magnitude of a number
 
-/// An element with its allowed attributes and child elements, as words.
+/// An element that a model may contain, with its child elements as words. "*": any, because they
+/// are not compiled.
 struct Element {
-  std::string name, attributes, children = {};
+  std::string_view name, children = "";
 };
 
-/// Attributes that hold a name. Other attributes hold numbers and kKeywords; MuJoCo checks which
-/// ones and how many.
-constexpr std::string_view kNames =
+constexpr std::string_view kInBody = "body frame geom joint inertial light camera site";
+constexpr Element kElements[] = {
+    {"mujoco",
+     "compiler option size default worldbody actuator contact asset visual statistic custom sensor "
+     "keyframe"},
+    {"option", "flag"},
+    {"default", "default joint geom site camera light material motor general"},
+    {"worldbody", "body frame geom light camera site"},
+    {"body", kInBody},
+    {"frame", kInBody},
+    {"actuator", "motor general"},
+    {"contact", "exclude"},
+    {"asset", "texture material"},
+    {"visual", "*"},
+    {"statistic", "*"},
+    {"custom", "*"},
+    {"sensor", "*"},
+    {"keyframe", "*"},
+    {"texture", "*"},
+    {"material", "*"},
+    {"light", "*"},
+    {"camera", "*"},
+    {"site", "*"}};
+
+/// Attributes with a name or another text, of any element. MuJoCo checks which element has which.
+constexpr std::string_view kTexts =
     "name class childclass model joint jointinparent body1 body2 material eulerseq meshdir "
-    "texturedir "
-    "assetdir memory nstack njmax nconmax nkey";
+    "texturedir assetdir memory nstack njmax nconmax nkey";
+/// Attributes with numbers or kKeywords.
+constexpr std::string_view kNumbers =
+    // compiler
+    "angle autolimits coordinate inertiafromgeom inertiagrouprange balanceinertia boundmass "
+    "boundinertia settotalmass discardvisual fusestatic alignfree saveinertial usethread "
+    "convexhull fitaabb strippath "
+    // option and flag
+    "timestep gravity wind magnetic density viscosity integrator solver iterations tolerance "
+    "ls_iterations ls_tolerance noslip_iterations noslip_tolerance ccd_iterations ccd_tolerance "
+    "jacobian cone impratio contact constraint equality frictionloss limit warmstart eulerdamp "
+    "refsafe midphase nativeccd island energy sensor filterparent spring damper actuation "
+    "clampctrl fwdinv invdiscrete multiccd autoreset "
+    // body and inertial
+    "pos quat axisangle xyaxes zaxis euler gravcomp mass diaginertia fullinertia "
+    // joint
+    "group type axis ref springref stiffness springdamper damping armature limited range margin "
+    "solreflimit solimplimit solreffriction solimpfriction actuatorfrclimited actuatorfrcrange "
+    // geom
+    "size fromto rgba shellinertia contype conaffinity condim priority friction solmix solref "
+    "solimp gap fluidshape fluidcoef "
+    // motor and general
+    "gear ctrllimited ctrlrange forcelimited forcerange dyntype gaintype biastype dynprm gainprm "
+    "biasprm";
 constexpr std::string_view kKeywords =
     "false true auto enable disable degree radian local Euler RK4 implicit implicitfast PGS CG "
     "Newton dense sparse pyramidal elliptic hinge slide ball free capsule sphere ellipsoid "
     "cylinder box plane none fixed affine";
-
-/// The elements that a model may contain. "*": anything, because it is not compiled.
-std::vector<Element> MakeElements() {
-  const std::string named = "name class ", place = "pos quat axisangle xyaxes zaxis euler ",
-                    in_body = "body frame geom light camera site ";
-  const std::string motor = named +
-                            "group joint jointinparent gear ctrllimited ctrlrange "
-                            "forcelimited forcerange ";
-  std::vector<Element> elements{
-      {"mujoco", "model",
-       "compiler option size default worldbody actuator contact asset visual statistic custom "
-       "sensor keyframe"},
-      {"compiler",
-       "angle autolimits coordinate eulerseq inertiafromgeom inertiagrouprange balanceinertia "
-       "boundmass boundinertia settotalmass discardvisual fusestatic alignfree saveinertial "
-       "usethread convexhull fitaabb strippath meshdir texturedir assetdir"},
-      {"option",
-       "timestep gravity wind magnetic density viscosity integrator solver iterations tolerance "
-       "ls_iterations ls_tolerance noslip_iterations noslip_tolerance ccd_iterations ccd_tolerance "
-       "jacobian cone impratio",
-       "flag"},
-      {"flag",
-       "contact constraint equality frictionloss limit warmstart eulerdamp refsafe midphase "
-       "nativeccd island energy sensor filterparent gravity spring damper actuation clampctrl "
-       "fwdinv invdiscrete multiccd autoreset"},
-      {"size", "memory nstack njmax nconmax nkey"},
-      {"default", "class", "default joint geom site camera light material motor general"},
-      {"worldbody", "", in_body},
-      {"frame", "name childclass " + place, in_body},
-      {"body", "name childclass gravcomp " + place, in_body + "joint inertial"},
-      {"inertial", "mass diaginertia fullinertia " + place},
-      {"joint", named + "group type axis pos ref springref stiffness springdamper damping armature "
-                        "frictionloss limited range margin solreflimit solimplimit solreffriction "
-                        "solimpfriction actuatorfrclimited actuatorfrcrange"},
-      {"geom",
-       named + place +
-           "group type size fromto rgba material mass density shellinertia contype "
-           "conaffinity condim priority friction solmix solref solimp margin gap fluidshape "
-           "fluidcoef"},
-      {"actuator", "", "motor general"},
-      {"motor", motor},
-      {"general", motor + "dyntype gaintype biastype dynprm gainprm biasprm"},
-      {"contact", "", "exclude"},
-      {"exclude", "name body1 body2"},
-      {"asset", "", "texture material"}};
-  for (const char* name : {"visual", "statistic", "custom", "sensor", "keyframe", "texture",
-                           "material", "light", "camera", "site"}) {
-    elements.push_back({name, "*", "*"});
-  }
-  return elements;
-}
 
 /// The words of `text`, separated by whitespace.
 std::vector<std::string> Words(std::string_view text) {
@@ -108,7 +103,7 @@ std::string Quoted(std::string_view text) {
 /// Checks one document; error messages begin with `where`.
 class Checker {
  public:
-  explicit Checker(const std::string& where) : where_(where), elements_(MakeElements()) {}
+  explicit Checker(const std::string& where) : where_(where) {}
 
   void Check(const std::string& mjcf) {
     tinyxml2::XMLDocument document;
@@ -159,7 +154,7 @@ class Checker {
     if (ignored && element->Name() == std::string_view("include")) Find(*element, nullptr);
     const Element& known = ignored ? *parent : Find(*element, parent);
     for (const auto* a = element->FirstAttribute(); a != nullptr; a = a->Next()) {
-      if (known.attributes != "*") CheckAttribute(*a, known);
+      if (known.children != "*") CheckAttribute(*a, element->Name());
     }
     for (const auto* child = node.FirstChild(); child != nullptr; child = child->NextSibling()) {
       CheckNode(*child, &known, level + 1);
@@ -174,34 +169,34 @@ class Checker {
     }
     const std::vector<std::string> expected = Words(parent ? parent->children : "mujoco");
     if (std::ranges::find(expected, name) == expected.end()) {
-      const std::string place = parent ? Concat(" in <", parent->name, ">") : "";
+      const std::string place = parent ? Concat(" in <", element.Parent()->Value(), ">") : "";
       Refuse(element.GetLineNum(),
              Concat("expected ",
                     expected.empty() ? "nothing" : Concat("<", Join(expected, ">, <"), ">"), place,
                     ", got ", Quoted(name), DidYouMean(name.substr(0, kMostName), expected)));
     }
-    return *std::ranges::find(elements_, name, &Element::name);
+    const auto* known = std::ranges::find(kElements, name, &Element::name);
+    static constexpr Element kLeaf{};
+    return known == std::end(kElements) ? kLeaf : *known;
   }
 
-  void CheckAttribute(const tinyxml2::XMLAttribute& attribute, const Element& element) const {
+  void CheckAttribute(const tinyxml2::XMLAttribute& attribute, std::string_view element) const {
     const int line = attribute.GetLineNum();
     const std::string name = attribute.Name();
-    const std::vector<std::string> names = Words(element.attributes);
+    const std::vector<std::string> names = Words(Concat(kTexts, " ", kNumbers));
     if (std::ranges::count(names, name) == 0) {
-      Refuse(line, Concat("<", element.name, "> takes no ", Quoted(name), " here",
-                          DidYouMean(name.substr(0, kMostName), names), "; expected ",
-                          names.empty() ? "no attribute" : Join(names, ", ")));
+      Refuse(line, Concat("<", element, "> takes no ", Quoted(name), " here",
+                          DidYouMean(name.substr(0, kMostName), names)));
     }
     const std::string_view text = attribute.Value();
     const std::string expected = Expected(name, text);
     if (expected.empty()) return;
-    Refuse(line,
-           Concat("<", element.name, "> ", name, ": expected ", expected, ", got ", Quoted(text)));
+    Refuse(line, Concat("<", element, "> ", name, ": expected ", expected, ", got ", Quoted(text)));
   }
 
   /// A description of the attribute's valid values; empty if `text` is valid.
   static std::string Expected(const std::string& name, std::string_view text) {
-    if (std::ranges::count(Words(kNames), name) > 0) {
+    if (std::ranges::count(Words(kTexts), name) > 0) {
       const bool fits = text.size() <= kMostName && Printable(text) == text;
       return fits ? "" : Concat("a name of at most ", kMostName, " bytes");
     }
@@ -216,7 +211,6 @@ class Checker {
   }
 
   const std::string& where_;
-  std::vector<Element> elements_;
   int count_ = 0;  // number of elements so far
 };
 

@@ -93,7 +93,7 @@ TEST(MjcfCheck, AcceptsHandWrittenModels) {
 )";
   EXPECT_EQ(ErrorOf(mjcf), "");
   const LoadedModel model = LoadModel(mjcf, "m.xml");
-  EXPECT_EQ(PlantOf(*model.model).torque_limit, 6);
+  EXPECT_EQ(model.plant.torque_limit, 6);
   const std::vector<std::string> differences = DifferencesFromBuiltIn(model);
   const std::vector<std::string> expected{"timestep 0.002 s",       "integrator implicitfast",
                                           "density 1.2 kg/m³",      "viscosity 2e-05 Pa·s",

@@ -84,7 +84,7 @@ ModelPtr CompileModel(const std::string& mjcf, const std::string& where, bool on
 
 std::vector<std::string> DifferencesFromBuiltIn(const LoadedModel& loaded) {
   const mjModel& model = *loaded.model;
-  const Plant plant = PlantOf(model);
+  const Plant& plant = loaded.plant;
   const ModelPtr ours = CompileModel(Mjcf(plant), "built-in model");
   std::vector<std::string> differences;
   const auto compare = [&](const std::string& what, double a, double b, std::string_view unit) {
@@ -144,34 +144,6 @@ std::vector<std::string> DifferencesFromBuiltIn(const LoadedModel& loaded) {
     soft("solimplimit" + number, model.jnt_solimp + mjNIMP * i, ours->jnt_solimp, mjNIMP);
   }
   return differences;
-}
-
-Plant PlantOf(const mjModel& model) {
-  Plant plant;
-  plant.mass1 = model.body_mass[1];
-  plant.mass2 = model.body_mass[2];
-  plant.length1 = 2 * model.geom_size[1];
-  plant.length2 = 2 * model.geom_size[4];
-  plant.damping1 = model.dof_damping[0];
-  plant.damping2 = model.dof_damping[1];
-  plant.gravity = -model.opt.gravity[2];
-  plant.torque_limit = model.actuator_ctrlrange[1];
-  plant.actuated_joint = model.actuator_trnid[0] + 1;
-  constexpr double kRounding = 1e-9;  // m, and share of an inertia
-  for (const int body : kLinkBodies) {
-    const int geom = body - 1;
-    const double length = 2 * model.geom_size[3 * geom + 1];
-    const double center = -model.body_ipos[3 * body + 2], I = model.body_inertia[3 * body];
-    const double capsule =
-        CapsuleInertia(model.body_mass[body], model.geom_size[3 * geom], length).across;
-    if (std::abs(center - length / 2) > kRounding) {
-      (body == 1 ? plant.center1 : plant.center2) = center;
-    }
-    if (std::abs(I - capsule) > kRounding * capsule) {
-      (body == 1 ? plant.inertia1 : plant.inertia2) = I;
-    }
-  }
-  return plant;
 }
 
 ModelFields FieldsOf(mjModel& model, bool built_in) {

@@ -41,9 +41,12 @@ struct JointAngle {
   double Back(double q) const { return sign * (q - offset); }
 };
 
-/// The built-in model with the numbers of a file, and the angles of the file's joints.
+/// The built-in model with the numbers of a file.
 struct LoadedModel {
   ModelPtr model;
+  /// Own centres of mass and inertias where the links are not solid capsules. No rotors, no dry
+  /// friction and the default armature: a file has its own.
+  Plant plant;
   std::array<JointAngle, 2> angles;
 };
 
@@ -63,11 +66,6 @@ LoadedModel LoadModel(const std::string& mjcf, const std::string& where);
 /// parameters; such as "armature1 0.02 kg·m²". A limit or friction that a flag of the model
 /// switches off is one of them, and says so. Also angles that the file counts in another way.
 std::vector<std::string> DifferencesFromBuiltIn(const LoadedModel& loaded);
-
-/// The plant that a loaded model describes. It has own centres of mass and inertias where the links
-/// are not solid capsules. It has no rotors, no dry friction and the default armature, which only
-/// the built-in model takes from a plant.
-Plant PlantOf(const mjModel& model);
 
 /// Pointers to the plant's numbers in an mjModel, or in rows that a batch has expanded. The
 /// comments give sizes.

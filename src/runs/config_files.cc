@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 ModelFile ReadModel(const std::string& path) {
   ModelFile model{path, ReadOwnFile(path, kMostMjcfBytes), {}};
-  model.plant = PlantOf(*LoadModel(model.mjcf, path).model);
+  model.plant = LoadModel(model.mjcf, path).plant;
   return model;
 }
 

@@ -12,7 +12,7 @@ bool TryInput(std::string_view input) {
   config.num_envs = 1;
   config.mjcf = mjcf;
   config.engine = &kMuJoCo;
-  if (!Accepts([&] { config.plants = {PlantOf(*LoadModel(mjcf, kInputName).model)}; })) return false;
+  if (!Accepts([&] { config.plants = {LoadModel(mjcf, kInputName).plant}; })) return false;
   // An accepted model can be simulated.
   PendulumEnv env(config);
   StepResult result = env.MakeResult();
