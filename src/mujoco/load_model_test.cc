@@ -80,6 +80,9 @@ std::vector<Same> SamePendulums() {
   add("a floor below").world = "<geom type=\"plane\" pos=\"0 0 1.05\" size=\"1 1 1\"/><light/>";
   add("a floor without contact").world =
       "<geom type=\"plane\" pos=\"0 0 1.9\" size=\"1 1 1\" contype=\"0\" conaffinity=\"0\"/>";
+  Form& no_limit = add("limits that a flag switches off");
+  no_limit.joint1 += " range=\"0 90\"";
+  no_limit.option = "><flag limit=\"disable\"/></option><option ";
   add("values that are the defaults").option = "wind=\"0 0 0\" density=\"0\" gravity=\"0 0 -9.81\"";
   Form& extras = add("extras");
   extras.top =
