@@ -98,7 +98,7 @@ def text_of(value: Any) -> str:
     return str(value)
 
 
-# Names of earlier versions and of Stable-Baselines3, with their replacements.
+# Names of earlier versions and of Stable-Baselines3, and their replacements.
 _OTHER_NAMES = {
     "task": "env in train and evaluate, which are for the double pendulum without it",
     "total_timesteps": "steps", "n_envs": "num_envs with env, else envs", "net_arch": "hidden",
