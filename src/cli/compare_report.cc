@@ -109,12 +109,17 @@ void PrintGroup(const RunGroup& group, const std::string& task) {
 void PrintPair(const Comparison& comparison, const PairSummary& pair) {
   fmt::print("{} against {}\n", Printable(comparison.groups[pair.a].label),
              Printable(comparison.groups[pair.b].label));
-  fmt::print("  {:<16}{}", "solves sooner", PairsText(pair.sooner));
-  if (pair.seconds_difference) {
-    fmt::print("; difference of IQMs [s]: {}", EstimateText(*pair.seconds_difference, Signed));
-  }
-  fmt::print("\n  {:<16}{}; difference of IQMs: {}\n\n", "higher return",
-             PairsText(pair.higher_return), EstimateText(pair.return_difference, Signed));
+  const auto print = [](const char* name, const PairFigure& figure, const char* unit) {
+    fmt::print("  {:<16}{}", name, PairsText(figure.better));
+    if (figure.difference) {
+      fmt::print("; difference of IQMs{}: {}", unit, EstimateText(*figure.difference, Signed));
+    }
+    fmt::print("\n");
+  };
+  print("solves sooner", pair.seconds, " [s]");
+  print("in fewer steps", pair.steps, " [steps]");
+  print("higher return", pair.final_return, "");
+  fmt::print("\n");
 }
 
 /// Prints the figures of a policy, which has no seeds.
@@ -230,14 +235,17 @@ std::string ComparisonJson(const Comparison& comparison) {
   for (const RunGroup& group : comparison.groups) j["groups"].push_back(GroupJson(group));
   j["pairs"] = ordered_json::array();
   for (const PairSummary& pair : comparison.pairs) {
-    j["pairs"].push_back(
-        {{"group", comparison.groups[pair.a].label},
-         {"against", comparison.groups[pair.b].label},
-         {"solves_sooner", EstimateJson(pair.sooner)},
-         {"solve_seconds_difference",
-          pair.seconds_difference ? EstimateJson(*pair.seconds_difference) : ordered_json()},
-         {"higher_return", EstimateJson(pair.higher_return)},
-         {"return_difference", EstimateJson(pair.return_difference)}});
+    const auto difference = [](const PairFigure& figure) {
+      return figure.difference ? EstimateJson(*figure.difference) : ordered_json();
+    };
+    j["pairs"].push_back({{"group", comparison.groups[pair.a].label},
+                          {"against", comparison.groups[pair.b].label},
+                          {"solves_sooner", EstimateJson(pair.seconds.better)},
+                          {"solve_seconds_difference", difference(pair.seconds)},
+                          {"solves_in_fewer_steps", EstimateJson(pair.steps.better)},
+                          {"solve_steps_difference", difference(pair.steps)},
+                          {"higher_return", EstimateJson(pair.final_return.better)},
+                          {"return_difference", difference(pair.final_return)}});
   }
   j["policies"] = ordered_json::array();
   for (const JudgedPolicy& policy : comparison.policies) {

@@ -135,7 +135,9 @@ class CompareTest(ProgramTest):
         (pair,) = answer["pairs"]
         self.assertEqual((pair["group"], pair["against"]), ("dqn", "d3qn"))
         self.assertEqual(pair["solves_sooner"]["value"], 0)
+        self.assertEqual(pair["solves_in_fewer_steps"], pair["solves_sooner"])
         self.assertIsNone(pair["solve_seconds_difference"])
+        self.assertIsNone(pair["solve_steps_difference"])
         self.assertEqual(pair["return_difference"]["value"],
                          (2501 + 2502 + 903) / 3 - (2501 + 2502 + 2503) / 3)
         # Zero of nine pairs does not mean that it never happens.
@@ -143,7 +145,8 @@ class CompareTest(ProgramTest):
         self.assertEqual(low, 0)
         self.assertAlmostEqual(high, 0.499, delta=0.001)
         self.assertIn("solves sooner   with probability 0.00 (95% 0.00 to 0.50), in no pair of "
-                      "runs\n", self.succeed("compare", "a", "b"))
+                      "runs\n  in fewer steps  with probability 0.00 ",
+                      self.succeed("compare", "a", "b"))
         self.assertEqual(self.compare("b", "a")["pairs"][0]["solves_sooner"]["value"], 1)
 
     def test_stability(self):

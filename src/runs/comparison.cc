@@ -106,18 +106,19 @@ GroupSummary Summarize(const RunGroup& group) {
 }
 
 PairSummary ComparePair(const std::vector<RunGroup>& groups, size_t a, size_t b) {
-  const GroupSummary &of_a = groups[a].summary, &of_b = groups[b].summary;
-  const std::vector<double>& seconds_a = of_a.solve_seconds.values;
-  const std::vector<double>& seconds_b = of_b.solve_seconds.values;
-  const Strata return_a{of_a.final_return.values}, return_b{of_b.final_return.values};
-  PairSummary pair{a, b, {}, {}, {}, {}};
-  pair.sooner = EstimateImprovement({Negated(seconds_a)}, {Negated(seconds_b)});
-  pair.higher_return = EstimateImprovement(return_a, return_b);
-  if (AllFinite(seconds_a) && AllFinite(seconds_b)) {
-    pair.seconds_difference = EstimateIqmDifference({seconds_a}, {seconds_b});
-  }
-  pair.return_difference = EstimateIqmDifference(return_a, return_b);
-  return pair;
+  const auto compare = [&](Scores GroupSummary::*scores, bool less_is_better) {
+    const std::vector<double>& of_a = (groups[a].summary.*scores).values;
+    const std::vector<double>& of_b = (groups[b].summary.*scores).values;
+    PairFigure figure;
+    figure.better = less_is_better ? EstimateImprovement({Negated(of_a)}, {Negated(of_b)})
+                                   : EstimateImprovement({of_a}, {of_b});
+    if (AllFinite(of_a) && AllFinite(of_b)) {
+      figure.difference = EstimateIqmDifference({of_a}, {of_b});
+    }
+    return figure;
+  };
+  return {a, b, compare(&GroupSummary::solve_seconds, true),
+          compare(&GroupSummary::solve_steps, true), compare(&GroupSummary::final_return, false)};
 }
 
 }  // namespace upswing

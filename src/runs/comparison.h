@@ -62,15 +62,15 @@ struct RunFigure {
 };
 std::span<const RunFigure> RunFigures();
 
-/// Comparison of two groups; a difference is a - b.
+/// Comparison of a figure of two groups a and b, or of what they need to solve the task.
+struct PairFigure {
+  Estimate better;                     // probability that a run of a is better than one of b
+  std::optional<Estimate> difference;  // IQM of a - IQM of b; nothing if a run is unsolved
+};
+
 struct PairSummary {
-  size_t a, b;             // indices of the groups
-  Estimate sooner;         // probability that a run of a solves in less time than one of b
-  Estimate higher_return;  // probability that the final return of a run of a is higher
-  /// Differences of the interquartile means. The difference of the times exists only if all runs
-  /// are solved.
-  std::optional<Estimate> seconds_difference;
-  Estimate return_difference;
+  size_t a, b;  // indices of the groups
+  PairFigure seconds, steps, final_return;
 };
 PairSummary ComparePair(const std::vector<RunGroup>& groups, size_t a, size_t b);
 

@@ -89,15 +89,15 @@ TEST(Comparison, PairsAreTheSameFromBothSides) {
   const std::vector<RunGroup> groups{Summarized(kGroup), Summarized(fast)};
   const PairSummary ab = ComparePair(groups, 0, 1);
   const PairSummary ba = ComparePair(groups, 1, 0);
-  EXPECT_DOUBLE_EQ(ba.sooner.value, (9 + 3 * 0.5) / 12);  // tie with the fastest of the others
-  EXPECT_DOUBLE_EQ(ab.sooner.value + ba.sooner.value, 1);
-  EXPECT_EQ(ba.higher_return.value, 1);
-  EXPECT_EQ(ab.return_difference.value, 2525 - 2700);
-  EXPECT_FALSE(ab.seconds_difference);  // one run has no time
+  EXPECT_DOUBLE_EQ(ba.seconds.better.value, (9 + 3 * 0.5) / 12);  // tie with the fastest of the others
+  EXPECT_DOUBLE_EQ(ab.seconds.better.value + ba.seconds.better.value, 1);
+  EXPECT_EQ(ba.final_return.better.value, 1);
+  EXPECT_EQ(ab.final_return.difference->value, 2525 - 2700);
+  EXPECT_FALSE(ab.seconds.difference);  // one run has no time
 
   RunGroup solved = kGroup;
   solved.runs.pop_back();
-  EXPECT_EQ(ComparePair({Summarized(solved), groups[1]}, 0, 1).seconds_difference->value, 2 - 1);
+  EXPECT_EQ(ComparePair({Summarized(solved), groups[1]}, 0, 1).seconds.difference->value, 2 - 1);
 }
 
 TEST(Comparison, OneRunHasNoInterval) {
@@ -106,7 +106,7 @@ TEST(Comparison, OneRunHasNoInterval) {
   one.summary = Summarize(one);
   EXPECT_EQ(one.summary.final_return.iqm.value, 2610);
   EXPECT_FALSE(one.summary.final_return.iqm.interval);
-  EXPECT_FALSE(ComparePair({one, Summarized(kGroup)}, 0, 1).sooner.interval);
+  EXPECT_FALSE(ComparePair({one, Summarized(kGroup)}, 0, 1).seconds.better.interval);
 }
 
 }  // namespace
