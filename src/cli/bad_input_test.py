@@ -25,7 +25,7 @@ class CommandLineTest(ProgramTest):
     def test_empty_path(self):
         for command in (["train", "--resume", ""], ["train", "--out", ""], ["train", "--config", ""],
                         ["eval", ""], ["info", ""], ["compare", ""], ["simulate", "--torque", ""],
-                        ["simulate", "--csv", ""], ["simulate", "--model", ""]):
+                        ["simulate", "--csv", ""], ["simulate", "--model", ""], [*TRAIN, "--model", ""]):
             with self.subTest(command=command):
                 self.refuse(command, "empty")
 
@@ -37,7 +37,6 @@ class CommandLineTest(ProgramTest):
 
     def test_unknown_subcommand(self):
         self.refuse(["trian"], "trian", "did you mean train?")
-        self.refuse([], "expected a command", "train")
 
     def test_too_much_or_too_little(self):
         self.refuse(["eval"], "policy")
@@ -416,6 +415,29 @@ class RunFolderTest(SmallRunTest):
         for out in ("file/run", "/proc/run", "/proc/1/deep/run"):
             with self.subTest(out=out):
                 self.refuse(small(out=out), out)
+
+    def test_a_pipe_that_no_program_reads(self):
+        os.mkfifo(self.folder / "pipe")
+        for command in (["simulate", "--csv", "pipe"], ["export", "sac", "--c", "pipe"],
+                        ["eval", "sac", "--episodes", 1, "--episodes-csv", "pipe"]):
+            self.refuse(command, "got a pipe that no program reads", timeout=PATIENCE)
+
+    def test_a_link_to_nothing(self):
+        (self.folder / "link.gif").symlink_to("nothing")
+        self.refuse(["view", "sac", "--record", "link.gif"], "it is a link to nothing")
+
+    def test_nul_in_a_file(self):
+        self.write("nul.toml", 'gamma = "a\\u0000b"\n[agent]\n')
+        self.refuse(["train", "--config", "nul.toml"], "nul.toml:1: gamma: ")
+        self.write("nul.toml", '[agent]\ngamma = "a\\u0000b"\n')
+        self.refuse(["train", "--config", "nul.toml"], 'got "a\\x00b"')
+
+    def test_tables_of_another_type(self):
+        for text in ("[[plant]]\n", "plant = 1\n"):
+            self.write("p.toml", text)
+            for command in ([*TRAIN, "--config", "p.toml"], ["eval", "lqr", "--plant", "p.toml"],
+                            ["info", "lqr", "--made-for", "p.toml"]):
+                self.refuse(command, "p.toml:1: expected a table [plant], got another type")
 
     def test_unwritable_csv(self):
         self.write("file", "mine")

@@ -23,6 +23,13 @@ std::string TypeName(const Option& option) {
   return option.name == "model" ? "FILE" : kNames.at(option.target.index());
 }
 
+CLI::Validator NotEmpty(std::string_view what) {
+  return {[what = std::string(what)](const std::string& text) -> std::string {
+            return text.empty() ? Concat("expected ", what, ", got an empty text") : "";
+          },
+          ""};
+}
+
 /// A function that receives a flag's value.
 using TakeValue = std::function<void(const std::string&)>;
 
@@ -37,17 +44,14 @@ void AddFlag(CLI::App& app, const Option& option, const std::string& group, cons
         ->disable_flag_override();
     return;
   }
-  app.add_option_function<std::string>(option.flag(), take, help)
-      ->group(group)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
-      ->type_name(TypeName(option));
-}
-
-CLI::Validator NotEmpty(std::string_view what) {
-  return {[what = std::string(what)](const std::string& text) -> std::string {
-            return text.empty() ? Concat("expected ", what, ", got an empty text") : "";
-          },
-          ""};
+  CLI::Option* flag = app.add_option_function<std::string>(option.flag(), take, help)
+                          ->group(group)
+                          ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
+                          ->type_name(TypeName(option));
+  // Files of settings may have an empty text. On a command line it is an unset shell variable.
+  if (std::holds_alternative<std::string*>(option.target) && option.choices.empty()) {
+    flag->check(NotEmpty(option.name == "model" ? kPath : "a value"));
+  }
 }
 
 /// `text` with its prose wrapped to HelpColumns(). Indented lines and headings (`Examples:`) keep
@@ -99,8 +103,11 @@ class HelpFormatter : public CLI::Formatter {
   std::string make_help(const CLI::App* app, std::string name,
                         CLI::AppFormatMode mode) const override {
     HideFlags();
-    return CLI::Formatter::make_help(app, std::move(name), mode);
+    return Arranged(CLI::Formatter::make_help(app, std::move(name), mode));
   }
+
+  /// Leaves out settings and notes, as -h does.
+  void Shorten() { is_short_ = true; }
 
   std::string make_footer(const CLI::App* app) const override {
     return Reflowed(WithLaunchCommand(CLI::Formatter::make_footer(app)));
@@ -120,8 +127,43 @@ class HelpFormatter : public CLI::Formatter {
   }
 
  private:
+  /// Moves the examples to the top, below the usage. For -h, leaves out all blocks but arguments
+  /// and commands.
+  std::string Arranged(const std::string& help) const {
+    std::vector<std::string> blocks;  // separated by empty lines
+    std::istringstream lines(help);
+    bool ended = true;
+    for (std::string line; std::getline(lines, line); ended = line.empty()) {
+      if (line.empty()) continue;
+      if (ended) blocks.emplace_back();
+      blocks.back() += line + '\n';
+    }
+    const auto begins = [](const std::string& block, std::initializer_list<const char*> titles) {
+      return std::ranges::any_of(titles,
+                                 [&](const char* title) { return block.starts_with(title); });
+    };
+    const auto examples = std::ranges::find_if(
+        blocks, [&](const std::string& block) { return begins(block, {"Examples:"}); });
+    if (examples != blocks.end()) std::rotate(blocks.begin() + 1, examples, examples + 1);
+    if (is_short_) {
+      std::erase_if(blocks, [&](const std::string& block) {
+        return &block != &blocks.front() &&
+               !begins(block, {"Examples:", "Positionals:", "Options:", "Subcommands:"});
+      });
+      blocks.emplace_back("--help also shows all settings.\n");
+    }
+    return Join(blocks, "\n");
+  }
+
   std::function<void()> before_;
+  bool is_short_ = false;
 };
+
+/// Lets -h print the short help of a command and of its commands.
+void ShortenHelp(CLI::App& app) {
+  if (auto* help = dynamic_cast<HelpFormatter*>(app.get_formatter().get())) help->Shorten();
+  for (CLI::App* sub : app.get_subcommands({})) ShortenHelp(*sub);
+}
 
 std::vector<std::string> FlagsOf(const CLI::Option& option) {
   std::vector<std::string> flags;
@@ -377,6 +419,7 @@ int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> 
       "Upswing trains, compares, explains and deploys controllers that swing up and\n"
       "balance a double pendulum with one motor.",
       "upswing");
+  program.set_help_flag("-h,--help", "Print a short help (-h), or all of it (--help)");
   program.set_version_flag("--version", "upswing " UPSWING_VERSION);
   program.require_subcommand(1);
   const auto formatter = std::make_shared<HelpFormatter>();
@@ -395,6 +438,10 @@ int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> 
   std::optional<CommandLine> line;
   if (command != own.end()) {
     command->declare(line.emplace(*program.get_subcommand(std::string(called))));
+  }
+  if (std::ranges::any_of(std::span(argv, static_cast<size_t>(argc)),
+                          [](std::string_view word) { return word == "-h"; })) {
+    ShortenHelp(program);
   }
   try {
     program.parse(argc, argv);

@@ -4,6 +4,7 @@
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import unittest
@@ -23,6 +24,35 @@ class HelpTest(ProgramTest):
             for line in self.succeed(*command, "--help").splitlines():
                 with self.subTest(command=command, line=line):
                     self.assertLessEqual(len(line), 100)
+
+    def test_help_without_flags(self):
+        self.assertEqual(self.succeed(), self.succeed("--help"))
+        self.assertEqual(self.succeed("help"), self.succeed("--help"))
+        for words in (["help", "eval"], ["--help", "eval"]):
+            self.assertEqual(self.succeed(*words), self.succeed("eval", "--help"))
+        self.refuse(["help", "evla"], 'got "evla"', "did you mean eval?")
+
+    def test_examples_come_first_and_a_short_help_has_no_settings(self):
+        full, short = self.succeed("train", "--help"), self.succeed("train", "-h")
+        for text in (full, short):
+            self.assertRegex(text, r"^Train .*\nUsage: .*\n\nExamples:\n(  .*\n)+\nOptions:\n")
+            self.assertIn("\n  --out FOLDER ", text)
+        self.assertIn("--gamma", full)
+        self.assertIn("Named agents:", full)
+        self.assertNotIn("Named agents:", short)
+        self.assertNotIn("  --gamma", short.split("Options:")[1])
+        self.assertTrue(short.endswith("\n--help also shows all settings.\n"))
+
+    @unittest.skipUnless(shutil.which("bash"), "needs bash")
+    def test_completion(self):
+        for words, expected in (("upswing ev", {"eval"}), ("upswing eval --epis", {"--episodes", "--episodes-csv"})):
+            script = (f"source <({UPSWING} completion bash); COMP_WORDS=({words}); "
+                      f"COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1)); _upswing {UPSWING}; echo ${{COMPREPLY[@]}}")
+            done = subprocess.run(["bash", "-c", script], check=True, capture_output=True, encoding="utf-8")
+            self.assertEqual((set(done.stdout.split()), done.stderr), (expected, ""))
+        self.assertTrue(self.succeed("completion", "zsh").endswith(self.succeed("completion", "bash")))
+        self.assertIn("complete -c upswing", self.succeed("completion", "fish"))
+        self.refuse(["completion", "ksh"], "expected bash, zsh or fish, got ksh")
 
     def help_of(self, flag, *arguments):
         """The help lines of a flag, joined into one."""
@@ -51,7 +81,7 @@ class HelpTest(ProgramTest):
 
     def test_lines_end_only_where_the_width_asks_for_it(self):
         for command in COMMANDS:
-            lines = self.succeed(command, "--help").split("\n\nExamples")[0].splitlines()
+            lines = self.succeed(command, "--help").split("\n\nOptions:")[1].splitlines()
             for line, after in zip(lines, lines[1:]):
                 if not re.match(r" {30}\S", line) or not re.match(r" {30}\S", after):
                     continue

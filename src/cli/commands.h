@@ -21,6 +21,7 @@ void AddView(CommandLine& line);
 void AddInfo(CommandLine& line);
 void AddCompare(CommandLine& line);
 void AddStudy(CommandLine& line);
+void AddCompletion(CommandLine& line);
 
 /// Adds the policy argument (a file, a run folder, a shipped policy or a controller) and the
 /// controllers' settings.

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "agents/config.h"
@@ -9,6 +10,7 @@
 #include "agents/loaded_policy.h"
 #include "base/error.h"
 #include "base/format.h"
+#include "base/json.h"
 #include "base/simd.h"
 #include "base/text.h"
 #include "cli/commands.h"
@@ -29,6 +31,7 @@ namespace upswing {
 namespace {
 
 namespace fs = std::filesystem;
+using nlohmann::ordered_json;
 
 /// A text from a file on one line; "unknown" if the file lacks it.
 std::string Known(const std::string& text) { return text.empty() ? "unknown" : Printable(text); }
@@ -130,12 +133,43 @@ void PrintPolicy(const LoadedPolicy& loaded) {
   if (learned != nullptr) PrintSelfCheck(learned->self_check());
 }
 
+/// The checkpoint of a run.
+struct RunFacts {
+  explicit RunFacts(const fs::path& path)
+      : checkpoint(LoadTensors(RunFolder::CheckpointPath(path))),
+        config(ReadRunConfig(path)),
+        spec(config.Spec()),
+        state(spec.num_envs, static_cast<int>(spec.term_names.size())) {
+    state.State(Archive::Loader(checkpoint).In("train"));
+  }
+  Tensors checkpoint;
+  Config config;
+  EnvSpec spec;
+  TrainState state;
+};
+
+ordered_json RunJson(const fs::path& path) {
+  const RunFacts run(path);
+  const TrainState& state = run.state;
+  return {{"run", path.string()},
+          {"agent", run.config.agent},
+          {"seed", run.config.train.seed},
+          {"step", state.steps},
+          {"steps", run.config.train.steps},
+          {"episodes", state.episodes},
+          {"seconds", state.seconds},
+          {"solved", state.solved},
+          {"solve_step", state.solved ? ordered_json(state.streak_step) : nullptr},
+          {"solve_seconds", state.solved ? ordered_json(state.streak_seconds) : nullptr},
+          {"best_step", state.best_step}};
+}
+
 void PrintRun(const fs::path& path, bool has_policy) {
-  const Tensors checkpoint = LoadTensors(RunFolder::CheckpointPath(path));
-  const Config config = ReadRunConfig(path);
-  const EnvSpec spec = config.Spec();
-  TrainState state(spec.num_envs, static_cast<int>(spec.term_names.size()));
-  state.State(Archive::Loader(checkpoint).In("train"));
+  const RunFacts run(path);
+  const Tensors& checkpoint = run.checkpoint;
+  const Config& config = run.config;
+  const EnvSpec& spec = run.spec;
+  const TrainState& state = run.state;
   fmt::print("{}\n", Printable(path.string()));
   fmt::print("  agent       {}, seed {}, upswing {}\n", config.agent, config.train.seed,
              Printable(checkpoint.Metadata("upswing_version")));
@@ -159,6 +193,35 @@ void PrintRun(const fs::path& path, bool has_policy) {
                                                      FormatCount(state.best_step)));
 }
 
+/// The files' and the design's facts on a policy.
+ordered_json PolicyJson(const LoadedPolicy& loaded) {
+  const Policy& policy = *loaded.policy;
+  const PolicyInfo& info = policy.info();
+  const auto known = [](const auto& value) { return value ? ordered_json(*value) : nullptr; };
+  ordered_json j{{"policy", loaded.name},
+                 {"description", policy.description()},
+                 {"parameters", policy.num_parameters()},
+                 {"task", loaded.task},
+                 {"agent", info.agent},
+                 {"seed", known(info.seed)},
+                 {"step", known(info.step)},
+                 {"upswing_version", info.upswing_version},
+                 {"success_rate", known(info.success_rate)},
+                 {"mean_return", known(info.mean_return)},
+                 {"control_period", known(info.control_period)}};
+  if (!loaded.is_foreign()) {
+    j["memory"] = loaded.memory();
+    j["identifies"] = loaded.identifies();
+    for (const auto& [name, value] : PlantValues(loaded.plant)) j["plant"][name] = value;
+  }
+  if (const auto* learned = dynamic_cast<const NetworkPolicy*>(&policy)) {
+    const SelfCheck check = learned->self_check();
+    j["self_check"] = {
+        {"error", check.error}, {"tolerance", check.tolerance}, {"checksum", check.has_checksum}};
+  }
+  return j;
+}
+
 /// Prints the program's version, and the libraries and hardware that it uses on this machine.
 void PrintProgram() {
   fmt::print("upswing {}\n", UPSWING_VERSION);
@@ -171,7 +234,33 @@ void PrintProgram() {
     fmt::print("  examples    {}\n", Printable((SharePath() / "examples").string()));
 }
 
-int RunInfo(const PolicyArguments& a) {
+ordered_json ProgramJson() {
+  return {{"upswing", UPSWING_VERSION},       {"mujoco", MuJoCoVersion()},
+          {"threads", ResolveThreads(0)},     {"vectors", SimdPath()},
+          {"supported_vectors", SimdPaths()}, {"policies", ShippedPolicies()},
+          {"controllers", ControllerNames()}};
+}
+
+/// The arguments of `info`.
+struct InfoArguments : PolicyArguments {
+  bool as_json = false;
+};
+
+/// The whole answer: of the program, a policy, or a run and its policy.
+ordered_json InfoJson(const InfoArguments& a) {
+  if (a.empty()) return ProgramJson();
+  const fs::path path = a.name;
+  if (!fs::exists(path / RunFolder::kConfig)) return PolicyJson(GetPolicy(a));
+  ordered_json j = RunJson(path);
+  j["policy"] = fs::exists(path / RunFolder::kPolicy) ? PolicyJson(GetPolicy(a)) : nullptr;
+  return j;
+}
+
+int RunInfo(const InfoArguments& a) {
+  if (a.as_json) {
+    fmt::print("{}\n", PrintableJson(InfoJson(a)));
+    return 0;
+  }
   if (a.empty()) {
     PrintProgram();
     return 0;
@@ -198,8 +287,9 @@ int RunInfo(const PolicyArguments& a) {
 }  // namespace
 
 void AddInfo(CommandLine& line) {
-  PolicyArguments& a = line.Runs(RunInfo);
+  InfoArguments& a = line.Runs(RunInfo);
   AddPolicy(line, a);
+  line.Flag("--json", a.as_json, "print JSON instead of text");
   line.Footer(
       "Examples:\n"
       "  ./upswing info runs/d3qn-seed1\n"

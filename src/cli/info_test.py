@@ -2,6 +2,7 @@
 """Tests of `upswing info`: the description of a policy or run, how it was made, and its
 self-check."""
 
+import json
 import os
 import re
 import signal
@@ -31,6 +32,19 @@ class InfoTest(ProgramTest):
         self.assert_says(text, "MuJoCo ", "threads ")
         used, choice = re.search(r"vectors +(\S+) \(this processor supports: (.*)\)", text).groups()
         self.assertEqual(used, choice.split(", ")[0])
+
+    def test_json(self):
+        def answer(*words):
+            return json.loads(self.succeed("info", *words, "--json"))
+
+        self.assertIn("sac", answer()["policies"])
+        policy = answer("sac")
+        self.assertEqual((policy["agent"], policy["plant"]["mass2"]), ("sac", 1))
+        self.assertLess(policy["self_check"]["error"], policy["self_check"]["tolerance"])
+        self.assertEqual(answer("lqr", "--made-for", "mass2=1.2")["plant"]["mass2"], 1.2)
+        self.succeed(*small())
+        run = answer("run")
+        self.assertEqual((run["step"], run["solved"], run["policy"]["agent"]), (4000, False, "d3qn-small"))
 
     def test_shipped_policy(self):
         self.assert_says(self.succeed("info"), "policies    d3qn, d3qn-adaptive, ", "sac (shipped)")

@@ -5,9 +5,17 @@ namespace upswing {
 namespace {
 
 constexpr Command kCommands[] = {
-    {"train", AddTrain},     {"eval", AddEval},   {"bounds", AddBounds}, {"simulate", AddSimulate},
-    {"map", AddMap},         {"plot", AddPlot},   {"view", AddView},     {"info", AddInfo},
-    {"compare", AddCompare}, {"study", AddStudy},
+    {"train", AddTrain},
+    {"eval", AddEval},
+    {"bounds", AddBounds},
+    {"simulate", AddSimulate},
+    {"map", AddMap},
+    {"plot", AddPlot},
+    {"view", AddView},
+    {"info", AddInfo},
+    {"compare", AddCompare},
+    {"study", AddStudy},
+    {"completion", AddCompletion},
 };
 
 }  // namespace

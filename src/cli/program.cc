@@ -14,6 +14,7 @@
 #include <iostream>
 #include <iterator>
 #include <system_error>
+#include <vector>
 
 #include "base/error.h"
 #include "base/simd.h"
@@ -39,6 +40,7 @@ constexpr CommandEntry kTable[] = {
     {"info", "Describe and check a policy or a run, or describe this machine", "upswing"},
     {"compare", "Compare runs over their seeds, with intervals and curves", "upswing"},
     {"study", "Train variants of the settings, each with many seeds", "upswing"},
+    {"completion", "Print completions for bash, zsh or fish", "upswing"},
     {"export", "Export policies as ONNX or C, or into the page", "upswing-deploy"},
     {"realaigym", "Score a policy by RealAIGym's rules, or search for one", "upswing-realaigym"},
     {"machine", "Check logs of a real machine, identify its twin, validate it", "upswing-machine"},
@@ -100,6 +102,20 @@ void RunOtherProgram(int argc, char** argv, std::span<const Command> own) {
                         entry->program.empty() ? "" : Concat(", which builds ", entry->program)));
 }
 
+/// The command line with `help COMMAND` as `COMMAND --help`, and no words as `--help`.
+std::vector<char*> WithHelpLast(int argc, char** argv) {
+  static char help[] = "--help";  // a word may be written to
+  std::vector<char*> words(argv, argv + argc);
+  const bool asks =
+      argc > 1 && (std::strcmp(argv[1], "help") == 0 ||
+                   (argc > 2 && argv[2][0] != '-' &&
+                    (std::strcmp(argv[1], "-h") == 0 || std::strcmp(argv[1], help) == 0)));
+  if (asks) words.erase(words.begin() + 1);
+  if (asks || argc == 1) words.push_back(help);
+  words.push_back(nullptr);
+  return words;
+}
+
 int Main(int argc, char** argv, std::span<const Command> own) {
   try {
     RunOtherProgram(argc, argv, own);
@@ -130,7 +146,8 @@ int MainProgram(int argc, char** argv, std::span<const Command> own) {
   // A failed write then returns an error, which gets a message, instead of ending the program.
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
-  return Main(argc, argv, own);
+  std::vector<char*> words = WithHelpLast(argc, argv);
+  return Main(static_cast<int>(words.size()) - 1, words.data(), own);
 }
 
 }  // namespace upswing

@@ -27,7 +27,7 @@ constexpr const char* kStudyName = "study.toml";  // in a study's folder
 struct StudyArguments {
   std::string file, out, seeds, keep, work;
   int64_t jobs = 0;  // 0: one per processor
-  bool status = false, prepare = false;
+  bool status = false, prepare = false, as_json = false;
 
   fs::path folder() const {
     return out.empty() ? fs::path("runs") / fs::path(file).stem() : fs::path(out);
@@ -106,7 +106,10 @@ int RunStudy(const StudyArguments& arguments) {
       throw BadInput(
           Concat(arguments.file, ": no such file or folder; expected a study's file or folder"));
     }
-    return PrintStudyStatus(folder);
+    if (Exists(arguments.file) && !is_folder) {
+      (void)ParseStudy(ReadOwnFile(arguments.file), arguments.file);
+    }
+    return PrintStudyStatus(folder, arguments.as_json);
   }
   const ManyRuns many = ReadStudy(arguments);
   if (arguments.prepare) {
@@ -137,6 +140,9 @@ void CheckArguments(const CommandLine& line, const StudyArguments& arguments) {
   };
   alone(!arguments.work.empty(), "--work",
         {"--out", "--seeds", "--jobs", "--keep", "--status", "--prepare"});
+  if (arguments.as_json && !arguments.status) {
+    throw BadInput("--json: expected --status with it; `compare FOLDER --json` prints the results");
+  }
   alone(arguments.status, "--status", {"--seeds", "--jobs", "--keep", "--prepare"});
 }
 
@@ -155,6 +161,7 @@ void AddStudy(CommandLine& line) {
   line.Flag(
       "--status", arguments.status,
       "print how many runs are done, running and lost, and exit; also takes the study's folder");
+  line.Flag("--json", arguments.as_json, "print the status as JSON");
   line.Flag("--prepare", arguments.prepare, "prepare the folder for workers, and exit");
   for (const char* flag : {"--slurm", "--tasks", "--print"}) {
     line.Removed(

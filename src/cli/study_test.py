@@ -180,6 +180,7 @@ class StudyTest(ProgramTest):
                 ("seed = 3\n" + one, [":1:", '"seed"', "did you mean seeds?"]),
                 ("seeds = 2\n", ["[variants.NAME]"]),
                 ("seeds = 2\n[variants]\n", ["[variants.NAME]"]),
+                (f"[variants.{'a' * 101}]\n", ["a name of at most 100 letters, got 101"]),
                 (one, ["seeds = 10"]),
                 ('seeds = "0-"\n' + one, [":1: seeds: expected", "3,5,8-12"]),
                 ("seeds = [1, 1]\n" + one, [":1: seeds:", "1 is twice"]),
@@ -202,6 +203,8 @@ class StudyTest(ProgramTest):
             with self.subTest(text=text):
                 self.refuse_study(text, *words)
         self.refuse(["study", "none.toml"], "none.toml")
+        self.write("bad.toml", "seeds = \n" + one)
+        self.refuse(["study", "bad.toml", "--status"], "bad.toml:1:")
         self.refuse(["study"], "study: expected FILE.toml")
 
     def test_the_studies_of_the_project_can_be_run(self):

@@ -5,9 +5,11 @@
 
 #include <cstdio>
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/format.h"
+#include "base/json.h"
 #include "base/text.h"
 #include "cli/say.h"
 #include "cli/signals.h"
@@ -72,7 +74,7 @@ int WorkOnStudy(const std::filesystem::path& folder) {
   return outcome.failed > 0 ? 1 : 0;
 }
 
-int PrintStudyStatus(const std::filesystem::path& folder) {
+int PrintStudyStatus(const std::filesystem::path& folder, bool as_json) {
   struct Counts {
     int64_t done = 0, solved = 0, running = 0, lost = 0, failed = 0, stopped = 0, waiting = 0;
   };
@@ -97,6 +99,22 @@ int PrintStudyStatus(const std::filesystem::path& folder) {
     } else {
       ++(run.state ? c.stopped : c.waiting);
     }
+  }
+  if (as_json) {
+    nlohmann::ordered_json j{{"study", folder.string()}};
+    for (const Variant& variant : plan.variants) {
+      const Counts& c = counts[&variant];
+      j["variants"].push_back({{"variant", variant.name},
+                               {"done", c.done},
+                               {"solved", c.solved},
+                               {"running", c.running},
+                               {"lost", c.lost},
+                               {"failed", c.failed},
+                               {"stopped", c.stopped},
+                               {"waiting", c.waiting}});
+    }
+    Say("{}\n", PrintableJson(j));
+    return 0;
   }
   Say("{}\n", Printable(folder.string()));
   Say("  {:<20} {:>7} {:>7} {:>8} {:>7} {:>7} {:>8} {:>8}\n", "", "done", "solved", "running",

@@ -10,6 +10,6 @@ namespace upswing {
 int WorkOnStudy(const std::filesystem::path& folder);
 
 /// Prints the progress and the workers of the study in a folder.
-int PrintStudyStatus(const std::filesystem::path& folder);
+int PrintStudyStatus(const std::filesystem::path& folder, bool as_json);
 
 }  // namespace upswing

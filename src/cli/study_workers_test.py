@@ -240,6 +240,8 @@ class WorkersTest(ProgramTest):
         self.write("study/one/seed2.failed/precious", "mine")
         status = self.succeed("study", "study", "--status")
         self.assertRegex(status, r"one/seed1 .*expected a regular file")
+        (one, *_) = json.loads(self.succeed("study", "study", "--status", "--json"))["variants"]
+        self.assertEqual((one["variant"], one["failed"]), ("one", 2))
         self.work(code=1)
         self.assertEqual(len(list(study.rglob("*.done"))), 6)
         again = ["study", "little.toml", "--out", "study"]
