@@ -147,12 +147,17 @@ std::vector<FlagValue> ApplyTable(const Options& options, const toml::table& tab
       settings.push_back(ApplyNode(options, "", key, node, where));
       continue;
     }
+    const bool is_known = std::ranges::find(sections, key) != sections.end();
+    if (section == nullptr && is_known) {
+      throw BadInput(
+          Concat(PlaceOf(node, where), ": expected a table [", key, "], got another type"));
+    }
     if (section == nullptr) {
       const Option& option = *options.Find(key, PlaceOf(node, where)).front();
       throw BadInput(Concat(PlaceOf(node, where), ": ", key, ": expected in section [",
                             option.section, "], got outside any section"));
     }
-    if (std::ranges::find(sections, key) == sections.end()) {
+    if (!is_known) {
       throw BadInput(Concat(PlaceOf(node, where), ": expected a known section, got [", key, "]",
                             DidYouMean(key, sections)));
     }

@@ -11,12 +11,20 @@ namespace upswing {
 class Error : public std::runtime_error {
  public:
   Error(int exit_code, const std::string& message)
-      : std::runtime_error(message), exit_code_(exit_code) {}
+      : std::runtime_error(WithoutNul(message)), exit_code_(exit_code) {}
 
   /// Exit status: 2 for bad usage or input, 1 for work that failed.
   int exit_code() const { return exit_code_; }
 
  private:
+  /// The message with NUL characters as \x00, because what() would end at the first.
+  static std::string WithoutNul(std::string message) {
+    for (size_t at = 0; (at = message.find('\0')) != std::string::npos;) {
+      message.replace(at, 1, "\\x00");
+    }
+    return message;
+  }
+
   int exit_code_;
 };
 

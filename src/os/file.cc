@@ -48,7 +48,13 @@ std::string TextOf(std::span<const std::byte> bytes) {
 }
 
 void WriteInPlace(const fs::path& path, std::string_view text) {
-  const Descriptor fd(open(path.c_str(), O_WRONLY | O_CLOEXEC));
+  // Without a reader, opening a pipe would wait for one.
+  const Descriptor fd(open(path.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC));
+  if (fd.get() < 0 && errno == ENXIO) {
+    throw BadInput(Concat("cannot write ", path.string(), ": expected a file, got a pipe that no ",
+                          "program reads"));
+  }
+  if (fd.get() >= 0) fcntl(fd.get(), F_SETFL, O_WRONLY);
   if (fd.get() < 0 || !WriteAll(fd.get(), BytesOf(text))) {
     throw PathError("cannot write", path, errno);
   }

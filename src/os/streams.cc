@@ -46,6 +46,7 @@ void CheckWritable(const std::string& flag, const std::string& path) {
     if (access(path.c_str(), W_OK) != 0) throw cannot(std::strerror(errno));
     return;
   }
+  if (std::filesystem::is_symlink(path, error)) throw cannot("it is a link to nothing");
   const int descriptor = open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
   if (descriptor < 0) throw cannot(std::strerror(errno));
   close(descriptor);

@@ -111,7 +111,7 @@ void PpoConfig::CheckBatch(int64_t num_envs) const {
   const int64_t rollout = horizon * num_envs;
   if (rollout > kMostRollout) {
     throw BadInput(Concat("horizon: expected at most ", kMostRollout / num_envs, " steps of ",
-                          num_envs, " environments, got ", horizon));
+                          Counted(num_envs, "environment"), ", got ", horizon));
   }
   if (rollout % batch == 0) return;
   int64_t below = batch, above = batch;
@@ -121,8 +121,8 @@ void PpoConfig::CheckBatch(int64_t num_envs) const {
                                ? Concat(below, " or ", above)
                                : Concat(rollout);
   throw BadInput(Concat("batch: expected a size that divides the ", rollout,
-                        " steps of a rollout (horizon ", horizon, ", ", num_envs,
-                        " environments), such as ", fits, ", got ", batch));
+                        " steps of a rollout (horizon ", horizon, ", ",
+                        Counted(num_envs, "environment"), "), such as ", fits, ", got ", batch));
 }
 
 }  // namespace upswing

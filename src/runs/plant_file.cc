@@ -56,7 +56,10 @@ void TakeOwnTables(toml::table& table, const std::string& where) {
                           ", got [", Printable(name), "]", DidYouMean(name, known)));
   }
   if (table["plant"].is_table()) return;
-  throw BadInput(Concat(where, ": expected a table [plant], got none"));
+  const toml::node* other = table.get("plant");
+  throw BadInput(Concat(other != nullptr ? PlaceOf(*other, where) : where,
+                        ": expected a table [plant], got ",
+                        other != nullptr ? "another type" : "none"));
 }
 
 }  // namespace

@@ -80,7 +80,8 @@ TEST(PlantFile, MistakesHaveTheirLineAndASuggestion) {
             std::string::npos);
   EXPECT_NE(ErrorOf("mass1 = 1\n[plant]").find("expected in section [plant]"), std::string::npos);
   EXPECT_EQ(ErrorOf("[sensors]"), "m.toml: expected a table [plant], got none");
-  EXPECT_EQ(ErrorOf("plant = 1"), "m.toml: expected a table [plant], got none");
+  EXPECT_EQ(ErrorOf("plant = 1"), "m.toml:1: expected a table [plant], got another type");
+  EXPECT_EQ(ErrorOf("[[plant]]"), "m.toml:1: expected a table [plant], got another type");
 }
 
 TEST(PlantFile, RefusesACovarianceThatIsNone) {

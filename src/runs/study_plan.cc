@@ -186,6 +186,11 @@ void CheckVariantName(const std::string& name, const std::string& place) {
     throw BadInput(
         Concat(place, ": expected a name of letters, digits, - and _, got \"", name, "\""));
   }
+  constexpr size_t kLongest = 100;  // file names are shorter than 255 bytes
+  if (name.size() > kLongest) {
+    throw BadInput(
+        Concat(place, ": expected a name of at most ", kLongest, " letters, got ", name.size()));
+  }
 }
 
 }  // namespace upswing

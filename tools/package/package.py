@@ -272,7 +272,7 @@ Description: controllers that swing up and balance a double pendulum
 
 def find_pythons():
     """Pythons with headers: 3.11, and the newest from 3.12 on, whose wheel serves all later ones. Also
-    returns the missing parts, in words."""
+    returns the missing versions."""
     check = ("import pathlib, sysconfig, sys, ensurepip; "
              "sys.exit(not pathlib.Path(sysconfig.get_path('include'), 'Python.h').exists())")
     found, missing = [], []
