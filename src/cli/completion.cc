@@ -9,13 +9,13 @@
 namespace upswing {
 namespace {
 
-// The commands are the indented words of the list in --help, the flags are all words with --.
+// The commands and the flags are the first words of the indented lines in --help.
 constexpr const char* kBash = R"(_upswing() {
   local word=${COMP_WORDS[COMP_CWORD]} names
   if [ "$COMP_CWORD" = 1 ]; then
     names=$("$1" -h 2>/dev/null | sed -n '/^Subcommands:/,$s/^  \([a-z]*\) .*/\1/p')
   else
-    names=$("$1" "${COMP_WORDS[1]}" --help 2>/dev/null | grep -oE -e '--[a-z][a-z0-9-]*')
+    names=$("$1" "${COMP_WORDS[1]}" --help 2>/dev/null | sed -n 's/^  \(-[^ ]*\) .*/\1/p' | tr , '\n')
   fi
   COMPREPLY=($(compgen -W "$names" -- "$word"))
 }
@@ -27,7 +27,7 @@ constexpr const char* kFish = R"(function __upswing_names
   if test (count $words) = 1
     $words[1] -h 2>/dev/null | sed -n '/^Subcommands:/,$s/^  \([a-z]*\) .*/\1/p'
   else
-    $words[1] $words[2] --help 2>/dev/null | grep -oE -e '--[a-z][a-z0-9-]*' | sort -u
+    $words[1] $words[2] --help 2>/dev/null | sed -n 's/^  \(-[^ ]*\) .*/\1/p' | tr , '\n'
   end
 end
 complete -c upswing -a '(__upswing_names)'

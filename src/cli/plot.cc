@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <iterator>
 #include <optional>
 
 #include "agents/config.h"
@@ -71,11 +73,7 @@ int RunPlot(const PlotArguments& a) {
   for (auto& [name, figure] : figures) {
     figure.title = WithModel(loaded.name, model);
     figure.caption = Caption(a, config, rollout, loaded);
-    for (const char* ending : {".svg", ".png"}) {
-      const fs::path file = folder / Concat(name, ending);
-      Draw(figure, file);
-      files.push_back(Printable(file.string()));
-    }
+    std::ranges::move(DrawIfPossible(figure, folder / name), std::back_inserter(files));
   }
   fmt::print("{}\n", Printable(loaded.name));
   fmt::print("  plant      {}, physics {}\n", EpisodeText(rollout), a.trial.physics);
@@ -88,7 +86,7 @@ int RunPlot(const PlotArguments& a) {
     fmt::print("  episode    {} of eval: {}\n", a.trial.episode,
                JudgementText(*loaded.policy, config.env));
   }
-  fmt::print("  written    {}\n", Join(files, ", "));
+  fmt::print("  written    {}\n", Printable(Join(files, ", ")));
   return 0;
 }
 

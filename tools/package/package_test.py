@@ -102,6 +102,7 @@ class PackageTest(unittest.TestCase):
     def test_has_all_libraries_and_their_notices(self):
         for program in (self.tree / "bin").iterdir():
             self.assertNotIn("not found", call("ldd", program).stdout)
+            self.assertRegex(call("readelf", "-d", program).stdout, r"\bNOW\b")  # full RELRO
         components = tomllib.loads((FOLDER / "components.toml").read_text("utf-8"))["component"]
         parts = " ".join(component["part"] for component in components)
         libraries = list((self.tree / "lib/upswing").glob("*.so*"))
