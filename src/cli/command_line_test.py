@@ -127,7 +127,6 @@ class NumberTest(ProgramTest):
 
     def test_missing_and_superfluous_arguments(self):
         self.refuse_numbers(
-            ([], "expected a command, one of train, eval, "),
             (["evla"], 'got "evla" (did you mean eval?)'),
             (["evaluate"], 'got "evaluate" (did you mean eval?)'),
             (["tets"], 'got "tets" (did you mean test?)'),
