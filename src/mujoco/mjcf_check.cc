@@ -59,11 +59,13 @@ constexpr std::string_view kNumbers =
     "angle autolimits coordinate inertiafromgeom inertiagrouprange balanceinertia boundmass "
     "boundinertia settotalmass discardvisual fusestatic alignfree saveinertial usethread "
     "convexhull fitaabb strippath "
-    // option and flag
+    // option
     "timestep gravity wind magnetic density viscosity integrator solver iterations tolerance "
     "ls_iterations ls_tolerance noslip_iterations noslip_tolerance ccd_iterations ccd_tolerance "
-    "jacobian cone impratio contact constraint equality frictionloss limit warmstart eulerdamp "
-    "refsafe midphase nativeccd island energy sensor filterparent spring damper actuation "
+    "jacobian cone impratio "
+    // flag
+    "contact constraint equality frictionloss limit warmstart eulerdamp refsafe midphase nativeccd "
+    "island energy sensor filterparent spring damper actuation "
     "clampctrl fwdinv invdiscrete multiccd autoreset "
     // body and inertial
     "pos quat axisangle xyaxes zaxis euler gravcomp mass diaginertia fullinertia "
