@@ -42,6 +42,8 @@ ALLOWED = {
         r"__assert_fail|abort",
     "printf of the test's own result":
         r"printf|puts|putchar|__printf_chk",
+    "checked copies of hardened builds":
+        r"__(snprintf|mem(cpy|move|set))_chk",
 }
 # Symbols of the C++ library that are refused anyway, because they open files or write to a
 # terminal.

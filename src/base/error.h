@@ -17,7 +17,7 @@ class Error : public std::runtime_error {
   int exit_code() const { return exit_code_; }
 
  private:
-  /// The message with NUL characters as \x00, because what() would end at the first.
+  /// Escapes NUL characters, because what() would end at the first.
   static std::string WithoutNul(std::string message) {
     for (size_t at = 0; (at = message.find('\0')) != std::string::npos;) {
       message.replace(at, 1, "\\x00");

