@@ -76,17 +76,19 @@ bool FindLine(std::string_view& rest, Line& line) {
   return false;
 }
 
-/// Moves to the line of names, and finds out the separator; false if there is none. Skips a
-/// byte-order mark, and the line `sep=;` of spreadsheets.
+/// Moves to the line of names and sets the separator; false if there is none. Skips a byte-order
+/// mark. The line `sep=;` of spreadsheets names the separator.
 bool FindNames(std::string_view& rest, Line& line) {
   constexpr std::string_view kMark = "\xef\xbb\xbf";
   if (rest.starts_with("\xff\xfe") || rest.starts_with("\xfe\xff")) {
     throw BadInput(Concat(line.where, ": expected text in UTF-8, got UTF-16: save it as UTF-8"));
   }
   if (rest.starts_with(kMark)) rest.remove_prefix(kMark.size());
-  do {
-    if (!FindLine(rest, line)) return false;
-  } while (line.text.starts_with("sep=") && line.text.size() <= 5);
+  if (!FindLine(rest, line)) return false;
+  if (line.text.starts_with("sep=") && line.text.size() <= 5) {
+    line.separator = line.text.size() == 5 ? line.text.back() : '\t';  // TakeLine trims a tab
+    return FindLine(rest, line);
+  }
   for (const char separator : {',', ';', '\t'}) {
     line.separator = separator;
     if (EndOfCell(line, 0) < line.text.size()) return true;

@@ -39,7 +39,9 @@ TEST(Csv, SeparatorsDecimalCommasAndComments) {
   EXPECT_EQ(values("sep=;\r\na;b\r\n0;1,5\r\n0;-2e-3\r\n"), expected);
   EXPECT_EQ(values("% logger\n// v2\n; of today\na\tb\n0\t1,5\n# half\n0\t-2,0e-3\n"), expected);
   EXPECT_EQ(values("a;\"b\"\n0;\"1,5\"\n0;-0.002"), expected);
-  EXPECT_EQ(CsvNames("sep=\t\na\tb,c\n", "t.csv"), (std::vector<std::string>{"a\tb", "c"}));
+  EXPECT_EQ(CsvNames("sep=\t\na\tb,c\n", "t.csv"), (std::vector<std::string>{"a", "b,c"}));
+  EXPECT_EQ(values("sep=|\na|b\n0|1,5\n0|-2e-3\n"), expected);
+  EXPECT_EQ(values("sep=;\n;b;a\n0;1,5;0\n1;-2e-3;0\n"), expected);  // the index has no name
 }
 
 TEST(Csv, NamesOfTheColumns) {
