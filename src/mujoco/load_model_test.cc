@@ -202,7 +202,7 @@ TEST(LoadModel, NamesTheCauseOfARefusal) {
            {"axis=\"0 1 0\" stiffness=\"1 1\"", "a stiffness of several numbers"},
            {"axis=\"0 1 0\" range=\"-80 90\"",
             "limits of a the same both ways from hanging, got"}}) {
-    expect(words, [&](Form& f) { f.joint1 = joint; });
+    expect(words, [&text = joint](Form& f) { f.joint1 = text; });
   }
   for (const auto& [motor, words] : std::vector<std::pair<std::string, std::string>>{
            {"motor", "a limit of the motor's torque: ctrlrange or forcerange"},
@@ -211,14 +211,14 @@ TEST(LoadModel, NamesTheCauseOfARefusal) {
            {"position kp=\"1\"", "expected <motor>, <general> in <actuator>, got \"position\""},
            {"general biastype=\"affine\" biasprm=\"0 -1 0\" ctrlrange=\"-5 5\"", "no bias"},
            {"general dyntype=\"integrator\" ctrlrange=\"-5 5\"", "got \"integrator\""}}) {
-    expect(words, [&](Form& f) { f.motor = motor; });
+    expect(words, [&text = motor](Form& f) { f.motor = text; });
   }
   for (const auto& [option, words] : std::vector<std::pair<std::string, std::string>>{
            {"gravity=\"0 0 0\"", "gravity across the axes of the hinges, got none"},
            {"gravity=\"0 -9.81 0\"", "gravity across the axes of the hinges, got none"},
            {"density=\"1.2\" wind=\"1 0 0\"", "got wind, air"},
            {"actuatorgroupdisable=\"0\"", "takes no \"actuatorgroupdisable\""}}) {
-    expect(words, [&](Form& f) { f.option = option; });
+    expect(words, [&text = option](Form& f) { f.option = text; });
   }
   for (const char* flag : {"gravity", "damper", "actuation", "clampctrl"}) {
     expect("a flag that disables",
