@@ -258,18 +258,23 @@ class Translator {
     if (m.jnt_limited[j] == 0) return;
     const auto [low, high] =
         std::minmax({angles_[j].Of(m.jnt_range[2 * j]), angles_[j].Of(m.jnt_range[2 * j + 1])});
-    const bool acts = (m.opt.disableflags & (mjDSBL_CONSTRAINT | mjDSBL_LIMIT)) == 0;
-    Expect(!acts || std::abs(low + high) < 1e-6,
+    Expect(!IsLimited(j) || std::abs(low + high) < 1e-6,
            Concat("limits of ", angles_[j].joint, " the same both ways from hanging, got ", low,
                   " to ", high, " rad from there"));
     ours.jnt_range[2 * j] = (low - high) / 2;
     ours.jnt_range[2 * j + 1] = (high - low) / 2;
   }
 
+  /// Whether a joint has a limit that no flag switches off.
+  bool IsLimited(int j) const {
+    constexpr int kOff = mjDSBL_CONSTRAINT | mjDSBL_LIMIT;
+    return given_->jnt_limited[j] != 0 && (given_->opt.disableflags & kOff) == 0;
+  }
+
   /// Largest angle of a joint from hanging, rad.
   double Most(int j) const {
     const mjtNum* range = given_->jnt_range + 2 * j;
-    return given_->jnt_limited[j] ? (range[1] - range[0]) / 2 : std::numbers::pi;
+    return IsLimited(j) ? (range[1] - range[0]) / 2 : std::numbers::pi;
   }
 
   /// Puts the file's model into a state that is given in our angles.
@@ -280,7 +285,7 @@ class Translator {
     data_->qvel[1] = angles_[1].sign * s.w2;
   }
 
-  /// Refuses geoms that touch in any position that the joints can reach.
+  /// Refuses geoms that touch in a position of a grid over the reach of the joints.
   void CheckContacts() const {
     if ((given_->opt.disableflags & (mjDSBL_CONTACT | mjDSBL_CONSTRAINT)) != 0) return;
     constexpr int n = 90;  // positions on each side; of a whole turn, 2 degrees apart

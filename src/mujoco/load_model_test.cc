@@ -230,6 +230,13 @@ TEST(LoadModel, NamesTheCauseOfARefusal) {
   });
   expect("geoms post and number 2",
          [](Form& f) { f.world = "<geom name=\"post\" size=\"0.05\" pos=\"0 0 2\"/>"; });
+  expect("geoms ceiling and", [](Form& f) {  // beyond a limit that is switched off
+    f.world =
+        "<geom name=\"ceiling\" type=\"plane\" pos=\"0 0 2.7\" zaxis=\"0 0 -1\" size=\"1 1 1\"/>";
+    f.joint1 += " range=\"-60 60\"";
+    f.joint2 += " range=\"-60 60\"";
+    f.option = "><flag limit=\"disable\"/></option><option ";
+  });
   expect("two hinges and no other joint, got a (hinge), b (hinge), c (hinge)",
          [](Form& f) { f.link2 = "<body><joint name=\"c\"/><geom size=\"0.1\"/></body>"; });
   expect("the centre of mass of link 1 on the line from its hinge to the second",
