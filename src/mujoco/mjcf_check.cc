@@ -19,8 +19,8 @@ constexpr size_t kMostName = 100;   // bytes
 
 constexpr double kLargest = 1e6;  // largest magnitude of a number
 
-/// An element that a model may contain, with its child elements as words. "*": any, because they
-/// are not compiled.
+/// An element that a model may contain, with its child elements as words. "*": any children and
+/// attributes, because CompileModel leaves the element out.
 struct Element {
   std::string_view name, children = "";
 };
@@ -152,9 +152,11 @@ class Checker {
       Refuse(line, Concat("expected at most ", kMostElements, " elements, nested at most ",
                           kMostLevels, " deep"));
     }
-    const bool ignored = parent != nullptr && parent->children == "*";
-    if (ignored && element->Name() == std::string_view("include")) Find(*element, nullptr);
-    const Element& known = ignored ? *parent : Find(*element, parent);
+    if (element->Name() == std::string_view("include")) {
+      Refuse(line, "expected one file without <include>; MuJoCo's mj_saveLastXML writes one");
+    }
+    const bool is_ignored = parent != nullptr && parent->children == "*";
+    const Element& known = is_ignored ? *parent : Find(*element, parent);
     for (const auto* a = element->FirstAttribute(); a != nullptr; a = a->Next()) {
       if (known.children != "*") CheckAttribute(*a, element->Name());
     }
@@ -163,12 +165,9 @@ class Checker {
     }
   }
 
+  /// What an element may contain. Throws BadInput if its parent may not contain it.
   const Element& Find(const tinyxml2::XMLElement& element, const Element* parent) const {
     const std::string name = element.Name();
-    if (name == "include") {
-      Refuse(element.GetLineNum(),
-             "expected one file without <include>; MuJoCo's mj_saveLastXML writes one");
-    }
     const std::vector<std::string> expected = Words(parent ? parent->children : "mujoco");
     if (std::ranges::find(expected, name) == expected.end()) {
       const std::string place = parent ? Concat(" in <", element.Parent()->Value(), ">") : "";

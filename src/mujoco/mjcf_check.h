@@ -16,8 +16,8 @@ inline constexpr size_t kMostMjcfBytes = 65536;
 /// and within 1e6, and anything that CompileModel leaves out.
 ///
 /// Refused are attributes that read files, repeat elements or set a size, delays, and sleep or
-/// disabled groups, which LoadModel cannot see. MuJoCo then checks the values,
-/// and LoadModel checks that the model moves as a double pendulum.
+/// disabled groups, which LoadModel cannot see. MuJoCo then checks the values, and LoadModel checks
+/// that the model moves as a double pendulum.
 void CheckMjcf(const std::string& mjcf, const std::string& where);
 
 }  // namespace upswing
