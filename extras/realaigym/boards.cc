@@ -11,6 +11,7 @@
 #include "agents/controllers.h"
 #include "base/error.h"
 #include "base/json.h"
+#include "base/sample.h"
 #include "base/stopwatch.h"
 #include "base/text.h"
 #include "pendulum/observation.h"
@@ -236,6 +237,21 @@ std::vector<BoardEntry> PublishedEntries(Robot robot) {
   };
 }
 
+std::vector<UptimeEntry> PublishedUptimes(Robot robot) {
+  if (robot == Robot::kAcrobot) {
+    return {{"AR-EAPO", .658, 21},
+            {"VIMPPI", .648, 16},
+            {"acados MPC", .630, 21},
+            {"MC-PILCO", .307, 34},
+            {"PRX analytical", .117, 14}};
+  }
+  return {{"VIMPPI", .799, 16},
+          {"AR-EAPO", .759, 16},
+          {"acados MPC", .726, 16},
+          {"MC-PILCO", .509, 23},
+          {"PRX analytical", .240, 13}};
+}
+
 std::vector<HardwareEntry> PublishedHardwareEntries(Robot robot, bool pushed) {
   if (robot == Robot::kAcrobot && pushed) {
     // The runs at IROS 2024 were scored with the normalisers of runs without pushes.
@@ -282,6 +298,39 @@ BoardReport ScoreOnBoard(const Competitor& competitor, uint64_t seed, ThreadPool
   return report;
 }
 
+UptimeReport ScoreUptime(const Competitor& competitor, uint64_t seed, int count, ThreadPool& pool,
+                         const Progress& progress) {
+  const Stopwatch watch;
+  UptimeReport report{competitor, {}, {}, {}, 0};
+  report.runs = SimulateUptimes(
+      competitor.robot, [&] { return MachineControllerOf(competitor); }, seed, count, &pool,
+      &report.trace, progress);
+  std::vector<double> scores;
+  for (const UptimeRun& run : report.runs) scores.push_back(run.score);
+  report.scores = MomentsOf(scores);
+  report.seconds = watch.seconds();
+  return report;
+}
+
+Interval UptimeReport::interval() const {
+  const double half = 1.96 * scores.deviation / std::sqrt(static_cast<double>(runs.size()));
+  return {scores.mean - half, scores.mean + half};
+}
+
+std::string UptimeJson(const UptimeReport& report) {
+  const Interval interval = report.interval();
+  ordered_json j{{"policy", report.competitor.name},
+                 {"robot", NameOf(report.competitor.robot)},
+                 {"mean_score", report.scores.mean},
+                 {"interval", {interval.low, interval.high}},
+                 {"deviation", report.scores.deviation}};
+  for (const UptimeRun& run : report.runs) {
+    j["runs"].push_back({{"score", run.score}, {"swing_ups", run.swing_ups}});
+  }
+  j["seconds"] = report.seconds;
+  return PrintableJson(j);
+}
+
 std::string BoardJson(const BoardReport& report) {
   const BoardOutcome& o = report.nominal;
   ordered_json j;
@@ -304,14 +353,13 @@ std::string BoardJson(const BoardReport& report) {
   return PrintableJson(j);
 }
 
-std::string BoardCsv(const BoardReport& report) {
+std::string BoardCsv(std::span<const BoardSample> trace) {
   std::string csv = "time,pos_meas1,pos_meas2,vel_meas1,vel_meas2,tau_con1,tau_con2\n";
-  const bool first = report.competitor.robot == Robot::kPendubot;
-  for (const BoardSample& sample : report.trace) {
+  for (const BoardSample& sample : trace) {
     csv += FormatNumber(std::round(sample.time * 1e6) / 1e6);
     for (const double x : sample.state) csv += Concat(",", FormatNumber(x));
-    csv += Concat(",", FormatNumber(first ? sample.torque : 0), ",",
-                  FormatNumber(first ? 0 : sample.torque), "\n");
+    for (const double u : sample.torque) csv += Concat(",", FormatNumber(u));
+    csv += '\n';
   }
   return csv;
 }

@@ -2,14 +2,17 @@
 
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "agents/loaded_policy.h"
 #include "base/progress.h"
+#include "base/sample.h"
 #include "extras/machine/controller.h"
 #include "extras/machine/twin.h"
 #include "extras/realaigym/search.h"
+#include "extras/realaigym/uptime.h"
 #include "runs/find_policy.h"
 
 /// Scoring of policies by the rules of RealAIGym's boards (docs/howto/realaigym.md).
@@ -87,9 +90,33 @@ struct BoardReport {
 BoardReport ScoreOnBoard(const Competitor& competitor, uint64_t seed, ThreadPool& pool,
                          const Progress& progress);
 
+/// A published entry of the boards of ICRA 2025, score version 3: a single run.
+struct UptimeEntry {
+  std::string name;
+  double score;
+  int swing_ups;
+};
+/// These entries, best first.
+std::vector<UptimeEntry> PublishedUptimes(Robot robot);
+
+/// A competitor's runs by score version 3.
+struct UptimeReport {
+  Competitor competitor;
+  std::vector<UptimeRun> runs;
+  Moments scores;
+  std::vector<BoardSample> trace;  // of the first run
+  double seconds;                  // wall time of the simulations
+  Interval interval() const;       // 95%, of the mean score (normal approximation)
+};
+
+/// Simulates `count` runs, whose resets have seeds from `seed` on. `progress` counts them.
+UptimeReport ScoreUptime(const Competitor& competitor, uint64_t seed, int count, ThreadPool& pool,
+                         const Progress& progress);
+
+std::string UptimeJson(const UptimeReport& report);
 std::string BoardJson(const BoardReport& report);
-/// The nominal motion as CSV in the boards' own format.
-std::string BoardCsv(const BoardReport& report);
+/// A motion as CSV in the boards' own format.
+std::string BoardCsv(std::span<const BoardSample> trace);
 /// Draws the six rows of robustness as .svg or .png.
 void DrawBoard(const BoardReport& report, const std::filesystem::path& file);
 

@@ -42,7 +42,8 @@ struct RealAiGymArguments {
   int64_t draws = 1000;
   bool no_pushes = false;
   std::vector<FlagValue> search;
-  int64_t threads = 0, case_seed = 1;
+  int64_t threads = 0, case_seed = 1, runs = 100;
+  std::string score_version = "2";
   bool as_json = false;
 };
 
@@ -255,6 +256,38 @@ int ScoreLogs(const RealAiGymArguments& a) {
   return 0;
 }
 
+/// Scores a competitor by score version 3.
+int ScoreUptimes(const RealAiGymArguments& a, const Competitor& competitor, ThreadPool& pool) {
+  UptimeReport report;
+  {
+    EpisodeProgress progress(a.as_json, "runs");
+    report = ScoreUptime(competitor, static_cast<uint64_t>(a.case_seed), static_cast<int>(a.runs),
+                         pool, std::ref(progress));
+  }
+  if (!a.csv.empty()) WriteOutput(a.csv, BoardCsv(report.trace));
+  if (IsStandardStream(a.csv)) return 0;
+  if (a.as_json) {
+    fmt::print("{}\n", UptimeJson(report));
+    return 0;
+  }
+  const auto [least, most] = std::ranges::minmax(report.runs, {}, &UptimeRun::score);
+  double swing_ups = 0;
+  for (const UptimeRun& run : report.runs) swing_ups += run.swing_ups;
+  const Interval interval = report.interval();
+  fmt::print(
+      "{} on RealAIGym's {}, simulation, version 3\n"
+      "  mean score {:.3f} (95%: {:.3f}–{:.3f}) of {}, {:.3f} to {:.3f}; {:.1f} swing-ups\n"
+      "  published, one run each\n",
+      Printable(report.competitor.name), NameOf(report.competitor.robot), report.scores.mean,
+      interval.low, interval.high, Counted(report.runs.size(), "run"), least.score, most.score,
+      swing_ups / static_cast<double>(report.runs.size()));
+  for (const UptimeEntry& entry : PublishedUptimes(report.competitor.robot)) {
+    fmt::print("  {:<22} {:>6.3f} {:>4} swing-ups\n", entry.name, entry.score, entry.swing_ups);
+  }
+  if (!a.csv.empty()) fmt::print("  written {}\n", Printable(a.csv));
+  return 0;
+}
+
 /// Scores a competitor on machines drawn from a twin's posterior.
 int ScoreOnTwin(const RealAiGymArguments& a, const Twin& twin, const Competitor& competitor,
                 ThreadPool& pool) {
@@ -343,12 +376,13 @@ int RunRealAiGym(const RealAiGymArguments& a) {
       searches ? Search(a, twin, pool) : GetCompetitor(a.policy, robot, twin);
   if (StopSignal() != 0) return 128 + StopSignal();
   if (twin) return ScoreOnTwin(a, *twin, competitor, pool);
+  if (a.score_version == "3") return ScoreUptimes(a, competitor, pool);
   BoardReport report;
   {
     EpisodeProgress progress(a.as_json);
     report = ScoreOnBoard(competitor, static_cast<uint64_t>(a.case_seed), pool, std::ref(progress));
   }
-  if (!a.csv.empty()) WriteOutput(a.csv, BoardCsv(report));
+  if (!a.csv.empty()) WriteOutput(a.csv, BoardCsv(report.trace));
   if (!a.figure.empty()) DrawBoard(report, a.figure);
   if (to_output) return 0;
   if (a.as_json) {
@@ -386,6 +420,10 @@ void AddRealAiGym(CommandLine& line) {
   own.Section("cases");
   own.Add(&a.case_seed, "case_seed", {0, 1e15}, "",
           "seed of noise and pushes in the robustness score, and of a twin's machines");
+  own.AddChoice(
+      &a.score_version, "score_version", {"2", "3"},
+      "rules; 2: performance and robustness, 3: share of 60 s upright after random resets");
+  own.Add(&a.runs, "runs", {1, 1e6}, "", "number of runs by score version 3");
   own.Add(&a.draws, "draws", {1, 1e6}, "", "number of machines drawn from the twin");
   line.Arguments(own);
   BoardSearchConfig config;

@@ -130,13 +130,13 @@ TEST(RealAiGymSimulation, OutcomesMatchTheMotion) {
     double energy = 0, cost = 0, velocity = 0, sum = 0, squares = 0;
     const size_t joint = robot == Robot::kPendubot ? 0 : 1;
     for (size_t k = 0; k + 1 < trace.size(); ++k) {
-      const double u = trace[k].torque;
+      const double u = trace[k].torque[0];
       const auto& x = trace[k].state;
       energy += std::abs((trace[k + 1].state[joint] - x[joint]) * u);
       cost += u * u * 0.002;
       velocity += (x[2] * x[2] + x[3] * x[3]) * 0.002;
-      sum += trace[k + 1].torque - u;
-      squares += std::pow(trace[k + 1].torque - u, 2);
+      sum += trace[k + 1].torque[0] - u;
+      squares += std::pow(trace[k + 1].torque[0] - u, 2);
     }
     EXPECT_NEAR(o.energy, energy, 1e-9 * energy);
     EXPECT_NEAR(o.torque_cost, cost, 1e-9 * cost);
@@ -165,7 +165,7 @@ TEST(RealAiGymSimulation, TheMotorRespondsByItsShareWithinItsLimit) {
     const BoardSample& now = played.trace[static_cast<size_t>(k)];
     const double wanted = Script(k, now.state[0]);
     before = std::clamp(before + 1.7 * (wanted - before), -6.0, 6.0);
-    ASSERT_NEAR(now.torque, before, 1e-12) << k;
+    ASSERT_NEAR(now.torque[0], before, 1e-12) << k;
   }
 }
 
@@ -188,7 +188,7 @@ TEST(RealAiGymSimulation, NoiseIsOfItsSize) {
   squares = 0;
   for (int k = 0; k < 5000; ++k) {
     const BoardSample& now = pushed.trace[static_cast<size_t>(k)];
-    const double n = now.torque - Script(k, now.state[0]);
+    const double n = now.torque[0] - Script(k, now.state[0]);
     squares += n * n;
   }
   EXPECT_NEAR(std::sqrt(squares / 5000), 0.3, 0.02);
@@ -202,7 +202,7 @@ TEST(RealAiGymSimulation, APushActsNextToTheMotor) {
   EXPECT_NE(pushed.trace[1100].state, free.trace[1100].state);
   // The tables' torque is only the motor's.
   const BoardSample& now = pushed.trace[1000];
-  EXPECT_EQ(now.torque, Script(1000, now.state[0]));
+  EXPECT_EQ(now.torque[0], Script(1000, now.state[0]));
 }
 
 /// Asks for more torque than the motor has.

@@ -82,7 +82,11 @@ class Run {
     for (int step = 0; step < steps_; ++step) {
       controller.Act(step, Measure(step), episodes_.size(), wanted_);
       Drive(step);
-      if (trace != nullptr) trace->push_back({step * kBoardTimestep, StateOf(0), torque_[0]});
+      if (trace != nullptr) {
+        const double torque = torque_[0];
+        trace->push_back({step * kBoardTimestep, StateOf(0),
+                          block_.joint[0] == 1 ? Joints{torque, 0} : Joints{0, torque}});
+      }
       NoteAngles();
       if (step % kNoted == 0) NoteNearness(step);
       if (step < steps_ - 1) NoteVelocities();

@@ -7,6 +7,7 @@
 
 #include "base/progress.h"
 #include "base/thread_pool.h"
+#include "extras/machine/log.h"
 #include "extras/realaigym/rules.h"
 
 namespace upswing::realaigym {
@@ -38,11 +39,11 @@ class BoardController {
 /// Makes the controller of the block whose first simulation has number `first`.
 using BoardControllerMaker = std::function<std::unique_ptr<BoardController>(size_t first)>;
 
-/// One step of a simulation, for tables: the state, and the torque that acts after it.
+/// One step of a simulation, for tables: the state, and the torques that act after it.
 struct BoardSample {
   double time;
   BoardState state;
-  double torque;  // N·m
+  Joints torque;  // N·m
 };
 
 /// Simulates all episodes, in blocks on the pool's threads. `trace`, if given, gets the steps of
