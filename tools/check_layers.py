@@ -51,8 +51,7 @@ ALLOWED_FILES = {
     "google": re.compile(r"(src/runs|extras/deploy)/"),
     "nanobind": re.compile(r"python/"),
     "hwy": re.compile(r"(src/(base/simd(_test)?|nn/(linear|product|registers-inl)|"
-                      r"pendulum/(closed_form|sine_cosine-inl))|tools/bench/roofline|"
-                      r"extras/realaigym/swing_net)\.(h|cc)$"),
+                      r"pendulum/(closed_form|sine_cosine-inl))|tools/bench/roofline)\.(h|cc)$"),
     "Eigen": re.compile(r"src/(control/|nn/[^/]*_test\.cc$)|extras/(machine|realaigym)/|tools/bench/"),
 }
 

@@ -67,8 +67,8 @@ def flags(command):
     texts = [help_of(command)]
     if command == "train":
         texts += [help_of("train", "--agent", agent) for agent in ALGORITHMS.values()]
-    if command == "machine":
-        texts += [help_of("machine", own) for own in _table(texts[0], "Subcommands")]
+    if "\nSubcommands" in texts[0]:
+        texts += [help_of(command, own) for own in _table(texts[0], "Subcommands")]
     return {flag for text in texts for flag in re.findall(r"(?<![\w-])--[a-z][a-z0-9-]*", text)}
 
 

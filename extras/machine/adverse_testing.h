@@ -204,7 +204,7 @@ class WildController : public MachineController {
  public:
   explicit WildController(Chooser choose) : choose_(std::move(choose)) {}
   int64_t hz() const override { return 500; }
-  double Torque(int64_t /*step*/, const PendulumState& /*state*/, bool /*estimated*/) override {
+  double Torque(int64_t /*step*/, const PendulumState& /*state*/) override {
     constexpr std::array kTorques{-1e300, -5.0, -1.0, 0.0, 2.0, 5.0, 1e300};
     if (choose_(20) == 0) torque_ = kTorques[choose_(kTorques.size())];
     return choose_(5000) == 0 ? std::nan("") : torque_;

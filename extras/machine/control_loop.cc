@@ -22,10 +22,10 @@ LoopController::LoopController(std::unique_ptr<MachineController> controller, in
   }
 }
 
-double LoopController::Act(int64_t cycle, const PendulumState& s, bool estimated) {
+double LoopController::Act(int64_t cycle, const PendulumState& s) {
   // After missed cycles only the last of the missed actions is made up.
   const int64_t step = cycle * controller_->hz() / hz_;
-  if (step != step_) torque_ = controller_->Torque(step, s, estimated);
+  if (step != step_) torque_ = controller_->Torque(step, s);
   step_ = step;
   return torque_;
 }
@@ -87,7 +87,7 @@ CycleFacts ControlLoop::FactsOf(double now, const std::optional<LinkReading>& re
 Joints ControlLoop::ControllerTorque() {
   Joints torque = estimator_.CompensationTorque(config_.compensation);
   torque[static_cast<size_t>(config_.actuated_joint - 1)] +=
-      controller_.Act(cycle_ - running_cycle_, estimator_.ahead(), estimator_.has_twin());
+      controller_.Act(cycle_ - running_cycle_, estimator_.ahead());
   return torque;
 }
 

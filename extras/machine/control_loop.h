@@ -21,9 +21,8 @@ class LoopController {
  public:
   /// Throws BadInput unless the rate `hz` of the loop is a multiple of the controller's.
   LoopController(std::unique_ptr<MachineController> controller, int64_t hz);
-  /// The motor's torque (N·m) in a cycle; number 0 is the first one. `estimated`: whether the
-  /// state's velocities come from a model.
-  double Act(int64_t cycle, const PendulumState& state, bool estimated);
+  /// The motor's torque (N·m) in a cycle; number 0 is the first one.
+  double Act(int64_t cycle, const PendulumState& state);
 
  private:
   std::unique_ptr<MachineController> controller_;

@@ -209,7 +209,7 @@ TEST(ControlLoop, CompensatesTheFrictionOfTheOtherJoint) {
 class FailingController : public MachineController {
  public:
   int64_t hz() const override { return 500; }
-  double Torque(int64_t step, const PendulumState& /*state*/, bool /*estimated*/) override {
+  double Torque(int64_t step, const PendulumState& /*state*/) override {
     if (step >= 100) throw std::bad_alloc();
     return 1;
   }
@@ -272,9 +272,7 @@ TEST(Supervisor, TakesTheReadingsOfARealMachineForMotions) {
 class AngleController : public MachineController {
  public:
   int64_t hz() const override { return 50; }
-  double Torque(int64_t /*step*/, const PendulumState& state, bool /*estimated*/) override {
-    return state.q1;
-  }
+  double Torque(int64_t /*step*/, const PendulumState& state) override { return state.q1; }
 };
 
 TEST(LoopController, KeepsThePeriodOfAPolicy) {
@@ -284,18 +282,17 @@ TEST(LoopController, KeepsThePeriodOfAPolicy) {
     double last = 0;
     for (int64_t cycle = 0; cycle < 10 * held; ++cycle) {
       const double torque =
-          controller.Act(cycle, {3.1 + 1e-4 * static_cast<double>(cycle), 0, 0, 0}, true);
+          controller.Act(cycle, {3.1 + 1e-4 * static_cast<double>(cycle), 0, 0, 0});
       EXPECT_EQ(torque != last, cycle % held == 0) << hz << " Hz, cycle " << cycle;
       last = torque;
     }
   }
   // After missed cycles it acts once, and then at its own times again.
   LoopController late(std::make_unique<AngleController>(), 500);
-  const double first = late.Act(0, {3.1, 0, 0, 0}, true),
-               second = late.Act(47, {3.2, 0, 0, 0}, true);
+  const double first = late.Act(0, {3.1, 0, 0, 0}), second = late.Act(47, {3.2, 0, 0, 0});
   EXPECT_NE(first, second);
-  EXPECT_EQ(late.Act(49, {3.1, 0, 0, 0}, true), second);
-  EXPECT_EQ(late.Act(50, {3.1, 0, 0, 0}, true), first);
+  EXPECT_EQ(late.Act(49, {3.1, 0, 0, 0}), second);
+  EXPECT_EQ(late.Act(50, {3.1, 0, 0, 0}), first);
   EXPECT_THROW(LoopController(std::make_unique<SineController>(1, 500), 400), Error);
 }
 

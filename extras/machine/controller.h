@@ -13,8 +13,7 @@ class MachineController {
   /// Steps per second. A torque is held for a step.
   virtual int64_t hz() const = 0;
   /// The motor's torque (N·m) in a step; number 0 is the first one. Steps can be left out.
-  /// `estimated`: whether the state's velocities come from a model.
-  virtual double Torque(int64_t step, const PendulumState& state, bool estimated) = 0;
+  virtual double Torque(int64_t step, const PendulumState& state) = 0;
 };
 
 }  // namespace upswing::machine

@@ -38,8 +38,6 @@ class Estimator {
   /// Takes the torques (N·m) sent at a time (s), and a new reading if there is one.
   void Update(double time, const Joints& sent, const TimedReading* reading);
 
-  /// Whether it follows a twin, so that its velocities come from a model.
-  bool has_twin() const { return model_.has_value(); }
   /// The estimated state now: true angles, without the encoders' zeros.
   const PendulumState& now() const { return now_; }
   /// The estimated state when a torque that is computed now will act.

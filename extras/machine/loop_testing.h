@@ -16,7 +16,7 @@ class SineController : public MachineController {
  public:
   explicit SineController(double amplitude, int64_t hz = 50) : amplitude_(amplitude), hz_(hz) {}
   int64_t hz() const override { return hz_; }
-  double Torque(int64_t step, const PendulumState& /*state*/, bool /*estimated*/) override {
+  double Torque(int64_t step, const PendulumState& /*state*/) override {
     return amplitude_ * std::sin(6 * static_cast<double>(step) / static_cast<double>(hz_));
   }
 

@@ -241,7 +241,7 @@ class Machine(ProgramTest):
             (self.folder / "log.csv").write_bytes(text.encode())
             return [self.succeed(*words, "--json") for words in (
                 ("machine", "check", "log.csv"), ("machine", "validate", "plant.toml", "log.csv"),
-                ("realaigym", "--hardware", "log.csv"))]
+                ("realaigym", "hardware", "log.csv"))]
 
         expected = results(log())
         order = [8, 3, 0, 7, 2, 6, 1, 5, 4]
@@ -265,7 +265,7 @@ class Machine(ProgramTest):
                          self.succeed(*validate, *reversed(files), "--json"))
         for again in (files[0], "./a.csv"):
             self.refuse([*validate, *files, again], "expected each log once", "a.csv twice")
-            self.refuse(["realaigym", "--hardware", *files, again], "expected each log once")
+            self.refuse(["realaigym", "hardware", *files, again], "expected each log once")
 
     def test_logs_without_commanded_torques(self):
         self.write("plant.toml", "[plant]\nmass1 = 0.5\n")
@@ -283,7 +283,7 @@ class Machine(ProgramTest):
         self.assertEqual({row["torques"] for row in rows["errors"]}, {"no"})
         rows = json.loads(self.succeed("machine", "validate", "plant.toml", measured, "--json"))
         self.assertEqual({row["torques"] for row in rows["errors"]}, {"reported"})
-        self.refuse(["realaigym", "--hardware", measured], "expected commanded torques")
+        self.refuse(["realaigym", "hardware", measured], "expected commanded torques")
         # Without the torques that move the machine, there is no prediction.
         only_one = self.write("one.csv", log(scaled(tau_meas2=0)))
         rows = json.loads(self.succeed("machine", "validate", "plant.toml", only_one, "--json"))
@@ -309,10 +309,10 @@ class Machine(ProgramTest):
         self.assertIn("steps of 0.000381 rad (16471 per turn)", text)
         self.assertIn("  warning  motion 2    does not move although joint 1 does", text)
         runs = sorted((REAL / "C.1/swingup").glob("pendubot-tvlqr-*.csv.gz"))
-        table = self.succeed("realaigym", "--hardware", *runs)
+        table = self.succeed("realaigym", "hardware", *runs)
         self.assertRegex(table, r"  mean +3/5 .* 0\.130\n")
         self.assertRegex(table, r"  TVLQR +8/10 .* 0\.175\n")
-        scores = json.loads(self.succeed("realaigym", "--hardware", *runs, "--json"))
+        scores = json.loads(self.succeed("realaigym", "hardware", *runs, "--json"))
         self.assertAlmostEqual(scores["runs"][1]["score"], 0.21401097079397924, delta=1e-9)
 
 

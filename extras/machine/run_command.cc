@@ -78,7 +78,9 @@ int Drive(const RunArguments& a, const realaigym::Competitor& competitor,
   const int joint = static_cast<int>(competitor.robot);
   const auto hz = std::llround(a.hz);
   const double period = 1 / a.hz;
-  LoopController controller(realaigym::MachineControllerOf(competitor), hz);
+  // A first call of another controller touches memory that is not there yet.
+  realaigym::MachineControllerOf(competitor.loaded)->Torque(0, {});
+  LoopController controller(realaigym::MachineControllerOf(competitor.loaded), hz);
   Estimator estimator = twin && !a.differences
                             ? Estimator(*twin, period)
                             : Estimator(twin ? twin->sensors : a.sensors, period);
@@ -100,7 +102,7 @@ int Drive(const RunArguments& a, const realaigym::Competitor& competitor,
   g_link = OpenLink(a, address, twin, start);
   MachineLink& link = *g_link;
   LogWriter log(a.log);
-  fmt::print("{} on {}, {} Hz, {}\n", Printable(competitor.name), Printable(a.link), a.hz,
+  fmt::print("{} on {}, {} Hz, {}\n", Printable(competitor.name()), Printable(a.link), a.hz,
              realaigym::NameOf(competitor.robot));
   if (!link.simulated()) {
     const std::string missing = EnterRealTime();
@@ -121,10 +123,7 @@ int Drive(const RunArguments& a, const realaigym::Competitor& competitor,
 int RunRun(const RunArguments& a) {
   if (a.policy.name.empty()) throw BadInput("run: expected a policy or a controller, got none");
   if (a.link.empty()) throw BadInput("run: expected --link, got none");
-  if (!a.robot.empty() && !realaigym::RobotNamed(a.robot)) {
-    throw BadInput(
-        Concat("--robot: expected pendubot or acrobot, got \"", Printable(a.robot), "\""));
-  }
+  realaigym::ParseRobot(a.robot);  // throws
   const LinkAddress address = ParseLink(a.link, /*listens=*/false);
   CheckBaud(address, std::llround(a.hz));
   if (IsStandardStream(a.log)) throw BadInput("--log: expected a file, got standard output");
@@ -191,7 +190,7 @@ void AddRun(CommandLine& line) {
       "sticks or saturates (docs/howto/protection.md).\n"
       "Exit code: 0, or 1 with the reason in a line after a fault or beyond a limit.\n\n"
       "A controller is designed for the twin without dry friction. --made-for changes this\n"
-      "plant. Policies of `realaigym --search --twin` need --compensation 0.95.\n"
+      "plant.\n"
       "Read docs/howto/real-machine.md before you switch on motors.\n\n"
       "Examples:\n"
       "  ./upswing run tvlqr --link twin.toml --compensation 0.95 --log rehearsal.csv\n"

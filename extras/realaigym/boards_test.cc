@@ -47,16 +47,14 @@ TEST(RealAIGym, PoliciesObserveAsInTraining) {
   LoadedPolicy loaded;
   loaded.policy = recorder;
   loaded.task = kDoublePendulum;
-  const BoardControllerMaker make = [&](size_t) { return ControllerOf(loaded, kBoardBlock); };
-  const std::vector<BoardEpisode> nominal(1);
-  std::vector<BoardSample> trace;
-  SimulateOnBoard(Robot::kPendubot, nominal, make, nullptr, &trace);
+  const MachineLog log = NominalLog({std::make_shared<LoadedPolicy>(loaded)});
   ASSERT_EQ(recorder->seen.size(), 500);
 
   Identifier identifier(loaded.plant, 1);
   for (size_t k = 0; k < 100; ++k) {
-    const BoardState& now = trace[10 * k].state;
-    const PendulumState measured{now[0], now[1], now[2], now[3]};
+    const auto &q = log.angle, &velocity = log.velocity;
+    const PendulumState measured{q[10 * k][0], q[10 * k][1], velocity[10 * k][0],
+                                 velocity[10 * k][1]};
     std::vector<float> expected;
     for (const float x : Observe(loaded.plant, measured)) expected.push_back(x);
     if (k == 0) identifier.Begin(0, measured);
@@ -64,10 +62,10 @@ TEST(RealAIGym, PoliciesObserveAsInTraining) {
     expected.resize(kObservationSize + kIdentifiedSize);
     identifier.Observe(0, measured, std::span(expected).subspan(kObservationSize));
     for (size_t past = 1; past <= kMemory; ++past) {
-      for (const size_t w : {2, 3}) {
+      for (const size_t j : {0, 1}) {
         const bool known = past <= k;
         const double change =
-            known ? trace[10 * (k - past + 1)].state[w] - trace[10 * (k - past)].state[w] : 0;
+            known ? velocity[10 * (k - past + 1)][j] - velocity[10 * (k - past)][j] : 0;
         expected.push_back(static_cast<float>(change / kMemoryVelocity));
       }
       expected.push_back(past <= k ? static_cast<float>(Recorder::Torque(k - past) / kMemoryTorque)

@@ -6,20 +6,16 @@
 #include "base/error.h"
 #include "base/json.h"
 #include "base/text.h"
+#include "extras/realaigym/uptime.h"
 
 namespace upswing::realaigym {
 namespace {
 
 /// Start of the last stretch above the line, s; the end if the tip is below at the end.
 double SwingUpSeconds(const MachineLog& log) {
-  const BoardPlant plant;
-  const double line = 0.9 * (plant.length1 + plant.length2);
-  const auto height = [&](const Joints& q) {
-    return -plant.length1 * std::cos(q[0]) - plant.length2 * std::cos(q[0] + q[1]);
-  };
   // The benchmark's program does not test the last row.
   int first = log.rows() - 1;
-  while (first > 0 && height(log.angle[first - 1]) > line) --first;
+  while (first > 0 && AboveLine(log.angle[first - 1])) --first;
   return log.time[first];
 }
 

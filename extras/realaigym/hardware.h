@@ -20,11 +20,11 @@ ScoreScales HardwareScales(Robot robot, bool pushed);
 Robot RobotOf(const MachineLog& log);
 
 /// Shortest run that can succeed, s.
-inline constexpr double kHardwareSeconds = 0.99 * kBoardSteps * kBoardTimestep;
+inline constexpr double kHardwareSeconds = 0.99 * kBoardSeconds;
 
-/// Measures of a run: angles and velocities as logged, torque as commanded. A run that is shorter
-/// than kHardwareSeconds is a failure. Throws BadInput if the log lacks velocities or commanded
-/// torques.
+/// Measures of a run, real or simulated: angles and velocities as logged, torque as commanded. A
+/// run that is shorter than kHardwareSeconds is a failure. Throws BadInput if the log lacks
+/// velocities or commanded torques.
 BoardOutcome OutcomeOf(const MachineLog& log);
 
 struct HardwareRun {

@@ -9,7 +9,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "extras/machine/testing.h"
-#include "extras/realaigym/boards.h"
+#include "extras/realaigym/published.h"
 
 namespace upswing::realaigym {
 namespace {

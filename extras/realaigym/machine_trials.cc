@@ -4,91 +4,67 @@
 #include <array>
 #include <cmath>
 #include <memory>
-#include <mutex>
+#include <numbers>
+#include <utility>
 
+#include "base/rng.h"
 #include "extras/machine/estimator.h"
-#include "extras/machine/motion.h"
 
 namespace upswing::realaigym {
 namespace {
 
-/// Two Gaussian pulses of torque at each joint, at least a second apart, the first at joint 1.
-std::array<BoardPush, 4> HardwarePushes(Robot robot, Rng& rng) {
+/// Four Gaussian pulses of torque, the first at joint 1, then at the joints in turn, at least a
+/// second apart. Returns the torques (N·m) over time (s).
+std::function<Joints(double)> RandomPushTorques(Rng& rng) {
   std::array<BoardPush, 4> pushes;
-  bool passive = robot == Robot::kAcrobot;
   double time = 0;
   for (BoardPush& push : pushes) {
     time += 1 + rng.Uniform(0, 1.4);
     const double sign = rng.Uniform() < 0.5 ? -1 : 1;
-    push = {sign * rng.Uniform(0.2, 0.5), time, rng.Uniform(0.05, 0.1), passive};
-    passive = !passive;
+    push = {sign * rng.Uniform(0.2, 0.5), time, rng.Uniform(0.05, 0.1)};
   }
-  return pushes;
-}
-
-/// The torques (N·m) of pushes at both joints over time (s).
-std::function<Joints(double)> PushTorques(const std::array<BoardPush, 4>& pushes, Robot robot) {
-  return [pushes, robot](double now) {
-    const size_t motor = static_cast<size_t>(robot) - 1;
+  return [pushes](double now) {
     Joints torque{};
-    for (const BoardPush& push : pushes) {
-      torque[push.passive ? 1 - motor : motor] += push.Torque(now);
-    }
+    for (size_t k = 0; k < pushes.size(); ++k) torque[k % 2] += pushes[k].Torque(now);
     return torque;
   };
 }
 
-/// State of a controller made by OnMachine.
-struct BoardOnMachine {
-  Estimator estimator;
-  std::unique_ptr<BoardController> controller;
-  BoardMeasurement measured{};
-  Lanes torque{};  // N·m
-  Joints sent{};   // in the last cycle, N·m
-  int steps = 0;   // of the controller so far
-};
+/// Runs a controller on the machine of a trial. `run` has the rules, and gets the trial's pushes
+/// if `pushes` asks for them.
+MachineLog RunTrial(const Twin& twin, int trial, LoopRun run, const TrialRules& rules, bool pushes,
+                    const TrialController& make) {
+  Rng rng(rules.seed, "realaigym: machine", static_cast<uint64_t>(trial));
+  const Twin machine = DrawTwin(twin, rng);
+  run.largest_angle = std::min(run.largest_angle, machine.sensors.angle_range);
+  if (pushes) run.push = rules.push_of ? rules.push_of(trial) : RandomPushTorques(rng);
+  run.seed = rng.Next();
+  return RunLoop(machine, run, make(run.seed));
+}
 
 }  // namespace
 
-BoardEpisode EpisodeOf(const Twin& machine) {
-  BoardEpisode episode;
-  episode.body = BodyOf(machine);
-  episode.body->f1 *= 1 - kCompensated;
-  episode.body->f2 *= 1 - kCompensated;
-  episode.angle_range = machine.sensors.angle_range;
-  episode.response = 1 - std::exp(-kBoardTimestep / std::max(machine.actuator.lag, 1e-5));
-  return episode;
-}
-
-BoardEpisode DrawEpisode(const Twin& twin, Robot robot, Rng& rng) {
-  const Twin machine = DrawTwin(twin, rng);
-  BoardEpisode episode = EpisodeOf(machine);
-  const double left = rng.Uniform(0, 1.5);
-  episode.zero = {left * (machine.sensors.zero1 - twin.sensors.zero1),
-                  left * (machine.sensors.zero2 - twin.sensors.zero2)};
-  episode.delay = static_cast<int>(rng.Below(2));
-  episode.pushes = HardwarePushes(robot, rng);
-  episode.seed = rng.Next();
-  return episode;
-}
-
-TrialController OnMachine(const BoardControllerMaker& make, const Twin& twin, Robot robot) {
-  return [make, twin, robot]() -> CycleController {
-    auto own = std::make_shared<BoardOnMachine>(
-        BoardOnMachine{Estimator(twin, twin.loop.period), make(0)});
+TrialController OnMachine(const ControllerMaker& make, const Twin& twin, Robot robot,
+                          const std::optional<ResetRules>& resets) {
+  return [make, twin, robot, resets](uint64_t seed) -> CycleController {
+    const auto estimator = std::make_shared<Estimator>(twin, twin.loop.period);
     const Joints limit = TorqueLimits(twin, static_cast<int>(robot));
-    return [own, limit, robot](const CycleInput& in) -> Joints {
+    const ControllerMaker compensated = [make, estimator, limit]() -> CycleController {
+      return [own = make(), estimator, limit](const CycleInput& in) -> Joints {
+        Joints torque = own(in);
+        const Joints friction = estimator->CompensationTorque(kCompensated);
+        for (size_t j = 0; j < 2; ++j) {
+          torque[j] = std::clamp(torque[j] + friction[j], -limit[j], limit[j]);
+        }
+        return torque;
+      };
+    };
+    const CycleController driver = resets ? WithResets(compensated, *resets, seed) : compensated();
+    return [estimator, driver, sent = Joints{}](const CycleInput& in) mutable -> Joints {
       const TimedReading reading{{in.angle, {}}, in.time};
-      own->estimator.Update(in.time, own->sent, &reading);
-      own->measured.SetFirst(own->estimator.ahead(), own->estimator.has_twin());
-      // A controller that holds its torque counts the steps.
-      for (; own->steps * kBoardTimestep <= in.time; ++own->steps) {
-        own->controller->Act(own->steps, own->measured, 1, own->torque);
-      }
-      Joints torque = own->estimator.CompensationTorque(kCompensated);
-      torque[static_cast<size_t>(robot) - 1] += own->torque[0];
-      for (size_t j = 0; j < 2; ++j) torque[j] = std::clamp(torque[j], -limit[j], limit[j]);
-      return own->sent = torque;
+      estimator->Update(in.time, sent, &reading);
+      const PendulumState& s = estimator->ahead();
+      return sent = driver({in.time, {s.q1, s.q2}, {s.w1, s.w2}});
     };
   };
 }
@@ -96,28 +72,29 @@ TrialController OnMachine(const BoardControllerMaker& make, const Twin& twin, Ro
 HardwareReport RunTrials(const Twin& twin, Robot robot, const TrialController& make,
                          const TrialRules& rules, ThreadPool* pool, const Progress& progress) {
   std::vector<HardwareRun> runs(static_cast<size_t>(rules.count));
-  std::mutex mutex;
-  double done = 0;
-  ParallelFor(pool, rules.count, [&](int i) {
-    Rng rng(rules.seed, "realaigym: machine", static_cast<uint64_t>(i));
-    const Twin machine = DrawTwin(twin, rng);
-    LoopRun run;
-    run.seconds = kBoardSteps * kBoardTimestep;
-    run.actuated_joint = static_cast<int>(robot);
-    run.largest_angle = machine.sensors.angle_range;
-    run.largest_velocity = rules.largest_velocity;
-    if (rules.pushes) {
-      run.push = rules.push_of ? rules.push_of(i) : PushTorques(HardwarePushes(robot, rng), robot);
-    }
-    run.seed = rng.Next();
-    const MachineLog log = RunLoop(machine, run, make());
-    runs[static_cast<size_t>(i)] = ScoreHardware(std::span(&log, 1), robot).runs.front();
-    runs[static_cast<size_t>(i)].name = "draw " + std::to_string(i + 1);
-    if (!progress) return;
-    const std::lock_guard lock(mutex);
-    progress(++done, rules.count);
+  const LoopRun run{.seconds = kBoardSeconds,
+                    .largest_velocity = rules.largest_velocity,
+                    .actuated_joint = static_cast<int>(robot)};
+  RunAll(rules.count, pool, progress, [&](int i) {
+    const MachineLog log = RunTrial(twin, i, run, rules, rules.pushes, make);
+    HardwareRun& own = runs[static_cast<size_t>(i)];
+    own = ScoreHardware(std::span(&log, 1), robot).runs.front();
+    own.name = "draw " + std::to_string(i + 1);
   });
   return {robot, rules.pushes, std::move(runs)};
+}
+
+std::vector<UptimeRun> RunUptimeTrials(const Twin& twin, const TrialController& make,
+                                       const TrialRules& rules, ThreadPool* pool,
+                                       const Progress& progress) {
+  std::vector<UptimeRun> runs(static_cast<size_t>(rules.count));
+  // Both motors may make a reset. These are the machine's safety limits.
+  const LoopRun run{
+      .seconds = kUptimeSeconds, .largest_angle = 4 * std::numbers::pi, .largest_velocity = 25};
+  RunAll(rules.count, pool, progress, [&](int i) {
+    runs[static_cast<size_t>(i)] = UptimeOf(RunTrial(twin, i, run, rules, false, make));
+  });
+  return runs;
 }
 
 }  // namespace upswing::realaigym

@@ -1,8 +1,5 @@
 #pragma once
 
-#include <array>
-#include <cstddef>
-
 #include "pendulum/equations.h"
 
 namespace upswing::machine {}
@@ -16,7 +13,7 @@ namespace upswing::realaigym {
 using namespace machine;
 
 inline constexpr double kBoardTimestep = 0.002;  // step of Runge-Kutta and of control, s
-inline constexpr int kBoardSteps = 5000;         // steps per simulation, 10 s
+inline constexpr double kBoardSeconds = 10;      // length of a simulation and of a hardware run, s
 inline constexpr double kBoardTorqueLimit = 6;   // of the motor, N·m
 inline constexpr double kBoardGearRatio = 6;     // of the motors
 
@@ -33,13 +30,5 @@ struct BoardPlant {
 };
 
 Manipulator ManipulatorOf(const BoardPlant& plant);
-
-/// State q1, q2, w1, w2.
-using BoardState = std::array<double, 4>;
-
-/// Number of simulations that are stepped together.
-inline constexpr size_t kBoardBlock = 64;
-/// One number for each simulation of a block.
-using Lanes = std::array<double, kBoardBlock>;
 
 }  // namespace upswing::realaigym

@@ -2,10 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "base/rng.h"
 #include "control/linearize.h"
+#include "control/riccati.h"
 #include "extras/realaigym/rules.h"
 #include "pendulum/closed_form.h"
 #include "runs/plant_file.h"
@@ -14,6 +16,9 @@ namespace upswing::realaigym {
 namespace {
 
 // Parameters of the benchmark's plant without friction (docs/howto/realaigym.md).
+
+/// State q1, q2, w1, w2.
+using BoardState = std::array<double, 4>;
 
 /// Kinetic plus potential energy (J); the potential energy is 0 at the height of the pivot.
 double EnergyOf(const Manipulator& plant, const BoardState& s) {
@@ -76,7 +81,10 @@ TEST(BoardPlant, LinearModelAndRegulatorAreTheBenchmarks) {
   EXPECT_NEAR(gravity(1, 1), 74.534058517, 1e-8);
   EXPECT_NEAR(model.B[2], 27.179932885, 1e-8);
   EXPECT_NEAR(model.B[3], -44.272653678, 1e-8);
-  const Eigen::RowVector4d K = SolveBoardLqr(Robot::kPendubot, {0.97, 0.93, 0.39, 0.26}, 0.11).K;
+  const Eigen::RowVector4d K =
+      SolveContinuousLqr(model, Eigen::Vector4d(0.97, 0.93, 0.39, 0.26).asDiagonal(), 0.11)
+          .value()
+          .K;
   const Eigen::RowVector4d expected{-74.06251872, -71.588802601, -17.239516925, -12.792756538};
   EXPECT_LT((K - expected).cwiseAbs().maxCoeff(), 1e-7);
 }

@@ -9,12 +9,14 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <memory>
 #include <numbers>
 #include <vector>
 
 #include "base/csv.h"
 #include "base/thread_pool.h"
+#include "control/linearize.h"
+#include "control/riccati.h"
+#include "extras/realaigym/hardware.h"
 #include "extras/realaigym/simulation.h"
 
 namespace upswing::realaigym {
@@ -99,7 +101,7 @@ Eigen::Vector4d FirstFourAt(const std::vector<Cubics>& channels, double t) {
 /// and once near upright holds it with another for good. Its parameters come from the repository
 /// that the trajectory's file names: leaderboard/pendubot/simulation_v2/con_ilqr_tvlqr_lqr.py and
 /// its classes (tvlqr_controller.py, pcw_polynomial.py).
-class PublishedTvlqr : public BoardController {
+class PublishedTvlqr {
  public:
   /// Precomputed trajectory and gains.
   struct Plan {
@@ -109,24 +111,18 @@ class PublishedTvlqr : public BoardController {
     Lqr upright;
   };
 
-  explicit PublishedTvlqr(const Plan& plan) : plan_(plan) {}
+  explicit PublishedTvlqr(const Plan& plan) : plan_(&plan) {}
 
-  void Act(int step, const BoardMeasurement& m, size_t count, Lanes& torque) override {
-    const double t = step * kBoardTimestep;
-    const Eigen::Vector4d then = FirstFourAt(plan_.trajectory, t), K = FirstFourAt(plan_.K, t);
-    const double u = plan_.trajectory[4].At(t);
-    for (size_t lane = 0; lane < count; ++lane) {
-      const Eigen::Vector4d x(m.q1[lane], m.q2[lane], m.w1[lane], m.w2[lane]);
-      const Eigen::Vector4d off = Wrapped(x - Eigen::Vector4d(kPi, 0, 0, 0));
-      held_[lane] = held_[lane] || (std::abs(off[0]) <= 0.05 && std::abs(off[1]) <= 0.05 &&
-                                    std::abs(off[2]) <= 0.1 && std::abs(off[3]) <= 0.1);
-      const auto& [gain, cost] = plan_.upright;
-      if (!held_[lane]) {
-        torque[lane] = u - K.dot(Wrapped(x - then));
-      } else {
-        torque[lane] = off.dot(cost * off) > 1000 ? 0 : -gain.dot(off);
-      }
-    }
+  Joints operator()(const CycleInput& in) {
+    const Eigen::Vector4d then = FirstFourAt(plan_->trajectory, in.time);
+    const Eigen::Vector4d K = FirstFourAt(plan_->K, in.time);
+    const Eigen::Vector4d x(in.angle[0], in.angle[1], in.velocity[0], in.velocity[1]);
+    const Eigen::Vector4d off = Wrapped(x - Eigen::Vector4d(kPi, 0, 0, 0));
+    held_ = held_ || (std::abs(off[0]) <= 0.05 && std::abs(off[1]) <= 0.05 &&
+                      std::abs(off[2]) <= 0.1 && std::abs(off[3]) <= 0.1);
+    const auto& [gain, cost] = plan_->upright;
+    if (!held_) return {plan_->trajectory[4].At(in.time) - K.dot(Wrapped(x - then)), 0};
+    return {off.dot(cost * off) > 1000 ? 0 : -gain.dot(off), 0};
   }
 
  private:
@@ -136,13 +132,18 @@ class PublishedTvlqr : public BoardController {
     return x;
   }
 
-  const Plan& plan_;
-  std::array<bool, kBoardBlock> held_{};
+  const Plan* plan_;
+  bool held_ = false;
 };
 
-PublishedTvlqr::Plan::Plan()
-    : trajectory(ReadTrajectory()),
-      upright(SolveBoardLqr(Robot::kPendubot, {0.97, 0.93, 0.39, 0.26}, 0.11)) {
+/// The regulator of the benchmark's baselines.
+Lqr BaselineLqr() {
+  return SolveContinuousLqr(LinearizeUpright(ManipulatorOf(BoardPlant()), 1),
+                            Eigen::Vector4d(0.97, 0.93, 0.39, 0.26).asDiagonal(), 0.11)
+      .value();
+}
+
+PublishedTvlqr::Plan::Plan() : trajectory(ReadTrajectory()), upright(BaselineLqr()) {
   const Eigen::Matrix4d Q = Eigen::Vector4d(0.64, 0.56, 0.13, 0.037).asDiagonal();
   constexpr double kR = 0.82;
   std::array<std::vector<double>, 4> gains;
@@ -172,9 +173,8 @@ PublishedTvlqr::Plan::Plan()
 
 TEST(RealAiGymPublished, TvlqrHasItsPublishedScores) {
   const PublishedTvlqr::Plan plan;
-  const auto make = [&](size_t) { return std::make_unique<PublishedTvlqr>(plan); };
-  const BoardOutcome o =
-      SimulateOnBoard(Robot::kPendubot, std::array<BoardEpisode, 1>(), make, nullptr).front();
+  const BoardOutcome o = OutcomeOf(SimulateEpisode(Robot::kPendubot, {}, PublishedTvlqr(plan)));
+  EXPECT_TRUE(AtGoal(EndOf(Robot::kPendubot, {}, PublishedTvlqr(plan))));
   // Tolerance: the last published digit, and a little for the motion between the file's rows.
   EXPECT_NEAR(o.swing_up_seconds, 4.13, 1e-9);
   EXPECT_NEAR(o.energy, 9.53, 0.006);
@@ -184,21 +184,14 @@ TEST(RealAiGymPublished, TvlqrHasItsPublishedScores) {
   EXPECT_NEAR(o.max_torque, 1.77, 0.007);
   EXPECT_NEAR(PerformanceScore(o), 0.526, 0.0006);
 
-  // An encoder that ends before upright loses the run.
-  std::array<BoardEpisode, 1> narrow;
-  narrow[0].angle_range = 3;
-  const BoardOutcome lost = SimulateOnBoard(Robot::kPendubot, narrow, make, nullptr).front();
-  EXPECT_TRUE(o.above_line && o.at_goal && o.held > 0.9);
-  EXPECT_FALSE(lost.above_line || lost.at_goal || lost.held > 0);
-  EXPECT_EQ(lost.energy, o.energy);
-
   const std::vector<RobustnessCase> cases = RobustnessCases(1);
-  std::vector<BoardEpisode> episodes;
-  episodes.reserve(cases.size());
-  for (const RobustnessCase& each : cases) episodes.push_back(each.episode);
+  std::vector<PendulumState> ends(cases.size());
   ThreadPool pool(2);
-  const Robustness judged =
-      JudgeRobustness(cases, SimulateOnBoard(Robot::kPendubot, episodes, make, &pool));
+  RunAll(static_cast<int>(cases.size()), &pool, nullptr, [&](int i) {
+    const auto k = static_cast<size_t>(i);
+    ends[k] = EndOf(Robot::kPendubot, cases[k].episode, PublishedTvlqr(plan));
+  });
+  const Robustness judged = JudgeRobustness(cases, ends);
   const auto& [model, velocity, torque, response, delay, pushes] = judged.rows;
   // Rows without random draws. One cell of the model is at an edge that rounding can move.
   EXPECT_NEAR(model, 132.0 / 210, 1.1 / 210);

@@ -201,7 +201,7 @@ double PublishedTvlqr::Misfit(const MachineLog& log) const {
 }
 
 TrialController PublishedTvlqr::OnMachine() const {
-  return [this]() -> CycleController {
+  return [this](uint64_t /*seed*/) -> CycleController {
     return [this, upright = false](const CycleInput& in) mutable -> Joints {
       const State x(in.angle[0], in.angle[1], in.velocity[0], in.velocity[1]);
       upright = upright || Catches(in.time, x);  // the regulator keeps control

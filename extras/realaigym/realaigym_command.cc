@@ -2,24 +2,26 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <span>
+#include <string>
 #include <tuple>
 #include <utility>
+#include <vector>
 
 #include "base/error.h"
 #include "base/format.h"
 #include "base/json.h"
 #include "base/sample.h"
+#include "base/stopwatch.h"
 #include "base/text.h"
 #include "cli/commands.h"
 #include "cli/progress.h"
 #include "cli/say.h"
-#include "cli/signals.h"
 #include "extras/machine/check.h"
 #include "extras/machine/windows.h"
 #include "extras/realaigym/boards.h"
@@ -28,23 +30,27 @@
 #include "extras/realaigym/published_tvlqr.h"
 #include "os/host.h"
 #include "os/streams.h"
-#include "report/figure.h"
-#include "runs/find_policy.h"
-#include "runs/tensor_file.h"
 
 namespace upswing::realaigym {
 namespace {
 
-struct RealAiGymArguments {
-  PolicyArguments policy;
-  std::string figure, csv, search_out, from, twin;
-  std::vector<std::string> hardware, law;
-  int64_t draws = 1000;
-  bool no_pushes = false;
-  std::vector<FlagValue> search;
-  int64_t threads = 0, case_seed = 1, runs = 100;
-  std::string score_version = "2";
+/// What the commands share.
+struct CommonArguments {
+  std::string robot, twin, score_version;
+  int64_t runs = 100, threads = 0, seed = 1;
   bool as_json = false;
+
+  bool version2() const { return score_version == "2"; }
+};
+
+struct ScoreArguments : CommonArguments {
+  PolicyArguments policy;
+  std::string csv;
+  bool no_pushes = false;
+};
+
+struct HardwareArguments : CommonArguments {
+  std::vector<std::string> logs, law;
 };
 
 /// A number of a table; a dash if it is unknown.
@@ -63,63 +69,46 @@ void PrintEntry(const BoardEntry& e) {
       Cell(e.rows[5], 1, 100), Cell(e.robustness, 3));
 }
 
-void PrintReport(const BoardReport& report) {
+void PrintReport(const BoardReport& report, double seconds) {
   const Robot robot = report.competitor.robot;
-  fmt::print("{} on RealAIGym's {}, simulation, version 2\n", Printable(report.competitor.name),
-             NameOf(robot));
+  fmt::print("{} on RealAIGym's {}, simulation, score version 2\n",
+             Printable(report.competitor.name()), NameOf(robot));
   fmt::print(
       "  {:<22} {:>6} {:>7} {:>6} {:>7} {:>7} {:>6}  {:>5} {:>5} {:>5} {:>5} {:>5} {:>5} {:>6}\n",
       "", "time", "energy", "cost", "smooth", "speed", "score", "model", "veloc", "torq.", "resp.",
       "delay", "push", "score");
   fmt::print("  {:<22} {:>6} {:>7} {:>6} {:>7} {:>7} {:>6}  {:>5} {:>5} {:>5} {:>5} {:>5} {:>5}\n",
              "", "s", "J", "N²m²s", "N·m", "rad²/s", "S", "%", "%", "%", "%", "%", "%");
-  BoardEntry ours = report.Entry();
-  ours.name = Printable(ours.name);
-  PrintEntry(ours);
+  PrintEntry(report.Entry());
   fmt::print("  published\n");
   for (const BoardEntry& entry : PublishedEntries(robot)) PrintEntry(entry);
-  if (!report.competitor.plant.empty()) {
-    fmt::print("  designed for {}, not for the board's plant\n", report.competitor.plant);
-  }
   fmt::print("  {} simulations of 10 s in {:.2f} s; largest torque {:.2f} N·m\n", kBoardSimulations,
-             report.seconds, report.nominal.max_torque);
+             seconds, report.nominal.max_torque);
   if (!report.nominal.above_line) {
     fmt::print("  no swing-up: the tip is not above 0.45 m at the end\n");
   }
 }
 
-Competitor Search(const RealAiGymArguments& a, const std::optional<Twin>& twin, ThreadPool& pool) {
-  BoardSearchConfig config;
-  SetFlags(OptionsOf(config), a.search);
-  BoardSearch search =
-      a.from.empty() ? BoardSearch(config) : BoardSearch(config, LoadSwingPolicy(a.from));
-  if (twin) search.SearchOn(*twin);
-  InstallSignalHandlers("\nwriting the best policy so far\n");
-  const auto begin = std::chrono::steady_clock::now();
-  BoardSearch::Report report;
-  {
-    ProgressLine line;
-    while (search.Step(&pool, report) && StopSignal() == 0) {
-      const bool prints = !a.as_json && report.milestone;
-      if (!prints && !line.due()) continue;
-      const std::string stage = report.start > 0 ? fmt::format("start {}", report.start)
-                                                 : fmt::format("generation {}", report.generation);
-      const std::string text =
-          fmt::format("{:<16}  S {:.3f}", stage, PerformanceScore(search.Nominal()));
-      line.Show(static_cast<double>(report.generation) / search.generations(), {text});
-      if (prints) line.Print(text);
-    }
+/// `place`: where the runs were, such as "simulation".
+void PrintUptimes(const UptimeReport& report, const std::string& place, bool hardware) {
+  const Robot robot = report.competitor.robot;
+  const auto [least, most] = std::ranges::minmax(report.runs, {}, &UptimeRun::score);
+  double swing_ups = 0;
+  for (const UptimeRun& run : report.runs) swing_ups += run.swing_ups;
+  const Interval interval = report.interval();
+  fmt::print("{} on RealAIGym's {}, {}, score version 3\n", Printable(report.competitor.name()),
+             NameOf(robot), place);
+  fmt::print("  {:<22} {:>6} {:>15} {:>15} {:>10}\n", "", "score", "95%", "least to most",
+             "swing-ups");
+  fmt::print("  {:<22} {:>6.3f} {:>15} {:>15} {:>10.1f}\n", Counted(report.runs.size(), "run"),
+             report.scores().mean, fmt::format("{:.3f}–{:.3f}", interval.low, interval.high),
+             fmt::format("{:.3f}–{:.3f}", least.score, most.score),
+             swing_ups / static_cast<double>(report.runs.size()));
+  fmt::print("  published, {}\n", hardware ? "mean of the runs" : "one run each");
+  for (const UptimeEntry& entry : PublishedUptimes(robot, hardware)) {
+    fmt::print("  {:<22} {:>6.3f} {:>15} {:>15} {:>10}\n", entry.name, entry.score, "", "",
+               entry.swing_ups);
   }
-  const double seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  SaveTensors(search.net().ToTensors(search.numbers()), a.search_out);
-  if (StopSignal() != 0) {
-    Say("stopped at generation {} of {}: {}\n", search.generation(), search.generations(),
-        Printable(a.search_out));
-  } else if (!a.as_json) {
-    Say("search took {}: {}\n", FormatDuration(seconds), Printable(a.search_out));
-  }
-  return CompetitorOf(search, a.search_out);
 }
 
 void PrintHardwareRow(const std::string& name, const std::string& success, double seconds,
@@ -175,9 +164,8 @@ std::vector<SuccessesOfRun> SplitByRun(const HardwareReport& trials, size_t runs
 }
 
 /// Runs the TVLQR of the logs on a twin, and compares successes.
-int CompareTvlqr(const RealAiGymArguments& a, std::span<const MachineLog> logs,
+int CompareTvlqr(const HardwareArguments& a, std::span<const MachineLog> logs,
                  const HardwareReport& real) {
-  if (a.no_pushes) throw BadInput("--no-pushes: expected no --hardware with it, whose logs decide");
   if (real.pushed && a.law.empty()) {
     throw BadInput("--law: expected runs without pushes to rebuild the TVLQR from, got none");
   }
@@ -190,8 +178,7 @@ int CompareTvlqr(const RealAiGymArguments& a, std::span<const MachineLog> logs,
   const PublishedTvlqr law(of_law, real.robot);
   std::vector<double> misfits;
   for (const MachineLog& log : of_law) misfits.push_back(law.Misfit(log));
-  const TrialRules rules{.count = static_cast<int>(a.draws),
-                         .seed = static_cast<uint64_t>(a.case_seed)};
+  const TrialRules rules{.count = static_cast<int>(a.runs), .seed = static_cast<uint64_t>(a.seed)};
   ThreadPool pool(ResolveThreads(a.threads));
   HardwareReport report;
   {
@@ -203,7 +190,7 @@ int CompareTvlqr(const RealAiGymArguments& a, std::span<const MachineLog> logs,
     if (e.name == "TVLQR") std::tie(successes, runs) = std::pair(e.successes, 10);
   }
   const Interval interval = WilsonInterval(successes, runs);
-  const double share = report.successes() / static_cast<double>(a.draws);
+  const double share = report.successes() / static_cast<double>(a.runs);
   const std::vector<SuccessesOfRun> split =
       real.pushed ? SplitByRun(report, real.runs.size()) : std::vector<SuccessesOfRun>();
   if (a.as_json) {
@@ -230,7 +217,7 @@ int CompareTvlqr(const RealAiGymArguments& a, std::span<const MachineLog> logs,
       "  {}: {:.1f}% of {} succeed, mean score {:.3f}\n",
       NameOf(real.robot), real.pushed ? ", pushed" : "", Counted(of_law.size(), "run"),
       Median(misfits), successes, runs, 100 * interval.low, 100 * interval.high,
-      Printable(twin.name), 100 * share, Counted(a.draws, "machine"), report.mean());
+      Printable(twin.name), 100 * share, Counted(a.runs, "machine"), report.mean());
   if (!split.empty()) fmt::print("  with the pushes of a run {:>17} {:>14}\n", "real", "twin");
   for (size_t k = 0; k < split.size(); ++k) {
     const std::string name = std::filesystem::path(real.runs[k].name).filename().string();
@@ -241,11 +228,27 @@ int CompareTvlqr(const RealAiGymArguments& a, std::span<const MachineLog> logs,
   return 0;
 }
 
-int ScoreLogs(const RealAiGymArguments& a) {
-  BoardSearchConfig config;  // has --robot
-  SetFlags(OptionsOf(config), a.search);
-  const std::optional<Robot> robot = a.search.empty() ? std::nullopt : RobotNamed(config.robot);
-  const std::vector<MachineLog> logs = ReadCheckedLogs(a.hardware, "", SayError);
+/// Prints the scores of logs by version 3.
+int ScoreUptimeLogs(const HardwareArguments& a, std::span<const MachineLog> logs) {
+  nlohmann::ordered_json json;
+  for (const MachineLog& log : logs) {
+    const UptimeRun run = UptimeOf(log);
+    if (a.as_json) {
+      json["runs"].push_back(
+          {{"name", log.name}, {"score", run.score}, {"swing_ups", run.swing_ups}});
+    } else {
+      fmt::print("{}: score {:.3f}, {:.2f} s upright, {}\n", Printable(log.name), run.score,
+                 run.score * kUptimeSeconds, Counted(run.swing_ups, "swing-up"));
+    }
+  }
+  if (a.as_json) fmt::print("{}\n", PrintableJson(json));
+  return 0;
+}
+
+int RunHardware(const HardwareArguments& a) {
+  const std::optional<Robot> robot = ParseRobot(a.robot);
+  const std::vector<MachineLog> logs = ReadCheckedLogs(a.logs, "", SayError);
+  if (!a.version2()) return ScoreUptimeLogs(a, logs);
   const HardwareReport report = ScoreHardware(logs, robot);
   if (!a.twin.empty()) return CompareTvlqr(a, logs, report);
   if (a.as_json) {
@@ -256,56 +259,25 @@ int ScoreLogs(const RealAiGymArguments& a) {
   return 0;
 }
 
-/// Scores a competitor by score version 3.
-int ScoreUptimes(const RealAiGymArguments& a, const Competitor& competitor, ThreadPool& pool) {
-  UptimeReport report;
-  {
-    EpisodeProgress progress(a.as_json, "runs");
-    report = ScoreUptime(competitor, static_cast<uint64_t>(a.case_seed), static_cast<int>(a.runs),
-                         pool, std::ref(progress));
-  }
-  if (!a.csv.empty()) WriteOutput(a.csv, BoardCsv(report.trace));
-  if (IsStandardStream(a.csv)) return 0;
-  if (a.as_json) {
-    fmt::print("{}\n", UptimeJson(report));
-    return 0;
-  }
-  const auto [least, most] = std::ranges::minmax(report.runs, {}, &UptimeRun::score);
-  double swing_ups = 0;
-  for (const UptimeRun& run : report.runs) swing_ups += run.swing_ups;
-  const Interval interval = report.interval();
-  fmt::print(
-      "{} on RealAIGym's {}, simulation, version 3\n"
-      "  mean score {:.3f} (95%: {:.3f}–{:.3f}) of {}, {:.3f} to {:.3f}; {:.1f} swing-ups\n"
-      "  published, one run each\n",
-      Printable(report.competitor.name), NameOf(report.competitor.robot), report.scores.mean,
-      interval.low, interval.high, Counted(report.runs.size(), "run"), least.score, most.score,
-      swing_ups / static_cast<double>(report.runs.size()));
-  for (const UptimeEntry& entry : PublishedUptimes(report.competitor.robot)) {
-    fmt::print("  {:<22} {:>6.3f} {:>4} swing-ups\n", entry.name, entry.score, entry.swing_ups);
-  }
-  if (!a.csv.empty()) fmt::print("  written {}\n", Printable(a.csv));
-  return 0;
-}
-
-/// Scores a competitor on machines drawn from a twin's posterior.
-int ScoreOnTwin(const RealAiGymArguments& a, const Twin& twin, const Competitor& competitor,
+/// Scores a competitor by version 2 on machines drawn from a twin's posterior.
+int ScoreOnTwin(const ScoreArguments& a, const Twin& twin, const Competitor& competitor,
                 ThreadPool& pool) {
-  const TrialRules rules{.count = static_cast<int>(a.draws),
+  const TrialRules rules{.count = static_cast<int>(a.runs),
                          .pushes = !a.no_pushes,
-                         .seed = static_cast<uint64_t>(a.case_seed)};
+                         .seed = static_cast<uint64_t>(a.seed)};
   HardwareReport report;
   {
     EpisodeProgress progress(a.as_json, "machines");
-    report = RunTrials(twin, competitor.robot, OnMachine(competitor.make, twin, competitor.robot),
-                       rules, &pool, std::ref(progress));
+    report = RunTrials(twin, competitor.robot,
+                       OnMachine(ControllersOf(competitor), twin, competitor.robot), rules, &pool,
+                       std::ref(progress));
   }
-  const Interval interval = WilsonInterval(report.successes(), a.draws);
+  const Interval interval = WilsonInterval(report.successes(), a.runs);
   if (a.as_json) {
-    fmt::print("{}\n", PrintableJson({{"policy", competitor.name},
+    fmt::print("{}\n", PrintableJson({{"policy", competitor.name()},
                                       {"twin", twin.name},
                                       {"pushed", report.pushed},
-                                      {"draws", a.draws},
+                                      {"runs", a.runs},
                                       {"successes", report.successes()},
                                       {"interval", {interval.low, interval.high}},
                                       {"mean_score", report.mean()}}));
@@ -314,152 +286,170 @@ int ScoreOnTwin(const RealAiGymArguments& a, const Twin& twin, const Competitor&
   fmt::print(
       "{} on {} of {}{}: {} of {} swing up and stay, {:.1f}% (95%: {:.1f}–{:.1f}%), mean "
       "score {:.3f}\n",
-      Printable(competitor.name), Counted(a.draws, "machine"), Printable(twin.name),
-      report.pushed ? ", pushed" : "", report.successes(), a.draws,
-      100.0 * report.successes() / static_cast<double>(a.draws), 100 * interval.low,
+      Printable(competitor.name()), Counted(a.runs, "machine"), Printable(twin.name),
+      report.pushed ? ", pushed" : "", report.successes(), a.runs,
+      100.0 * report.successes() / static_cast<double>(a.runs), 100 * interval.low,
       100 * interval.high, report.mean());
-  if (twin.covariance.empty()) {
-    fmt::print("  all machines are equal, because the twin has no [covariance]\n");
+  return 0;
+}
+
+/// Scores a competitor by version 3, in simulation or on machines drawn from a twin's posterior.
+int ScoreUptimes(const ScoreArguments& a, const std::optional<Twin>& twin,
+                 const Competitor& competitor, ThreadPool& pool) {
+  const auto seed = static_cast<uint64_t>(a.seed);
+  UptimeReport report{competitor, {}};
+  {
+    EpisodeProgress progress(a.as_json, "runs");
+    if (twin) {
+      report.runs = RunUptimeTrials(
+          *twin, OnMachine(ControllersOf(competitor), *twin, competitor.robot, kHardwareResets),
+          {.count = static_cast<int>(a.runs), .seed = seed}, &pool, std::ref(progress));
+    } else {
+      report = ScoreUptime(competitor, seed, static_cast<int>(a.runs), pool, std::ref(progress));
+    }
+  }
+  if (a.as_json) {
+    fmt::print("{}\n", UptimeJson(report));
+  } else {
+    PrintUptimes(report, twin ? Concat("machines of ", Printable(twin->name)) : "simulation",
+                 twin.has_value());
   }
   return 0;
 }
 
-int RunRealAiGym(const RealAiGymArguments& a) {
-  if (!a.hardware.empty()) {
-    const bool own_flags =
-        std::ranges::all_of(a.search, [](const FlagValue& flag) { return flag.name == "robot"; });
-    if (own_flags && a.policy.empty() && a.search_out.empty() && a.from.empty() &&
-        a.figure.empty() && a.csv.empty()) {
-      return ScoreLogs(a);
-    }
-    throw BadInput("--hardware: expected no policy, --search, --from, --figure or --csv with it");
-  }
-  const bool searches = !a.search_out.empty();
-  if (searches == !a.policy.empty()) {
-    throw BadInput(searches
-                       ? "--search: expected no policy with it"
-                       : "realaigym: expected a policy to score, --search FILE or --hardware LOG, "
-                         "got none");
-  }
-  if (IsStandardStream(a.search_out)) throw BadInput("--search: expected a file, got -");
-  if (!searches && !a.from.empty())
-    throw BadInput("--from: expected --search FILE with it, got none");
-  std::string robot;
-  for (const FlagValue& flag : a.search) {
-    constexpr std::array kOfFrom{"robot", "hidden", "starts", "alone", "first_population"};
-    if (!a.from.empty() && std::ranges::count(kOfFrom, flag.name) > 0) {
-      throw BadInput(
-          Concat(FlagOf(flag.name), ": expected none with --from, which starts from a policy"));
-    }
-    if (flag.name == "robot") robot = flag.text;
-    if (searches || flag.name == "robot") continue;
-    throw BadInput(Concat(FlagOf(flag.name), ": expected --search FILE with it, got none"));
-  }
-  for (const auto& [flag, path] :
-       {std::pair{"--search", &a.search_out}, {"--csv", &a.csv}, {"--figure", &a.figure}}) {
-    if (!path->empty()) CheckWritable(flag, *path);
-  }
-  if (!a.twin.empty() && !(a.csv.empty() && a.figure.empty())) {
-    throw BadInput("--twin: expected no --csv or --figure with it");
-  }
-  if (!a.figure.empty()) CheckFigureName(a.figure);
-  const bool to_output = IsStandardStream(a.csv);
-  if (to_output && a.as_json) {
+int RunScore(const ScoreArguments& a) {
+  if (a.policy.empty()) throw BadInput("realaigym score: expected a policy, got none");
+  if (!a.csv.empty()) CheckWritable("--csv", a.csv);
+  if (IsStandardStream(a.csv) && a.as_json) {
     throw BadInput(
         "--json: expected a file for --csv, got - (standard output), where the JSON goes");
   }
-  if (!a.figure.empty()) CheckCanDraw();
   ThreadPool pool(ResolveThreads(a.threads));
   std::optional<Twin> twin;
   if (!a.twin.empty()) twin = ReadTwin(a.twin, "--twin");
-  const Competitor competitor =
-      searches ? Search(a, twin, pool) : GetCompetitor(a.policy, robot, twin);
-  if (StopSignal() != 0) return 128 + StopSignal();
-  if (twin) return ScoreOnTwin(a, *twin, competitor, pool);
-  if (a.score_version == "3") return ScoreUptimes(a, competitor, pool);
-  BoardReport report;
-  {
-    EpisodeProgress progress(a.as_json);
-    report = ScoreOnBoard(competitor, static_cast<uint64_t>(a.case_seed), pool, std::ref(progress));
+  const Competitor competitor = GetCompetitor(a.policy, a.robot, twin);
+  const auto seed = static_cast<uint64_t>(a.seed);
+  if (!a.csv.empty()) {
+    WriteOutput(a.csv,
+                BoardCsv(a.version2() ? NominalLog(competitor) : UptimeLog(competitor, seed)));
+    if (IsStandardStream(a.csv)) return 0;
   }
-  if (!a.csv.empty()) WriteOutput(a.csv, BoardCsv(report.trace));
-  if (!a.figure.empty()) DrawBoard(report, a.figure);
-  if (to_output) return 0;
-  if (a.as_json) {
-    fmt::print("{}\n", BoardJson(report));
-    return 0;
+  int code = 0;
+  if (!a.version2()) {
+    code = ScoreUptimes(a, twin, competitor, pool);
+  } else if (twin) {
+    code = ScoreOnTwin(a, *twin, competitor, pool);
+  } else {
+    const Stopwatch watch;
+    BoardReport report;
+    {
+      EpisodeProgress progress(a.as_json);
+      report = ScoreOnBoard(competitor, seed, pool, std::ref(progress));
+    }
+    if (a.as_json) {
+      fmt::print("{}\n", BoardJson(report));
+    } else {
+      PrintReport(report, watch.seconds());
+    }
   }
-  PrintReport(report);
-  for (const std::string& file : {a.csv, a.figure}) {
-    if (!file.empty()) fmt::print("  written {}\n", Printable(file));
+  if (a.as_json) return code;
+  if (!twin && !competitor.plant.empty()) {
+    fmt::print("  designed for {}, not for the board's plant\n", competitor.plant);
   }
-  return 0;
+  if (twin && twin->covariance.empty()) {
+    fmt::print("  all machines are equal, because the twin has no [covariance]\n");
+  }
+  if (!a.csv.empty()) fmt::print("  written {}\n", Printable(a.csv));
+  return code;
+}
+
+/// Adds the arguments that the commands share. `version`: the default of the rules.
+void AddCommon(CommandLine& line, CommonArguments& a, const char* version,
+               std::string_view of_twin) {
+  a.score_version = version;
+  line.Text("--twin", a.twin, "FILE", of_twin);
+  line.Text("--robot", a.robot, "ROBOT",
+            "pendubot or acrobot (default: the policy's, or the joint with more torque in a log)");
+  line.Flag("--json", a.as_json, "print JSON instead of a table");
+  Options own;
+  own.Section("rules");
+  own.AddChoice(&a.score_version, "score_version", {"2", "3"},
+                "rules; 2: one swing-up of 10 s, 3: time upright in 60 s with random resets");
+  own.Add(&a.runs, "runs", {1, 1e6}, "", "number of runs with resets, or of machines of the twin");
+  line.Arguments(own);
+  AddSeed(line, a.seed, "resets, noise, pushes and machines");
+  AddThreads(line, a.threads);
+  line.Removed("--case-seed", "use --seed");
+  line.Removed("--draws", "use --runs");
+}
+
+void AddScore(CommandLine& line) {
+  ScoreArguments& a = line.Runs(RunScore);
+  AddPolicy(line, a.policy);
+  AddCommon(line, a, "3", "score on machines drawn from this twin, by the hardware rules");
+  line.Flag("--no-pushes", a.no_pushes, "no pushes on the twin's machines, version 2");
+  line.Text("--csv", a.csv, "FILE",
+            "CSV file to write, the first motion in the format of RealAIGym; -: standard output, "
+            "without a table");
+  line.Removed("--figure", "--json has the curves of the rows of robustness");
+  line.Check([&line, &a] {
+    if (line.Has("--no-pushes") && (a.twin.empty() || !a.version2())) {
+      throw BadInput("--no-pushes: expected --twin FILE and --score-version 2 with it");
+    }
+    if (!a.twin.empty() && !a.csv.empty()) throw BadInput("--twin: expected no --csv with it");
+  });
+  line.Footer(
+      "Version 3: runs of 60 s on RealAIGym's plant C.1 without friction, at 500 Hz, from\n"
+      "hanging. At 15 random times both motors drive the links to random angles for 0.2 s. The\n"
+      "score is the share of the time with the tip above 90% of the length. With --twin, runs\n"
+      "have 10 softer resets of 1 s, as on the real robot.\n\n"
+      "Version 2: performance in one swing-up of 10 s; robustness in 722 simulations with model\n"
+      "errors, noise, a motor that responds too little or too much, delay and pushes. With\n"
+      "--twin, one swing-up on each machine, with pushes.\n\n"
+      "--twin designs a controller for the twin without dry friction; --made-for changes this\n"
+      "plant. The motors compensate " +
+      fmt::format("{:.0f}%", 100 * kCompensated) +
+      " of the estimated dry friction.\n\n"
+      "Examples:\n"
+      "  ./upswing train --agent pendubot && ./upswing realaigym score runs/pendubot-seed1\n"
+      "  ./upswing realaigym score tvlqr --made-for realaigym --score-version 2\n"
+      "  ./upswing realaigym score runs/pendubot-seed1 --csv sim_swingup.csv\n"
+      "  ./upswing realaigym score tvlqr --lqr-q1 100 --lqr-q2 100 --twin realaigym-twin\n");
+}
+
+void AddHardware(CommandLine& line) {
+  HardwareArguments& a = line.Runs(RunHardware);
+  line.Texts("log", a.logs, "LOG", "logs of runs on the real robot, .csv or .csv.gz");
+  line.Require("log");
+  AddCommon(line, a, "2", "compare with the TVLQR of the logs on machines drawn from this twin");
+  line.Texts("--law", a.law, "LOG", "with --twin: runs without pushes to rebuild the TVLQR from");
+  line.Check([&line, &a] {
+    if (line.Has("--law") && a.twin.empty()) {
+      throw BadInput("--law: expected --twin FILE with it, got none");
+    }
+  });
+  line.Footer(
+      "Version 2: all logs must be of one robot. A log with tau_pert belongs to the board with\n"
+      "pushes. With --twin, the TVLQR of these runs also runs on machines drawn from the twin.\n"
+      "Version 3 also scores simulated runs in the format of RealAIGym.\n\n"
+      "Examples:\n"
+      "  ./upswing realaigym hardware run01.csv run02.csv.gz --json\n"
+      "  ./upswing realaigym hardware sim_swingup.csv --score-version 3\n"
+      "  ./upswing realaigym hardware pushed/*.csv --law unpushed/*.csv --twin realaigym-twin\n");
 }
 
 }  // namespace
 
 void AddRealAiGym(CommandLine& line) {
-  RealAiGymArguments& a = line.Runs(RunRealAiGym);
-  AddPolicy(line, a.policy);
-  line.Text("--search", a.search_out, "FILE",
-            "policy file to write: search a policy, then score it");
-  line.Text("--from", a.from, "FILE", "policy that the search starts from (default a random one)");
-  line.Texts("--hardware", a.hardware, "LOG",
-             "logs of runs on the real robot to score by the hardware rules, .csv or .csv.gz");
-  line.Texts("--law", a.law, "LOG",
-             "with --hardware and --twin: runs without pushes to rebuild the TVLQR from");
-  line.Text("--twin", a.twin, "FILE",
-            "score or search on machines drawn from this twin, by the hardware rules");
-  line.Flag("--no-pushes", a.no_pushes, "no pushes on the twin's machines");
-  line.Text("--figure", a.figure, "FILE", "figure of the robustness score to draw, .svg or .png");
-  line.Text("--csv", a.csv, "FILE",
-            "CSV file to write, the motion in the format of RealAIGym; -: standard output, without "
-            "a table");
-  line.Flag("--json", a.as_json, "print JSON instead of a table");
-  Options own;
-  own.Section("cases");
-  own.Add(&a.case_seed, "case_seed", {0, 1e15}, "",
-          "seed of noise and pushes in the robustness score, and of a twin's machines");
-  own.AddChoice(
-      &a.score_version, "score_version", {"2", "3"},
-      "rules; 2: performance and robustness, 3: share of 60 s upright after random resets");
-  own.Add(&a.runs, "runs", {1, 1e6}, "", "number of runs by score version 3");
-  own.Add(&a.draws, "draws", {1, 1e6}, "", "number of machines drawn from the twin");
-  line.Arguments(own);
-  BoardSearchConfig config;
-  line.Settings(OptionsOf(config), a.search);
-  AddThreads(line, a.threads);
-  line.Check([&line] {
-    for (const std::string flag : {"--law", "--draws", "--no-pushes"}) {
-      if (line.Has(flag) && !line.Has("--twin")) {
-        throw BadInput(Concat(flag, ": expected --twin FILE with it, got none"));
-      }
-    }
-  });
+  AddScore(line.Subcommand("score", "Score a policy in simulation or on a twin"));
+  AddHardware(line.Subcommand("hardware", "Score logs of the real robot"));
+  line.Removed("--search", "train an agent (docs/howto/realaigym.md)");
+  line.Removed("--hardware", "use `realaigym hardware LOG…`");
   line.Footer(
-      "Performance: one simulation of 10 s from hanging, on RealAIGym's plant C.1 without\n"
-      "friction, at 500 Hz. Robustness: 722 simulations with model errors, noise on\n"
-      "velocities and torque, a motor that responds too little or too much, delay and\n"
-      "pushes; each score is the share of simulations that end upright. A policy with a\n"
-      "longer control period keeps its period. These results are simulated.\n\n"
-      "--hardware scores logs of the real robot. The joint with more torque has the motor,\n"
-      "unless --robot names the robot. A log with tau_pert belongs to the board with pushes.\n"
-      "With --twin, the TVLQR of these runs also runs on machines drawn from the twin.\n\n"
-      "--twin designs a controller for the twin without dry friction; --made-for changes this\n"
-      "plant. The motors compensate " +
-      fmt::format("{:.0f}%", 100 * kCompensated) +
-      " of the estimated dry friction.\n"
-      "A policy of --search --twin mirrors: beyond upright, |q1| > 180°, it swings back.\n\n"
       "Examples:\n"
-      "  ./upswing realaigym --search pendubot.safetensors         takes some minutes\n"
-      "  ./upswing realaigym pendubot.safetensors --figure rows.svg\n"
-      "  ./upswing realaigym --search better.safetensors --from pendubot.safetensors\n"
-      "  ./upswing realaigym --search acrobot.safetensors --robot acrobot --seed 2\n"
-      "  ./upswing realaigym pendubot.safetensors --csv sim_swingup.csv --json\n"
-      "  ./upswing realaigym baseline-lqr              the regulator of the baselines\n"
-      "  ./upswing realaigym --hardware run01.csv run02.csv.gz --json\n"
-      "  ./upswing realaigym pendubot.safetensors --twin realaigym-twin\n"
-      "  ./upswing realaigym tvlqr --lqr-q1 100 --lqr-q2 100 --twin realaigym-twin\n");
+      "  ./upswing realaigym score runs/pendubot-seed1\n"
+      "  ./upswing realaigym hardware logs/*.csv.gz\n"
+      "  ./upswing realaigym score --help     show all options of score\n");
 }
 
 }  // namespace upswing::realaigym

@@ -6,14 +6,13 @@
 #include <numeric>
 
 #include "base/rng.h"
-#include "control/linearize.h"
 
 namespace upswing::realaigym {
 namespace {
 
 /// Draws six pushes with growing times, and keeps three random ones for the motor's joint. Pushes
 /// about the other joint have no effect there (docs/howto/realaigym.md).
-std::array<BoardPush, 4> RandomPushes(Rng& rng) {
+std::array<BoardPush, 3> RandomPushes(Rng& rng) {
   std::array<int, 6> order;
   std::iota(order.begin(), order.end(), 0);
   for (size_t i = order.size() - 1; i > 0; --i) std::swap(order[i], order[rng.Below(i + 1)]);
@@ -25,7 +24,7 @@ std::array<BoardPush, 4> RandomPushes(Rng& rng) {
     push.width = rng.Uniform(0.05, 0.1);
     push.amplitude = rng.Uniform(0.5, 5) * (rng.Uniform() < 0.5 ? -1 : 1);
   }
-  std::array<BoardPush, 4> ours{};
+  std::array<BoardPush, 3> ours;
   for (size_t k = 0; k < 3; ++k) ours[k] = all[static_cast<size_t>(order[k])];
   return ours;
 }
@@ -34,20 +33,7 @@ std::array<BoardPush, 4> RandomPushes(Rng& rng) {
 
 const char* NameOf(Robot robot) { return robot == Robot::kPendubot ? "pendubot" : "acrobot"; }
 
-std::optional<Robot> RobotNamed(std::string_view name) {
-  for (const Robot robot : {Robot::kPendubot, Robot::kAcrobot}) {
-    if (name == NameOf(robot)) return robot;
-  }
-  return std::nullopt;
-}
-
-Lqr SolveBoardLqr(Robot robot, const Eigen::Vector4d& Q, double R) {
-  const Manipulator plant = ManipulatorOf(BoardPlant());
-  return SolveContinuousLqr(LinearizeUpright(plant, static_cast<int>(robot)), Q.asDiagonal(), R)
-      .value();
-}
-
-bool AtGoal(const BoardState& state) {
+bool AtGoal(const PendulumState& state) {
   const auto [q1, q2, w1, w2] = state;
   return std::abs(Wrapped(q1 - std::numbers::pi)) < kBoardGoalAngle &&
          std::abs(Wrapped(q2)) < kBoardGoalAngle && std::abs(w1) < kBoardGoalVelocity &&
@@ -130,14 +116,14 @@ double Robustness::score() const {
 }
 
 Robustness JudgeRobustness(const std::vector<RobustnessCase>& cases,
-                           const std::vector<BoardOutcome>& outcomes) {
+                           const std::vector<PendulumState>& ends) {
   Robustness result;
   std::vector<int> rows;    // row of each curve
   std::vector<int> counts;  // simulations at the curve's last value
   double pushed = 0;
   for (size_t i = 0; i < cases.size(); ++i) {
     const RobustnessCase& each = cases[i];
-    const double reached = outcomes[i].at_goal ? 1 : 0;
+    const double reached = AtGoal(ends[i]) ? 1 : 0;
     if (each.row == RobustnessRow::kPush) {
       pushed += reached / kBoardPushCases;
       continue;

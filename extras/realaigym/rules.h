@@ -3,13 +3,9 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <limits>
-#include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
-#include "control/riccati.h"
 #include "extras/realaigym/plant.h"
 
 /// The rules of RealAIGym's simulation boards, version 2 (docs/howto/realaigym.md): the
@@ -19,18 +15,14 @@ namespace upswing::realaigym {
 /// The robot: the joint with the motor.
 enum class Robot { kPendubot = 1, kAcrobot = 2 };
 const char* NameOf(Robot robot);
-/// The robot with this name; nothing for an unknown name.
-std::optional<Robot> RobotNamed(std::string_view name);
 
-/// The continuous-time regulator of the board's plant about upright, as in the benchmark's
-/// baselines: minimises ∫ x' Q x + R u² dt, Q diagonal.
-Lqr SolveBoardLqr(Robot robot, const Eigen::Vector4d& Q, double R);
+/// Index of the motor's joint.
+inline size_t MotorOf(Robot robot) { return static_cast<size_t>(robot) - 1; }
 
 /// A short disturbing torque, also beyond the motor's limit.
 struct BoardPush {
   double amplitude = 0;        // N·m
   double time = 0, width = 0;  // s
-  bool passive = false;        // about the joint without the motor
 
   /// amplitude · exp(-(t - time)²/(2 width²)), N·m.
   double Torque(double t) const {
@@ -39,27 +31,22 @@ struct BoardPush {
   }
 };
 
-/// The conditions of a simulation: 10 s from hanging at rest.
+/// The conditions of a simulation.
 struct BoardEpisode {
   BoardPlant plant;
-  std::optional<Manipulator> body = {};  // equations of motion in place of the plant's
-  std::array<double, 2> zero{};          // measured angles of a pendulum that hangs, rad
-  double velocity_noise = 0;             // of the measured velocities, rad/s
-  double torque_noise = 0;               // N·m
-  double response = 1;                   // k of u = u_before + k (u_wanted - u_before)
-  int delay = 0;                         // of the measured state, steps
-  // Largest angle of the encoders, where an episode fails, rad.
-  double angle_range = std::numeric_limits<double>::infinity();
-  std::array<BoardPush, 4> pushes{};
-  uint64_t seed = 0;        // of the noise
-  int steps = kBoardSteps;  // fewer for a search; equal within a block
+  double velocity_noise = 0;          // of the measured velocities, rad/s
+  double torque_noise = 0;            // N·m
+  double response = 1;                // k of u = u_before + k (u_wanted - u_before)
+  int delay = 0;                      // of the measured state, steps
+  std::array<BoardPush, 3> pushes{};  // about the motor's joint
+  uint64_t seed = 0;                  // of the noise
 };
 
 /// Largest angle and velocity errors, of both joints, at an end that counts for robustness.
 inline constexpr double kBoardGoalAngle = 0.35, kBoardGoalVelocity = 1;  // rad, rad/s
-bool AtGoal(const BoardState& state);
+bool AtGoal(const PendulumState& state);
 
-/// The outcome of a simulation. Costs are infinite if it blew up.
+/// The measures of a run.
 struct BoardOutcome {
   // Start of the last stretch above the line, s; the end if there is none.
   double swing_up_seconds = 0;
@@ -69,9 +56,6 @@ struct BoardOutcome {
   double smoothness = 0;     // N·m
   double velocity_cost = 0;  // rad²/s
   bool above_line = false;   // swung up at the end: criterion of performance
-  bool at_goal = false;      // AtGoal at the end: criterion of robustness
-  double held = 0;           // closeness to the goal over the last 2 s, 0 to 1
-  double nearest = 0;        // largest closeness to the goal, 0 to 1
 };
 
 /// The normaliser n of each measure c in the performance score, whose penalties are tanh(π c/n).
@@ -151,8 +135,8 @@ struct Robustness {
   double score() const;
 };
 
-/// Computes the robustness scores from the outcomes of these cases.
+/// Computes the robustness scores from the final states of these cases.
 Robustness JudgeRobustness(const std::vector<RobustnessCase>& cases,
-                           const std::vector<BoardOutcome>& outcomes);
+                           const std::vector<PendulumState>& ends);
 
 }  // namespace upswing::realaigym

@@ -7,9 +7,10 @@
 #include <map>
 #include <numbers>
 #include <set>
-#include <span>
+#include <vector>
 
 #include "base/rng.h"
+#include "extras/realaigym/hardware.h"
 #include "extras/realaigym/simulation.h"
 #include "pendulum/closed_form.h"
 
@@ -53,7 +54,7 @@ TEST(RealAiGymRules, ThereAre722Cases) {
     if (each.row != RobustnessRow::kModel) {
       EXPECT_EQ(e.plant.mass2, BoardPlant().mass2);
     }
-    for (const BoardPush& push : std::span(e.pushes).first(3)) {
+    for (const BoardPush& push : e.pushes) {
       if (!pushed) break;
       EXPECT_GE(std::abs(push.amplitude), 0.5);
       EXPECT_LE(std::abs(push.amplitude), 5);
@@ -72,17 +73,18 @@ TEST(RealAiGymRules, ThereAre722Cases) {
 
 TEST(RealAiGymRules, ALevelOfNoisePassesAboveOneHalf) {
   const std::vector<RobustnessCase> cases = RobustnessCases(1);
-  std::vector<BoardOutcome> outcomes(cases.size());
-  EXPECT_EQ(JudgeRobustness(cases, outcomes).score(), 0);
-  for (BoardOutcome& o : outcomes) o.at_goal = true;
-  EXPECT_NEAR(JudgeRobustness(cases, outcomes).score(), 1, 1e-12);
+  std::vector<PendulumState> ends(cases.size());
+  const PendulumState up{std::numbers::pi, 0, 0, 0}, down{};
+  EXPECT_EQ(JudgeRobustness(cases, ends).score(), 0);
+  std::ranges::fill(ends, up);
+  EXPECT_NEAR(JudgeRobustness(cases, ends).score(), 1, 1e-12);
   // First level of velocity noise: five of ten are not more than half, six are.
-  for (size_t i = 210; i < 215; ++i) outcomes[i].at_goal = false;
-  EXPECT_NEAR(JudgeRobustness(cases, outcomes).rows[1], 20.0 / 21, 1e-12);
-  outcomes[214].at_goal = true;
-  EXPECT_EQ(JudgeRobustness(cases, outcomes).rows[1], 1);
-  outcomes[0].at_goal = outcomes.back().at_goal = false;
-  const Robustness judged = JudgeRobustness(cases, outcomes);
+  for (size_t i = 210; i < 215; ++i) ends[i] = down;
+  EXPECT_NEAR(JudgeRobustness(cases, ends).rows[1], 20.0 / 21, 1e-12);
+  ends[214] = up;
+  EXPECT_EQ(JudgeRobustness(cases, ends).rows[1], 1);
+  ends[0] = ends.back() = down;
+  const Robustness judged = JudgeRobustness(cases, ends);
   EXPECT_NEAR(judged.rows[0], 209.0 / 210, 1e-12);
   EXPECT_NEAR(judged.rows[5], 49.0 / 50, 1e-12);
   ASSERT_EQ(judged.curves.size(), 14);
@@ -93,50 +95,41 @@ TEST(RealAiGymRules, ALevelOfNoisePassesAboveOneHalf) {
 /// Torques that depend on the step and on the measured q1.
 double Script(int step, double q1) { return 2 * std::sin(0.01 * step) + 0.5 * std::sin(q1); }
 
-/// Acts by Script and records the measurements of the first simulation.
-class Scripted : public BoardController {
- public:
-  explicit Scripted(std::vector<BoardState>* seen) : seen_(seen) {}
-  void Act(int step, const BoardMeasurement& m, size_t count, Lanes& torque) override {
-    for (size_t i = 0; i < count; ++i) torque[i] = Script(step, m.q1[i]);
-    if (seen_ != nullptr) seen_->push_back({m.q1[0], m.q2[0], m.w1[0], m.w2[0]});
-  }
-
- private:
-  std::vector<BoardState>* seen_;
-};
-
 struct Played {
-  BoardOutcome outcome;
-  std::vector<BoardSample> trace;
-  std::vector<BoardState> seen;
+  MachineLog log;
+  std::vector<CycleInput> seen;
 };
 
+/// Acts by Script, and records the measurements.
 Played Play(const BoardEpisode& episode, Robot robot = Robot::kPendubot) {
   Played played;
-  const std::array<BoardEpisode, 1> one{episode};
-  played.outcome = SimulateOnBoard(
-                       robot, one, [&](size_t) { return std::make_unique<Scripted>(&played.seen); },
-                       nullptr, &played.trace)
-                       .front();
+  played.log = SimulateEpisode(robot, episode, [&](const CycleInput& in) {
+    const int step = static_cast<int>(played.seen.size());
+    EXPECT_NEAR(in.time, 0.002 * step, 1e-12);
+    played.seen.push_back(in);
+    Joints torque{};
+    torque[MotorOf(robot)] = Script(step, in.angle[0]);
+    return torque;
+  });
   return played;
 }
 
 TEST(RealAiGymSimulation, OutcomesMatchTheMotion) {
   for (const Robot robot : {Robot::kPendubot, Robot::kAcrobot}) {
-    const auto [o, trace, seen] = Play(BoardEpisode(), robot);
-    ASSERT_EQ(trace.size(), 5000);
-    EXPECT_NEAR(trace.back().time, 9.998, 1e-12);
+    const MachineLog log = Play(BoardEpisode(), robot).log;
+    const BoardOutcome o = OutcomeOf(log);
+    ASSERT_EQ(log.rows(), 5000);
+    EXPECT_NEAR(log.time.back(), 9.998, 1e-12);
     double energy = 0, cost = 0, velocity = 0, sum = 0, squares = 0;
-    const size_t joint = robot == Robot::kPendubot ? 0 : 1;
-    for (size_t k = 0; k + 1 < trace.size(); ++k) {
-      const double u = trace[k].torque[0];
-      const auto& x = trace[k].state;
-      energy += std::abs((trace[k + 1].state[joint] - x[joint]) * u);
+    const size_t j = MotorOf(robot);
+    for (size_t k = 0; k + 1 < log.time.size(); ++k) {
+      const double u = log.commanded[k][j];
+      const auto [w1, w2] = log.velocity[k];
+      energy += std::abs((log.angle[k + 1][j] - log.angle[k][j]) * u);
       cost += u * u * 0.002;
-      velocity += (x[2] * x[2] + x[3] * x[3]) * 0.002;
-      sum += trace[k + 1].torque[0] - u;
-      squares += std::pow(trace[k + 1].torque[0] - u, 2);
+      velocity += (w1 * w1 + w2 * w2) * 0.002;
+      sum += log.commanded[k + 1][j] - u;
+      squares += std::pow(log.commanded[k + 1][j] - u, 2);
     }
     EXPECT_NEAR(o.energy, energy, 1e-9 * energy);
     EXPECT_NEAR(o.torque_cost, cost, 1e-9 * cost);
@@ -152,20 +145,20 @@ TEST(RealAiGymSimulation, ADelayedStateIsTheOneOfThen) {
   episode.delay = 7;
   const Played played = Play(episode);
   for (size_t k = 0; k < 5000; ++k) {
-    EXPECT_EQ(played.seen[k], played.trace[k < 7 ? 0 : k - 7].state);
+    EXPECT_EQ(played.seen[k].angle, played.log.angle[k < 7 ? 0 : k - 7]);
+    EXPECT_EQ(played.seen[k].velocity, played.log.velocity[k < 7 ? 0 : k - 7]);
   }
 }
 
 TEST(RealAiGymSimulation, TheMotorRespondsByItsShareWithinItsLimit) {
   BoardEpisode episode;
   episode.response = 1.7;
-  const Played played = Play(episode);
+  const MachineLog log = Play(episode).log;
   double before = 0;
   for (int k = 0; k < 5000; ++k) {
-    const BoardSample& now = played.trace[static_cast<size_t>(k)];
-    const double wanted = Script(k, now.state[0]);
+    const double wanted = Script(k, log.angle[k][0]);
     before = std::clamp(before + 1.7 * (wanted - before), -6.0, 6.0);
-    ASSERT_NEAR(now.torque[0], before, 1e-12) << k;
+    ASSERT_NEAR(log.commanded[k][0], before, 1e-12) << k;
   }
 }
 
@@ -175,8 +168,8 @@ TEST(RealAiGymSimulation, NoiseIsOfItsSize) {
   const Played noisy = Play(episode);
   double sum = 0, squares = 0;
   for (size_t k = 0; k < 5000; ++k) {
-    EXPECT_EQ(noisy.seen[k][0], noisy.trace[k].state[0]);  // angles have no noise
-    const double n = noisy.seen[k][2] - noisy.trace[k].state[2];
+    EXPECT_EQ(noisy.seen[k].angle, noisy.log.angle[k]);  // angles have no noise
+    const double n = noisy.seen[k].velocity[0] - noisy.log.velocity[k][0];
     sum += n;
     squares += n * n;
   }
@@ -184,64 +177,51 @@ TEST(RealAiGymSimulation, NoiseIsOfItsSize) {
   EXPECT_NEAR(std::sqrt(squares / 5000), 0.4, 0.02);
   episode.velocity_noise = 0;
   episode.torque_noise = 0.3;
-  const Played pushed = Play(episode);
+  const MachineLog log = Play(episode).log;
   squares = 0;
   for (int k = 0; k < 5000; ++k) {
-    const BoardSample& now = pushed.trace[static_cast<size_t>(k)];
-    const double n = now.torque[0] - Script(k, now.state[0]);
+    const double n = log.commanded[k][0] - Script(k, log.angle[k][0]);
     squares += n * n;
   }
   EXPECT_NEAR(std::sqrt(squares / 5000), 0.3, 0.02);
 }
 
-TEST(RealAiGymSimulation, APushActsNextToTheMotor) {
-  BoardEpisode episode;
-  episode.pushes[0] = {5, 2, 0.05};
-  const Played pushed = Play(episode), free = Play(BoardEpisode());
-  EXPECT_EQ(pushed.trace[800].state, free.trace[800].state);
-  EXPECT_NE(pushed.trace[1100].state, free.trace[1100].state);
-  // The tables' torque is only the motor's.
-  const BoardSample& now = pushed.trace[1000];
-  EXPECT_EQ(now.torque[0], Script(1000, now.state[0]));
-}
-
-/// Asks for more torque than the motor has.
-class Strong : public BoardController {
- public:
-  void Act(int, const BoardMeasurement&, size_t count, Lanes& torque) override {
-    std::fill_n(torque.begin(), count, 9.0);
-  }
-};
-
-TEST(RealAiGymSimulation, APushAddsToTheMotorAtItsLimit) {
+TEST(RealAiGymSimulation, APushActsNextToTheMotorAlsoAtItsLimit) {
   for (const Robot robot : {Robot::kPendubot, Robot::kAcrobot}) {
     BoardEpisode episode;
     episode.pushes[0] = {-5, 2, 0.05};
-    std::vector<BoardSample> trace;
-    SimulateOnBoard(
-        robot, {&episode, 1}, [](size_t) { return std::make_unique<Strong>(); }, nullptr, &trace);
-    for (const size_t k : {980, 1000, 1040}) {
+    const size_t motor = MotorOf(robot);
+    const MachineLog log = SimulateEpisode(robot, episode, [&](const CycleInput&) {
+      Joints torque{};
+      torque[motor] = 9;  // more than the motor has
+      return torque;
+    });
+    for (const size_t k : {100, 980, 1000, 1040}) {
+      EXPECT_EQ(log.commanded[k][motor], 6);  // without the push
       const double z = (0.002 * static_cast<double>(k) - 2) / 0.05;
       ClosedFormBatch batch(1);
       batch.SetManipulator(0, ManipulatorOf(BoardPlant()));
       batch.joint[0] = static_cast<double>(robot);
       batch.tau[0] = 6 - 5 * std::exp(-z * z / 2);
-      ClosedFormBatch::Array* const state[] = {&batch.q1, &batch.q2, &batch.w1, &batch.w2};
-      for (size_t i = 0; i < 4; ++i) (*state[i])[0] = trace[k].state[i];
+      const auto &q = log.angle, &w = log.velocity;
+      batch.SetState(0, {q[k][0], q[k][1], w[k][0], w[k][1]});
       Advance(batch, 1, 0, 1, kBoardTimestep);
-      for (size_t i = 0; i < 4; ++i) EXPECT_NEAR((*state[i])[0], trace[k + 1].state[i], 1e-12);
+      EXPECT_NEAR(batch.q1[0], q[k + 1][0], 1e-12);
+      EXPECT_NEAR(batch.q2[0], q[k + 1][1], 1e-12);
+      EXPECT_NEAR(batch.w1[0], w[k + 1][0], 1e-11);
+      EXPECT_NEAR(batch.w2[0], w[k + 1][1], 1e-11);
     }
   }
 }
 
-TEST(RealAiGymSimulation, ABlowUpIsTheWorstOutcome) {
+TEST(RealAiGymSimulation, ABlowUpIsAFailure) {
   BoardEpisode episode;
   episode.plant.damping1 = -1e3;
-  const BoardOutcome o = Play(episode).outcome;
-  EXPECT_FALSE(o.above_line || o.at_goal);
-  EXPECT_NEAR(o.swing_up_seconds, 9.998, 1e-12);
-  EXPECT_EQ(PerformanceScore(o), 0);
-  for (const double penalty : PerformancePenalties(o)) EXPECT_GT(penalty, 0.9);
+  const MachineLog log = Play(episode).log;
+  const auto &q = log.angle.back(), &w = log.velocity.back();
+  EXPECT_FALSE(AtGoal({q[0], q[1], w[0], w[1]}));
+  EXPECT_FALSE(OutcomeOf(log).above_line);
+  EXPECT_EQ(PerformanceScore(OutcomeOf(log)), 0);
 }
 
 TEST(RealAiGymRules, TheGoalIsAsNearAndAsSlowAsTheySay) {
@@ -256,22 +236,6 @@ TEST(RealAiGymRules, TheGoalIsAsNearAndAsSlowAsTheySay) {
     EXPECT_FALSE(AtGoal({pi, 0, 0, sign * 1.001}));
   }
   EXPECT_FALSE(AtGoal({std::nan(""), 0, 0, 0}));
-}
-
-TEST(RealAiGymSimulation, PlaceAndThreadsChangeNoBit) {
-  const std::vector<RobustnessCase> cases = RobustnessCases(3);
-  std::vector<BoardEpisode> episodes;
-  for (size_t i = 0; i < cases.size(); i += 5) episodes.push_back(cases[i].episode);
-  const auto make = [](size_t) { return std::make_unique<Scripted>(nullptr); };
-  ThreadPool pool(3);
-  const auto alone = SimulateOnBoard(Robot::kPendubot, episodes, make, nullptr);
-  const auto together = SimulateOnBoard(Robot::kPendubot, episodes, make, &pool);
-  for (size_t i = 0; i < episodes.size(); ++i) {
-    EXPECT_EQ(alone[i].velocity_cost, together[i].velocity_cost);
-    if (i % 9 != 0) continue;
-    const std::array<BoardEpisode, 1> one{episodes[i]};
-    EXPECT_EQ(SimulateOnBoard(Robot::kPendubot, one, make, nullptr)[0].energy, alone[i].energy);
-  }
 }
 
 }  // namespace

@@ -2,9 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <mutex>
-
-#include "pendulum/runge_kutta.h"
 
 namespace upswing::realaigym {
 namespace {
@@ -71,77 +68,23 @@ Joints Resets::Pid(const PendulumState& measured) {
   return {torque[0] + gravity[0], torque[1] + gravity[1]};
 }
 
-bool AboveLine(const PendulumState& s) {
+bool AboveLine(const Joints& q) {
   constexpr BoardPlant kPlant;
-  return -kPlant.length1 * std::cos(s.q1) - kPlant.length2 * std::cos(s.q1 + s.q2) >
+  return -kPlant.length1 * std::cos(q[0]) - kPlant.length2 * std::cos(q[0] + q[1]) >
          0.9 * (kPlant.length1 + kPlant.length2);
 }
 
-void UptimeCounter::Add(double time, const PendulumState& state) {
-  const bool above = AboveLine(state);
-  if (above) run_.score += (time - time_) / kUptimeSeconds;
-  if (above && !above_ && time - crossing_ > 1) {
-    ++run_.swing_ups;
-    crossing_ = time;
+UptimeRun UptimeOf(const MachineLog& log) {
+  UptimeRun run;
+  double crossing = -1;  // time of the last counted crossing, s
+  for (int k = 1; k < log.rows(); ++k) {
+    if (!AboveLine(log.angle[k])) continue;
+    run.score += (log.time[k] - log.time[k - 1]) / kUptimeSeconds;
+    if (AboveLine(log.angle[k - 1]) || log.time[k] - crossing <= 1) continue;
+    ++run.swing_ups;
+    crossing = log.time[k];
   }
-  above_ = above;
-  time_ = time;
-}
-
-UptimeRun SimulateUptime(Robot robot, const MachineControllerMaker& make, uint64_t seed,
-                         std::vector<BoardSample>* trace) {
-  const Manipulator body = ManipulatorOf(BoardPlant());
-  const size_t motor = static_cast<size_t>(robot) - 1;
-  Resets resets({}, seed);
-  UptimeCounter counter;
-  PendulumState state{};
-  std::unique_ptr<MachineController> controller;
-  int64_t step = 0, hold = 0;  // since the controller began; of a torque
-  Joints torque{};
-  const auto steps = std::lround(kUptimeSeconds / kBoardTimestep);
-  for (int64_t k = 0; k < steps; ++k) {
-    const double time = static_cast<double>(k) * kBoardTimestep;
-    counter.Add(time, state);
-    if (const auto reset = resets.Torque(time, state)) {
-      torque = Clamped(*reset);
-      controller.reset();
-    } else {
-      if (!controller) {
-        controller = make();
-        hold = std::lround(1 / (kBoardTimestep * static_cast<double>(controller->hz())));
-        step = 0;
-      }
-      if (step % hold == 0) {
-        torque = {};
-        torque[motor] = std::clamp(controller->Torque(step / hold, state, false),
-                                   -kBoardTorqueLimit, kBoardTorqueLimit);
-      }
-      ++step;
-    }
-    if (trace != nullptr)
-      trace->push_back({time, {state.q1, state.q2, state.w1, state.w2}, torque});
-    const auto acceleration = [&](const PendulumState& s, double /*share*/) {
-      return body.Acceleration(s, torque);
-    };
-    state = RungeKuttaStep(state, acceleration(state, 0), kBoardTimestep, acceleration);
-  }
-  return counter.run();
-}
-
-std::vector<UptimeRun> SimulateUptimes(Robot robot, const MachineControllerMaker& make,
-                                       uint64_t seed, int count, ThreadPool* pool,
-                                       std::vector<BoardSample>* trace, const Progress& progress) {
-  std::vector<UptimeRun> runs(static_cast<size_t>(count));
-  std::mutex mutex;
-  double done = 0;
-  ParallelFor(pool, count, [&](int i) {
-    runs[static_cast<size_t>(i)] =
-        SimulateUptime(robot, make, seed + static_cast<uint64_t>(i), i == 0 ? trace : nullptr);
-    if (!progress) return;
-    const std::lock_guard lock(mutex);
-    progress(++done, count);
-  });
-  return runs;
+  return run;
 }
 
 }  // namespace upswing::realaigym

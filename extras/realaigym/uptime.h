@@ -1,19 +1,14 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <limits>
-#include <memory>
 #include <numbers>
 #include <optional>
 #include <vector>
 
-#include "base/progress.h"
 #include "base/rng.h"
-#include "base/thread_pool.h"
-#include "extras/machine/controller.h"
-#include "extras/realaigym/rules.h"
-#include "extras/realaigym/simulation.h"
+#include "extras/machine/log.h"
+#include "extras/realaigym/plant.h"
 
 /// The rules of RealAIGym's boards of ICRA 2025, score version 3 (docs/howto/realaigym.md). A run
 /// lasts 60 s. At random times both motors drive the pendulum to a random pose, then the controller
@@ -62,7 +57,7 @@ class Resets {
 };
 
 /// Whether the tip is above 90% of the links' length.
-bool AboveLine(const PendulumState& state);
+bool AboveLine(const Joints& angle);
 
 /// A run's outcome.
 struct UptimeRun {
@@ -70,28 +65,7 @@ struct UptimeRun {
   int swing_ups = 0;  // crossings of the line upwards, more than 1 s after the one before
 };
 
-/// Counts uptime over the rows of a run, as the benchmark does.
-class UptimeCounter {
- public:
-  void Add(double time, const PendulumState& state);
-  UptimeRun run() const { return run_; }
-
- private:
-  UptimeRun run_;
-  double time_ = 0, crossing_ = -1;  // s: of the last row; of the last counted crossing
-  bool above_ = false;
-};
-
-/// Makes the controller of a machine. A controller begins afresh after each reset.
-using MachineControllerMaker = std::function<std::unique_ptr<MachineController>()>;
-
-/// Simulates a run on the board's plant from hanging at rest. `trace`, if given, gets its steps.
-UptimeRun SimulateUptime(Robot robot, const MachineControllerMaker& make, uint64_t seed,
-                         std::vector<BoardSample>* trace = nullptr);
-
-/// The runs of `count` seeds from `seed` on. `trace` gets the steps of the first one.
-std::vector<UptimeRun> SimulateUptimes(Robot robot, const MachineControllerMaker& make,
-                                       uint64_t seed, int count, ThreadPool* pool,
-                                       std::vector<BoardSample>* trace, const Progress& progress);
+/// The outcome of a run's log.
+UptimeRun UptimeOf(const MachineLog& log);
 
 }  // namespace upswing::realaigym

@@ -4,6 +4,9 @@
 
 #include <cmath>
 #include <numbers>
+#include <vector>
+
+#include "extras/realaigym/simulation.h"
 
 namespace upswing::realaigym {
 namespace {
@@ -88,48 +91,37 @@ TEST(Resets, ALimitBeginsOneAndDelaysTheOthers) {
 }
 
 TEST(Uptime, CountsTimeAboveTheLine) {
-  UptimeCounter counter;
-  const PendulumState up{std::numbers::pi, 0, 0, 0};
+  MachineLog log;
   for (int k = 0; k < 30000; ++k) {
     const double time = k * kStep;
-    counter.Add(time,
-                time >= 15 && time < 45 && !(time >= 20 && time < 20.5) ? up : PendulumState{});
+    const bool up = time >= 15 && time < 45 && !(time >= 20 && time < 20.5);
+    log.time.push_back(time);
+    log.angle.push_back({up ? std::numbers::pi : 0, 0});
   }
-  EXPECT_NEAR(counter.run().score, 29.5 / 60, 1e-9);
-  EXPECT_EQ(counter.run().swing_ups, 2);
-  EXPECT_FALSE(AboveLine({std::numbers::pi - 0.46, 0, 0, 0}));  // cos 0.451 = 0.9
-  EXPECT_TRUE(AboveLine({std::numbers::pi - 0.44, 0, 0, 0}));
+  EXPECT_NEAR(UptimeOf(log).score, 29.5 / 60, 1e-9);
+  EXPECT_EQ(UptimeOf(log).swing_ups, 2);
+  EXPECT_FALSE(AboveLine({std::numbers::pi - 0.46, 0}));  // cos 0.451 = 0.9
+  EXPECT_TRUE(AboveLine({std::numbers::pi - 0.44, 0}));
 }
-
-/// Counts its calls; no torque.
-class Counter : public MachineController {
- public:
-  explicit Counter(int& calls) : calls_(calls) {}
-  int64_t hz() const override { return 50; }
-  double Torque(int64_t step, const PendulumState& /*state*/, bool /*estimated*/) override {
-    EXPECT_EQ(step, step_++);
-    ++calls_;
-    return 0;
-  }
-
- private:
-  int& calls_;
-  int64_t step_ = 0;
-};
 
 TEST(Uptime, AControllerBeginsAfreshAfterEachReset) {
   int made = 0, calls = 0;
-  const MachineControllerMaker make = [&] {
+  const ControllerMaker make = [&]() -> CycleController {
     ++made;
-    return std::make_unique<Counter>(calls);
+    return [&](const CycleInput&) {
+      ++calls;
+      return Joints{};
+    };
   };
-  std::vector<BoardSample> trace;
-  const UptimeRun run = SimulateUptime(Robot::kAcrobot, make, 1, &trace);
+  const auto run = [&] {
+    return SimulateEpisode(Robot::kAcrobot, {}, WithResets(make, {}, 1), kUptimeSeconds);
+  };
+  const MachineLog log = run();
   EXPECT_EQ(made, 16);
-  EXPECT_NEAR(calls, 57 * 50, 16);
-  EXPECT_LT(run.score, 0.2);
-  EXPECT_EQ(trace.size(), 30000u);
-  EXPECT_EQ(SimulateUptime(Robot::kAcrobot, make, 1).score, run.score);
+  EXPECT_EQ(calls, 30000 - 15 * 100);
+  EXPECT_EQ(log.rows(), 30000);
+  EXPECT_LT(UptimeOf(log).score, 0.2);
+  EXPECT_EQ(run().angle, log.angle);
 }
 
 }  // namespace

@@ -83,12 +83,6 @@ Plant TrainingPlant(const PolicyInfo& info, const std::string& where) {
 
 LoadedPolicy PolicyIn(const Tensors& file) {
   const std::string& where = file.where();
-  const auto format = file.metadata.find("format");
-  if (format != file.metadata.end() && format->second == "upswing-realaigym") {
-    throw BadInput(Concat(
-        where,
-        ": expected a policy of `upswing train`, got one for RealAIGym (`upswing realaigym`)"));
-  }
   const auto policy = std::make_shared<const NetworkPolicy>(NetworkPolicy::From(file));
   const PolicyInfo& info = policy->info();
   const std::string task = info.task.empty() ? kDoublePendulum : info.task;

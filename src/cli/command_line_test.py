@@ -337,7 +337,7 @@ class LauncherTest(ProgramTest):
 
         listed = commands(self.launch("--no-setup", "help").stdout, "Commands")
         self.assertEqual(listed, commands(self.succeed("--help"), "Subcommands"))
-        self.assertIn(("realaigym", "Score a policy by RealAIGym's rules, or search for one"), listed)
+        self.assertIn(("realaigym", "Score policies and logs by the rules of RealAIGym"), listed)
         self.assertEqual(self.launch("--no-setup", "help", "info").stdout, "ran: info --help\n")
 
     def test_words_that_ctest_would_ignore(self):

@@ -111,12 +111,13 @@ class PlantTest(ProgramTest):
                                       "gravity", "torque_limit"})
 
     def test_a_controller_for_the_board(self):
-        board = json.loads(self.succeed("realaigym", "tvlqr", "--made-for", "realaigym", "--json"))
+        score = ("realaigym", "score", "tvlqr", "--score-version", 2, "--made-for")
+        board = json.loads(self.succeed(*score, "realaigym", "--json"))
         self.assertEqual(board["policy"], "tvlqr (for realaigym)")
         self.assertTrue(board["performance"]["swung_up"])
         self.assertGreater(board["performance"]["score"], 0.45)
-        self.assertNotIn("designed for", self.succeed("realaigym", "tvlqr", "--made-for", "realaigym"))
-        changed = self.succeed("realaigym", "tvlqr", "--made-for", "realaigym", "--made-for", "mass1=0.6")
+        self.assertNotIn("designed for", self.succeed(*score, "realaigym"))
+        changed = self.succeed(*score, "realaigym", "--made-for", "mass1=0.6")
         self.assertIn("tvlqr (for realaigym and mass1 0.6)", changed)
         self.assertIn("designed for mass1 0.6", changed)
 

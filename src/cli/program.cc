@@ -42,7 +42,7 @@ constexpr CommandEntry kTable[] = {
     {"study", "Train variants of the settings, each with many seeds", "upswing"},
     {"completion", "Print completions for bash, zsh or fish", "upswing"},
     {"export", "Export policies as ONNX or C, or into the page", "upswing-deploy"},
-    {"realaigym", "Score a policy by RealAIGym's rules, or search for one", "upswing-realaigym"},
+    {"realaigym", "Score policies and logs by the rules of RealAIGym", "upswing-realaigym"},
     {"machine", "Check logs of a real machine, identify its twin, validate it", "upswing-machine"},
     {"run", "Drive a real machine or its twin with a policy", "upswing-machine"},
     {"fake", "Play a machine for `run`: a twin behind UDP or a terminal", "upswing-machine"},

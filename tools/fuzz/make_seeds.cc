@@ -3,19 +3,15 @@
 //   fuzz_seeds tools/fuzz/corpus
 #include <cstdio>
 #include <filesystem>
-#include <tuple>
 
 #include "agents/loaded_policy.h"
 #include "base/error.h"
-#include "extras/realaigym/swing_policy.h"
 #include "nn/network_policy.h"
 #include "runs/tensor_file.h"
 #include "runs/this_host.h"
 #include "tools/fuzz/tiny_training.h"
 
 namespace upswing {
-
-using namespace realaigym;
 
 namespace {
 
@@ -75,11 +71,6 @@ void MakeSeeds(const fs::path& corpus) {
   Tensors narrow = policy.Rounded().ToTensors();
   narrow.Narrow();
   SaveTensors(narrow, corpus / "policy/accepted/bfloat16.safetensors");
-  for (const auto& [robot, hidden, name] : {std::tuple(Robot::kAcrobot, 4, "searched.safetensors"),
-                                            {Robot::kPendubot, 16, "searched-16.safetensors"}}) {
-    const SwingNet net(robot, hidden);
-    SaveTensors(net.ToTensors(net.Initial(1)), corpus / "policy/accepted" / name);
-  }
 }
 
 }  // namespace

@@ -1,5 +1,4 @@
-// Target: policy files, which `eval`, `info`, `export` and others read from untrusted sources, and
-// the policy files of `realaigym --search`.
+// Target: policy files, which `eval`, `info`, `export` and others read from untrusted sources.
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -10,8 +9,6 @@
 #include "base/safetensors.h"
 #include "base/text.h"
 #include "extras/deploy/export.h"
-#include "extras/realaigym/simulation.h"
-#include "extras/realaigym/swing_policy.h"
 #include "runs/find_policy.h"
 #include "runs/train_command.h"
 #include "tools/fuzz/target.h"
@@ -19,44 +16,12 @@
 namespace upswing {
 
 using namespace deploy;
-using namespace realaigym;
-
-namespace {
-
-/// Checks a board policy: it is written as it was read, chooses finite torques from any reachable
-/// state, and controls the board for a while.
-void TrySwingPolicy(const Tensors& tensors) {
-  const SwingPolicy policy = ReadSwingPolicy(tensors);
-  const Tensors again = policy.net.ToTensors(policy.numbers);
-  Expect(ReadSwingPolicy(again).numbers == policy.numbers, "the same numbers again");
-  const auto finite = [](double x) { return std::isfinite(x); };
-  const auto controller = policy.net.Control(policy.numbers);
-  BoardMeasurement measured{};
-  Lanes torque{};
-  for (const double q : {0.0, 3.1, 3.2, -1e3, 1e6}) {
-    measured.q1.fill(q);
-    measured.q2.fill(-q);
-    controller->Act(q == 0 ? 0 : 1, measured, kBoardBlock, torque);
-    Expect(std::ranges::all_of(torque, finite), "finite torques");
-  }
-  BoardEpisode episode;
-  episode.steps = 100;
-  std::vector<BoardSample> trace;
-  SimulateOnBoard(
-      policy.net.robot(), {&episode, 1}, [&](size_t) { return policy.net.Control(policy.numbers); },
-      nullptr, &trace);
-  Expect(std::ranges::all_of(trace, finite, &BoardSample::torque), "finite torques of an episode");
-}
-
-}  // namespace
 
 bool TryInput(std::string_view input) {
   const auto bytes = BytesOf(input);
   std::optional<LoadedPolicy> loaded;
   const bool accepted = Accepts([&] {
-    const Tensors tensors = ReadSafetensors({bytes.begin(), bytes.end()}, kInputName);
-    if (IsSwingPolicy(tensors)) return TrySwingPolicy(tensors);
-    loaded = ReadPolicy(tensors);
+    loaded = ReadPolicy(ReadSafetensors({bytes.begin(), bytes.end()}, kInputName));
   });
   if (!loaded) return accepted;
 

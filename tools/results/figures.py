@@ -274,65 +274,6 @@ for _name, _agent, _reference in (("reward", "fast", "all"), ("curriculum", "fas
                                   ("sac-extensions", "sac-fast", "all"), ("ppo-parts", "ppo", "all")):
     DRAWN[f"study-{_name}"] = lambda name=_name, agent=_agent, reference=_reference: ablation(name, agent, reference)
 
-ROBOTS = ("pendubot", "acrobot")
-
-
-def entries(columns_of):
-    """(robot, first pixel, columns, rows) of each RealAIGym table, below each other."""
-    top = 50
-    for robot in ROBOTS:
-        columns, rows = table(f"realaigym-{robot}")
-        rows = [row for row in rows if any(number(row[columns.index(name)]) is not None for name in columns_of)]
-        yield robot, top, columns, rows
-        top += 22 * len(rows) + 50
-
-
-def dots(fig, left, width, top, rows, values, names, limits, texts=None):
-    """A panel with a row for each entry; our entries are large and filled."""
-    axes = panel(fig, left, top, width, 22 * len(rows))
-    axes.set_xlim(*limits)
-    axes.set_ylim(len(rows) - 0.5, -0.5)
-    axes.grid(axis="x", visible=False)
-    axes.spines["left"].set_visible(False)
-    axes.set_yticks(range(len(rows)), [row[0] for row in rows] if names else [""] * len(rows))
-    axes.tick_params(axis="y", length=0)
-    for y, (row, value) in enumerate(zip(rows, values)):
-        if value is None:
-            continue
-        ours = row[0] == "ours"
-        axes.plot(value, y, "o", color=INK if ours else MUTED, markerfacecolor=INK if ours else PAPER,
-                  markersize=10 if ours else 7, markeredgewidth=1.6, clip_on=False)
-        if texts:
-            axes.annotate(texts[y], (value, y), (9, 0), textcoords="offset points", va="center_baseline",
-                          color=INK if ours else MUTED, fontweight="bold" if ours else "normal", annotation_clip=False)
-    for label, row in zip(axes.get_yticklabels(), rows):
-        if row[0] == "ours":
-            label.set_fontweight("bold")
-        else:
-            label.set_color(MUTED)
-    return axes
-
-
-@figure("realaigym-scores")
-def realaigym_scores():
-    """Scores of performance and robustness: our entries and the published ones."""
-    blocks = list(entries(("S", "R")))
-    _, top, _, rows = blocks[-1]
-    fig = canvas(800, top + 22 * len(rows) + 40)
-    note(fig, 150 + 130, 14, "S: performance", ha="center", color=MUTED)
-    note(fig, 480 + 130, 14, "R: robustness", ha="center", color=MUTED)
-    for robot, top, columns, rows in blocks:
-        note(fig, 138, top - 14, robot, ha="right", color=MUTED, style="italic")
-        for k, (name, left) in enumerate((("S", 150), ("R", 480))):
-            cells = [row[columns.index(name)] for row in rows]
-            axes = dots(fig, left, 260, top, rows, [number(cell) for cell in cells], k == 0,
-                        (0.3, 0.9) if name == "S" else (0.2, 1.2), cells)  # values at the right
-            axes.set_xticks([0.3, 0.4, 0.5, 0.6, 0.7] if name == "S" else [0.2, 0.4, 0.6, 0.8, 1])
-            if robot != blocks[-1][0]:
-                axes.tick_params(axis="x", labelbottom=False)
-    return fig
-
-
 @figure("machine-motion")
 def machine_motion():
     """Measured angles of left-out runs, and predictions of the twin and the benchmark's own model."""
