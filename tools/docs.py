@@ -26,6 +26,7 @@ from program import ROOT
 WORK = Path(os.environ.get("UPSWING_DOCS_WORK", ROOT / "build/docs-work"))
 SOURCE = WORK / "source"
 XML = WORK / "doxygen/xml"
+DOCTREES = WORK / "doctrees"
 
 # Pages of the repository's root that the site also has.
 ROOT_PAGES = {"CHANGELOG.md": "development/changelog.md",
@@ -56,11 +57,14 @@ class Stage:
             path.write_bytes(content)
 
     def remove_others(self, out):
-        """Removes files that no longer belong to the folder, and everything built from them."""
-        for path in self.folder.rglob("*"):
-            if path.is_file() and path not in self.files:
-                path.unlink()
-                (out / path.relative_to(self.folder)).with_suffix(".html").unlink(missing_ok=True)
+        """Removes files that no longer belong to the folder, and everything built from them. Returns
+        the removed files."""
+        removed = [path for path in self.folder.rglob("*")
+                   if path.is_file() and path not in self.files]
+        for path in removed:
+            path.unlink()
+            (out / path.relative_to(self.folder)).with_suffix(".html").unlink(missing_ok=True)
+        return removed
 
 
 # --- Pages written by hand ----------------------------------------------------------------------
@@ -290,7 +294,8 @@ def run_doxygen():
     for name in layers():
         for header, path in headers_of(name).items():
             headers.write(header, for_doxygen(path.read_text(encoding="utf-8")))
-    headers.remove_others(WORK)
+    if headers.remove_others(WORK):
+        shutil.rmtree(DOCTREES, ignore_errors=True)  # Breathe would look for the XML of each header
     settings = DOXYFILE + (f"OUTPUT_DIRECTORY = {XML.parent}\nINPUT = {headers.folder}\n"
                            f"STRIP_FROM_PATH = {headers.folder}\n")
     stamp = XML.parent / "made-of.txt"
@@ -326,13 +331,12 @@ def build(out, jobs):
     stage.write("reference/python-api.md", PYTHON_PAGE)
     stage_cpp_api(stage)
     stage.remove_others(out)
-    doctrees = WORK / "doctrees"
     done = subprocess.run(
         [sys.executable, "-m", "sphinx", "-b", "html", "-q", "-W", "--jobs", jobs,
-         "-d", doctrees, SOURCE, out], check=False, stdin=subprocess.DEVNULL,
+         "-d", DOCTREES, SOURCE, out], check=False, stdin=subprocess.DEVNULL,
         env=os.environ | {"UPSWING_ROOT": str(ROOT), "UPSWING_DOXYGEN_XML": str(XML)})
     if done.returncode != 0:
-        shutil.rmtree(doctrees, ignore_errors=True)  # so that the next build warns again
+        shutil.rmtree(DOCTREES, ignore_errors=True)  # so that the next build warns again
         return 1
     return 0
 
