@@ -166,9 +166,15 @@ class Callbacks(InFolder):
 
     def test_an_interrupted_training_is_kept(self):
         def train():
-            threading.Timer(0.5, _thread.interrupt_main).start()
+            runs = threading.Event()
+
+            def interrupt():
+                runs.wait()
+                _thread.interrupt_main()
+
+            threading.Thread(target=interrupt).start()
             return upswing.train("fast", stop_when_solved=False, steps=10**9, threads=1,
-                                 eval_every=10**9)
+                                 eval_every=10**9, on_metrics=lambda row: runs.set())
 
         # A script gets KeyboardInterrupt, so that loops end. A prompt gets the training.
         with self.assertRaisesRegex(KeyboardInterrupt, "interrupted at step") as caught:
