@@ -207,7 +207,7 @@ class Interrupts:
     Ctrl-C ends it at once."""
 
     def __init__(self) -> None:
-        self._pending = False
+        self.pending = False  # whether Ctrl-C was pressed
         self._before: Any = None
 
     def __enter__(self) -> Interrupts:
@@ -223,10 +223,10 @@ class Interrupts:
 
     def check(self) -> None:
         """Raises KeyboardInterrupt after Ctrl-C."""
-        if self._pending:
+        if self.pending:
             raise KeyboardInterrupt
 
     def _note(self, _number: int, _frame: Any) -> None:
-        if self._pending:
+        if self.pending:
             raise KeyboardInterrupt
-        self._pending = True
+        self.pending = True

@@ -122,7 +122,8 @@ def texts_of(values: dict[str, Any]) -> list[tuple[str, str]]:
     texts = [(name, text_of(value)) for name, value in values.items()]
     for name, text in texts:
         if "\0" in text:
-            raise _upswing.InputError(f"{name}: expected a text without null characters, got {text!r}")
+            raise _upswing.InputError(
+                f"{name}: expected a text without null characters, got {text!r}")
     return texts
 
 

@@ -130,7 +130,7 @@ def train(
 
     Raises:
         InputError: a setting is out of range, settings contradict each other, or an environment
-            returned something else than Gymnasium's interface has
+            breaks Gymnasium's interface
         Failure: a number is not finite, or a file cannot be written
         Exception: any exception of `env` and of the callbacks, unchanged
 
@@ -206,7 +206,8 @@ def train(
         if source is not None:
             source.close()
     best, last = result.pop("best"), result.pop("last")
-    interrupted = result.pop("interrupted")
+    # Ctrl-C may come after the last step.
+    interrupted = result.pop("interrupted") or (interrupts is not None and interrupts.pending)
     training = Training(best=Policy(last if best is None else best), last=Policy(last),
                         evaluations=rows["evaluation"], metrics=rows["metrics"], **result)
     if not interrupted:
@@ -224,8 +225,10 @@ def train(
 
 def _source_of(agent: str | None, env: EnvLike | None, num_envs: int | None,
                eval_env: EnvLike | None, max_episode_steps: int | None,
-               solved_return: float | None, choose_agent: bool, settings: dict[str, Any]) -> tuple[Source | None, dict[str, Any]]:
-    """The environments of `env`, and the settings that follow from it. Raises InputError."""
+               solved_return: float | None, choose_agent: bool, settings: dict[str, Any]
+               ) -> tuple[Source | None, dict[str, Any]]:
+    """The environments of `env`, and the settings that follow from it. `choose_agent`: the default
+    agent depends on the actions. Raises InputError."""
     arguments = {"num_envs": num_envs, "eval_env": eval_env,
                  "max_episode_steps": max_episode_steps, "solved_return": solved_return}
     if env is None:
