@@ -106,7 +106,7 @@ int RunStudy(const StudyArguments& arguments) {
       throw BadInput(
           Concat(arguments.file, ": no such file or folder; expected a study's file or folder"));
     }
-    if (Exists(arguments.file) && !is_folder) {
+    if (Exists(arguments.file) && !is_folder) {  // names a mistake in the file
       (void)ParseStudy(ReadOwnFile(arguments.file), arguments.file);
     }
     return PrintStudyStatus(folder, arguments.as_json);

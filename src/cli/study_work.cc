@@ -75,54 +75,46 @@ int WorkOnStudy(const std::filesystem::path& folder) {
 }
 
 int PrintStudyStatus(const std::filesystem::path& folder, bool as_json) {
-  struct Counts {
-    int64_t done = 0, solved = 0, running = 0, lost = 0, failed = 0, stopped = 0, waiting = 0;
-  };
+  const char* const states[] = {"done",   "solved",  "running", "lost",
+                                "failed", "stopped", "waiting"};
   const StudyPlan plan = ReadPlan(folder);
-  std::map<const Variant*, Counts> counts;
+  std::map<const Variant*, std::map<std::string_view, int64_t>> counts;  // of runs, by state
   std::vector<std::string> lines;
   for (SeedRun& run : RunsOf(plan)) {
-    Counts& c = counts[run.variant];
+    auto& count = counts[run.variant];
     run.Refresh();
     const auto lease = ReadLease(run.claim());
     if (run.finished) {
-      ++c.done;
-      c.solved += run.state->solved ? 1 : 0;
+      ++count["done"];
+      count["solved"] += run.state->solved ? 1 : 0;
     } else if (lease) {
-      ++(lease->lost ? c.lost : c.running);
+      ++count[lease->lost ? "lost" : "running"];
       lines.push_back(fmt::format("  {:<20} {:>11} steps  {} by {}, seen {} ago", run.name,
                                   FormatCount(run.Steps()), lease->lost ? "lost" : "claimed",
                                   Printable(lease->holder), FormatDuration(lease->seconds)));
     } else if (!run.problem.empty()) {
-      ++c.failed;
+      ++count["failed"];
       lines.push_back(fmt::format("  {:<20} failed: {}", run.name, Printable(run.problem)));
     } else {
-      ++(run.state ? c.stopped : c.waiting);
+      ++count[run.state ? "stopped" : "waiting"];
     }
   }
   if (as_json) {
     nlohmann::ordered_json j{{"study", folder.string()}};
     for (const Variant& variant : plan.variants) {
-      const Counts& c = counts[&variant];
-      j["variants"].push_back({{"variant", variant.name},
-                               {"done", c.done},
-                               {"solved", c.solved},
-                               {"running", c.running},
-                               {"lost", c.lost},
-                               {"failed", c.failed},
-                               {"stopped", c.stopped},
-                               {"waiting", c.waiting}});
+      auto& row = j["variants"].emplace_back();
+      row["variant"] = variant.name;
+      for (const char* state : states) row[state] = counts[&variant][state];
     }
     Say("{}\n", PrintableJson(j));
     return 0;
   }
   Say("{}\n", Printable(folder.string()));
-  Say("  {:<20} {:>7} {:>7} {:>8} {:>7} {:>7} {:>8} {:>8}\n", "", "done", "solved", "running",
-      "lost", "failed", "stopped", "waiting");
+  Say("  {:<20} {:>8}\n", "", fmt::join(states, " "));
   for (const Variant& variant : plan.variants) {
-    const Counts& c = counts[&variant];
-    Say("  {:<20} {:>7} {:>7} {:>8} {:>7} {:>7} {:>8} {:>8}\n", variant.name, c.done, c.solved,
-        c.running, c.lost, c.failed, c.stopped, c.waiting);
+    Say("  {:<20}", variant.name);
+    for (const char* state : states) Say(" {:>8}", counts[&variant][state]);
+    Say("\n");
   }
   if (!lines.empty()) Say("\n");
   for (const std::string& line : lines) Say("{}\n", line);

@@ -9,7 +9,7 @@ namespace upswing {
 /// code: 0, 1 if a run failed, kTryAgain if a signal stopped the worker.
 int WorkOnStudy(const std::filesystem::path& folder);
 
-/// Prints the progress and the workers of the study in a folder.
+/// Prints the progress and the workers of the study in a folder; as JSON the progress only.
 int PrintStudyStatus(const std::filesystem::path& folder, bool as_json);
 
 }  // namespace upswing
