@@ -234,15 +234,14 @@ void CheckSameAxes(const std::vector<MapResult>& maps) {
 
 void WriteMaps(std::vector<MapResult>& maps, const fs::path& folder) {
   const bool several = maps.size() > 1;
-  const Figure figure = several ? SuccessFigure(maps) : MapFigure(maps.front());
-  const std::vector<std::string> drawn =
-      DrawIfPossible(figure, folder / (several ? "maps" : "map"));
   for (size_t i = 0; i < maps.size(); ++i) {
     const fs::path table = folder / (several ? Concat("map-", i + 1, ".csv") : "map.csv");
     WriteFileAtomically(table, MapCsv(maps[i]));
     maps[i].files = {table.string()};
-    maps[i].files.insert(maps[i].files.end(), drawn.begin(), drawn.end());
   }
+  const Figure figure = several ? SuccessFigure(maps) : MapFigure(maps.front());
+  const auto drawn = DrawIfPossible(figure, folder / (several ? "maps" : "map"));
+  for (MapResult& map : maps) map.files.insert(map.files.end(), drawn.begin(), drawn.end());
 }
 
 std::string MapsJson(const std::vector<MapResult>& maps) {
