@@ -166,9 +166,6 @@ Config ParseConfig(std::string_view text, const std::string& where,
   // A model file has its own plant; other settings may change it.
   const EarlySetting named = FindEarly("plant", "model", table, where, flags);
   ModelFile model;
-  if (named.value.empty() && named.where == FlagOf("model")) {
-    throw BadInput("--model: expected a path, got an empty text");
-  }
   if (!named.value.empty()) {
     model = read_model(named.value, named.in_file);
     config.plant = model.plant;
