@@ -127,8 +127,8 @@ class HelpFormatter : public CLI::Formatter {
   }
 
  private:
-  /// Moves the examples to the top, below the usage. For -h, leaves out all blocks but arguments
-  /// and commands.
+  /// Moves the examples below the usage. A short help keeps only usage, examples, arguments and
+  /// commands.
   std::string Arranged(const std::string& help) const {
     std::vector<std::string> blocks;  // separated by empty lines
     std::istringstream lines(help);
@@ -138,17 +138,15 @@ class HelpFormatter : public CLI::Formatter {
       if (ended) blocks.emplace_back();
       blocks.back() += line + '\n';
     }
-    const auto begins = [](const std::string& block, std::initializer_list<const char*> titles) {
-      return std::ranges::any_of(titles,
-                                 [&](const char* title) { return block.starts_with(title); });
-    };
     const auto examples = std::ranges::find_if(
-        blocks, [&](const std::string& block) { return begins(block, {"Examples:"}); });
+        blocks, [](const std::string& block) { return block.starts_with("Examples:"); });
     if (examples != blocks.end()) std::rotate(blocks.begin() + 1, examples, examples + 1);
     if (is_short_) {
+      constexpr const char* kKept[] = {"Examples:", "Positionals:", "Options:", "Subcommands:"};
       std::erase_if(blocks, [&](const std::string& block) {
-        return &block != &blocks.front() &&
-               !begins(block, {"Examples:", "Positionals:", "Options:", "Subcommands:"});
+        return &block != &blocks.front() && std::ranges::none_of(kKept, [&](const char* title) {
+          return block.starts_with(title);
+        });
       });
       blocks.emplace_back("--help also shows all settings.\n");
     }

@@ -133,7 +133,7 @@ void PrintPolicy(const LoadedPolicy& loaded) {
   if (learned != nullptr) PrintSelfCheck(learned->self_check());
 }
 
-/// The checkpoint of a run.
+/// The settings of a run and the state in its checkpoint.
 struct RunFacts {
   explicit RunFacts(const fs::path& path)
       : checkpoint(LoadTensors(RunFolder::CheckpointPath(path))),
@@ -193,7 +193,7 @@ void PrintRun(const fs::path& path, bool has_policy) {
                                                      FormatCount(state.best_step)));
 }
 
-/// The files' and the design's facts on a policy.
+/// A policy as JSON; null for what its file does not say.
 ordered_json PolicyJson(const LoadedPolicy& loaded) {
   const Policy& policy = *loaded.policy;
   const PolicyInfo& info = policy.info();
@@ -230,8 +230,8 @@ void PrintProgram() {
   fmt::print("  vectors     {} (this processor supports: {})\n", SimdPath(),
              fmt::join(SimdPaths(), ", "));
   fmt::print("  policies    {} (shipped)\n", fmt::join(ShippedPolicies(), ", "));
-  if (IsInstalled())
-    fmt::print("  examples    {}\n", Printable((SharePath() / "examples").string()));
+  if (!IsInstalled()) return;
+  fmt::print("  examples    {}\n", Printable((SharePath() / "examples").string()));
 }
 
 ordered_json ProgramJson() {
@@ -246,7 +246,7 @@ struct InfoArguments : PolicyArguments {
   bool as_json = false;
 };
 
-/// The whole answer: of the program, a policy, or a run and its policy.
+/// The program, a policy, or a run and its policy, as JSON.
 ordered_json InfoJson(const InfoArguments& a) {
   if (a.empty()) return ProgramJson();
   const fs::path path = a.name;

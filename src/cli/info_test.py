@@ -49,7 +49,7 @@ class InfoTest(ProgramTest):
     def test_shipped_policy(self):
         self.assert_says(self.succeed("info"), "policies    d3qn, d3qn-adaptive, ", "sac (shipped)")
         self.assert_says(self.succeed("info", "sac"), "sac\n", "agent sac", "self-check  passed")
-        self.refuse(["info", "sax"], "a shipped policy or controller (d3qn, ", "did you mean sac?")
+        self.refuse(["info", "sax"], "a shipped policy or a controller (d3qn, ", "did you mean sac?")
         self.refuse(["compare", "sac"], "expected runs too, whose episodes sac")
         (self.folder / "sac").mkdir()  # a folder here comes first
         self.refuse(["info", "sac"], "sac/policy.safetensors: no such file")

@@ -118,7 +118,7 @@ class TrainView : public TrainObserver {
   }
 
  private:
-  /// The share of the steps that are done.
+  /// Share of the steps that are done.
   double Share(const TrainState& s) const {
     return static_cast<double>(s.steps) / static_cast<double>(training_.config().train.steps);
   }
@@ -196,7 +196,7 @@ class TrainView : public TrainObserver {
     }
   }
 
-  /// Time by the clock: of earlier sessions without their evaluations.
+  /// Time by the clock. Earlier sessions of a resumed run count without their evaluations.
   std::string Elapsed() const {
     const std::chrono::duration<double> session = std::chrono::steady_clock::now() - begin_;
     return FormatDuration(seconds_before_ + session.count());
@@ -205,7 +205,7 @@ class TrainView : public TrainObserver {
   const Training& training_;
   ProgressLine line_;
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
-  double seconds_before_;                     // training time at the begin of the view
+  double seconds_before_;                     // training time before this view
   int64_t begin_step_;                        // of the training in this view
   Metrics metrics_;                           // last reported
   double value_ = 0, discounted_return_ = 0;  // of the last evaluation

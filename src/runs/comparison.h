@@ -62,15 +62,16 @@ struct RunFigure {
 };
 std::span<const RunFigure> RunFigures();
 
-/// Comparison of a figure of two groups a and b, or of what they need to solve the task.
+/// A figure of group a compared with that of group b.
 struct PairFigure {
   Estimate better;                     // probability that a run of a is better than one of b
   std::optional<Estimate> difference;  // IQM of a - IQM of b; nothing if a run is unsolved
 };
 
 struct PairSummary {
-  size_t a, b;  // indices of the groups
-  PairFigure seconds, steps, final_return;
+  size_t a, b;                // indices of the groups
+  PairFigure seconds, steps;  // until solved; fewer are better
+  PairFigure final_return;
 };
 PairSummary ComparePair(const std::vector<RunGroup>& groups, size_t a, size_t b);
 

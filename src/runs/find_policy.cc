@@ -170,14 +170,15 @@ LoadedPolicy LoadPolicy(const fs::path& path) {
     }
   }
   if (!fs::exists(file)) {
-    const std::string expected = "expected a policy.safetensors, a run folder or a shipped policy";
     if (IsController(path.string())) {
-      throw BadInput(Concat(path.string(), ": ", expected, ", got a controller"));
+      throw BadInput(Concat(path.string(), ": expected a policy.safetensors, a run folder or a ",
+                            "shipped policy, got a controller"));
     }
     std::vector<std::string> names = ShippedPolicies();
     std::ranges::copy(ControllerNames(), std::back_inserter(names));
-    throw BadInput(Concat(file.string(), ": no such file; ", expected, " or controller (",
-                          Join(names, ", "), ")", DidYouMean(path.string(), names)));
+    throw BadInput(Concat(file.string(), ": no such file; expected a policy.safetensors, a run ",
+                          "folder, a shipped policy or a controller (", Join(names, ", "), ")",
+                          DidYouMean(path.string(), names)));
   }
   return ReadPolicy(LoadTensors(file, kMostPolicyBytes));
 }
