@@ -10,31 +10,29 @@
 namespace upswing::machine {
 namespace {
 
-/// Whether a torque of row k is other than 0.
-bool HasTorqueAt(const std::vector<Joints>& torque, int k) {
-  return !torque.empty() && (torque[k][0] != 0 || torque[k][1] != 0);
+/// Largest torque at row k, N·m; 0 if the log lacks the quantity.
+double TorqueAt(const std::vector<Joints>& torque, int k) {
+  return torque.empty() ? 0 : std::max(std::abs(torque[k][0]), std::abs(torque[k][1]));
 }
 
-/// Rows without any torque.
-struct Unpowered {
-  const MachineLog* piece;
-  int first, last;
+/// Whether row k has a commanded torque or a push.
+bool IsPowered(const MachineLog& piece, int k) {
+  return TorqueAt(piece.commanded, k) > 0 || TorqueAt(piece.push, k) > 0;
+}
+
+/// Rows (indices) of a piece; empty if last < first.
+struct Rows {
+  int first = 0, last = -1;
 };
 
 /// The longest rows of a piece in which all known torques are zero.
-Unpowered LongestUnpowered(const MachineLog& piece) {
+Rows LongestUnpowered(const MachineLog& piece) {
   constexpr double kSensor = 0.05;  // measured torque that may be noise, N·m
-  const auto torque = [](const std::vector<Joints>& values, int k) {
-    return values.empty() ? 0 : std::max(std::abs(values[k][0]), std::abs(values[k][1]));
-  };
-  Unpowered best{&piece, 0, -1};
+  Rows best;
   int first = 0;
   for (int k = 0; k < piece.rows(); ++k) {
-    if (torque(piece.commanded, k) > 0 || torque(piece.push, k) > 0 ||
-        torque(piece.measured, k) > kSensor) {
-      first = k + 1;
-    }
-    if (k - first > best.last - best.first) best = {&piece, first, k};
+    if (IsPowered(piece, k) || TorqueAt(piece.measured, k) > kSensor) first = k + 1;
+    if (k - first > best.last - best.first) best = {first, k};
   }
   return best;
 }
@@ -60,7 +58,7 @@ void CheckGrowth(const MachineLog& piece, Findings& findings) {
   constexpr double kLongEnough = 2;           // s
   constexpr double kHeight = 0.3;             // of a swing within 45°
   constexpr double kRest = 0.002, kGrow = 4;  // heights: amplitude 0.06 rad, and its double
-  const Unpowered rows = LongestUnpowered(piece);
+  const Rows rows = LongestUnpowered(piece);
   if (rows.last <= rows.first) return;
   const double seconds = piece.time[rows.last] - piece.time[rows.first];
   if (seconds < kLongEnough) return;
@@ -81,38 +79,35 @@ void CheckGrowth(const MachineLog& piece, Findings& findings) {
        {{"speed_before", before.speed}, {"speed_after", after.speed}}});
 }
 
-/// The distance of an angle from another, in turns of its own, rad.
+/// Distance between two angles on the circle, rad.
 double Distance(double angle, double from) {
   return std::abs(std::remainder(angle - from, 2 * std::numbers::pi));
 }
 
 /// Rows of a piece at rest without torque, after which a torque moves it or the piece ends. (A hand
 /// may hold a pendulum that is released to swing.) Empty if they are shorter than 0.3 s.
-Unpowered RestOf(const MachineLog& piece) {
+Rows RestOf(const MachineLog& piece) {
   constexpr double kLong = 0.3, kStill = 0.01;  // s, rad
-  const auto powered = [&](int k) {
-    return HasTorqueAt(piece.commanded, k) || HasTorqueAt(piece.push, k);
-  };
   for (int first = 0; first < piece.rows();) {
     int last = first;
     const auto rests = [&](int k) {
-      return !powered(k) && std::abs(piece.angle[k][0] - piece.angle[first][0]) < kStill &&
+      return !IsPowered(piece, k) && std::abs(piece.angle[k][0] - piece.angle[first][0]) < kStill &&
              std::abs(piece.angle[k][1] - piece.angle[first][1]) < kStill;
     };
     while (last + 1 < piece.rows() && rests(last + 1)) ++last;
-    const bool counts = last + 1 == piece.rows() || powered(last + 1);
+    const bool counts = last + 1 == piece.rows() || IsPowered(piece, last + 1);
     if (counts && rests(first) && piece.time[last] - piece.time[first] > kLong) {
-      return {&piece, first, last};
+      return {first, last};
     }
     first = last + 1;
   }
-  return {&piece, 0, -1};
+  return {};
 }
 
 /// Reports a rest where gravity would move a link: an angle with another zero or meaning.
 void CheckRest(const MachineLog& piece, Findings& findings) {
   constexpr double kHeld = 0.35, kUpright = 0.1;  // rad; dry friction holds a link within
-  const Unpowered rest = RestOf(piece);
+  const Rows rest = RestOf(piece);
   if (rest.last < rest.first) return;
   const auto [q1, q2] = piece.angle[rest.first];
   const double links[] = {q1, q1 + q2};
