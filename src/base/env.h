@@ -14,10 +14,10 @@ namespace upswing {
 /// Static description of a task. Letters: N environments, D observation size, A action size, K
 /// reward terms, S state variables.
 struct EnvSpec {
-  std::string task;                      // name of the task, such as "double-pendulum"
-  int num_envs = 1;                      // N
-  int obs_size = 0;                      // D
-  std::vector<double> action_limit;      // (A) component i of an action is in ± action_limit[i]
+  std::string task;                  // name of the task, such as "double-pendulum"
+  int num_envs = 1;                  // N
+  int obs_size = 0;                  // D
+  std::vector<double> action_limit;  // (A) component i of an action is in ± action_limit[i]
   // (Q) The only actions of a task with discrete actions, where A = 1. Empty: any action within the
   // limit.
   std::vector<double> choices = {};

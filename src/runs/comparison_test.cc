@@ -89,7 +89,8 @@ TEST(Comparison, PairsAreTheSameFromBothSides) {
   const std::vector<RunGroup> groups{Summarized(kGroup), Summarized(fast)};
   const PairSummary ab = ComparePair(groups, 0, 1);
   const PairSummary ba = ComparePair(groups, 1, 0);
-  EXPECT_DOUBLE_EQ(ba.seconds.better.value, (9 + 3 * 0.5) / 12);  // tie with the fastest of the others
+  EXPECT_DOUBLE_EQ(ba.seconds.better.value,
+                   (9 + 3 * 0.5) / 12);  // tie with the fastest of the others
   EXPECT_DOUBLE_EQ(ab.seconds.better.value + ba.seconds.better.value, 1);
   EXPECT_EQ(ba.final_return.better.value, 1);
   EXPECT_EQ(ab.final_return.difference->value, 2525 - 2700);
