@@ -195,20 +195,9 @@ LogColumns RealAiGymColumns(const std::vector<std::string>& names, const std::st
   return columns;
 }
 
-/// Undoes the wrapping of an angle: no step between rows is longer than half of `wrap`.
-void Unwrap(std::vector<double>& angle, double wrap) {
-  double turns = 0, before = angle.empty() ? 0 : angle.front();
-  for (double& x : angle) {
-    turns -= std::round((x - before) / wrap);
-    before = x;
-    x += turns * wrap;
-  }
-}
-
 /// Numbers of a column in SI units. Throws BadInput for a huge one.
 std::vector<double> Scaled(CsvColumn table, const LogColumn& column, const std::string& where) {
   std::vector<double> values = std::move(table.values);
-  if (column.wrap > 0) Unwrap(values, column.wrap);
   for (size_t row = 0; row < values.size(); ++row) {
     double& x = values[row];
     x = (x - column.hanging) * column.scale;
@@ -249,7 +238,6 @@ WholeLog ReadRows(std::string_view csv, const LogColumns& columns, const std::st
   if (!columns.piece.empty()) whole.piece = table[columns.piece].values;
   for (const JointQuantity& q : kJointQuantities) {
     std::vector<Joints>& values = whole.log.*q.values;
-    const bool is_angle = q.values == &MachineLog::angle;
     for (int joint = 0; joint < 2; ++joint) {
       const LogColumn& column = (columns.*q.columns)[joint];
       if (column.name.empty()) continue;
@@ -257,10 +245,34 @@ WholeLog ReadRows(std::string_view csv, const LogColumns& columns, const std::st
       values.resize(numbers.size());
       for (size_t row = 0; row < numbers.size(); ++row) values[row][joint] = numbers[row];
     }
-    if (!columns.absolute || (!is_angle && q.values != &MachineLog::velocity)) continue;
-    for (Joints& row : values) row[1] -= row[0];
   }
   return whole;
+}
+
+/// Undoes the wrapping of a joint's angle at multiples of `wrap` (rad): the first row is nearest to
+/// hanging, and no step between rows is longer than half of it.
+void Unwrap(std::vector<Joints>& angle, int joint, double wrap) {
+  if (wrap == 0) return;
+  double turns = 0, before = 0;
+  for (Joints& row : angle) {
+    double& x = row[joint];
+    turns -= std::round((x - before) / wrap);
+    before = x;
+    x += turns * wrap;
+  }
+}
+
+/// Makes the angles of a piece continuous, and those of joint 2 relative to link 1.
+void FinishAngles(const LogColumns& columns, MachineLog& piece) {
+  const auto& [first, second] = columns.angle;
+  const double wrap1 = first.wrap * std::abs(first.scale);
+  const double wrap2 = second.wrap * std::abs(second.scale);
+  Unwrap(piece.angle, 0, wrap1);
+  if (columns.absolute) {
+    for (Joints& q : piece.angle) q[1] -= q[0];
+    for (Joints& w : piece.velocity) w[1] -= w[0];
+  }
+  Unwrap(piece.angle, 1, columns.absolute ? std::max(wrap1, wrap2) : wrap2);
 }
 
 /// Rows `begin` to `end` of a log.
@@ -334,8 +346,8 @@ LogColumns ParseLogColumns(std::string_view text, const std::string& where) {
 
 std::vector<MachineLog> ParseLog(std::string_view csv, const LogColumns* columns,
                                  const std::string& where) {
-  WholeLog whole =
-      ReadRows(csv, columns ? *columns : RealAiGymColumns(CsvNames(csv, where), where), where);
+  const LogColumns own = columns ? *columns : RealAiGymColumns(CsvNames(csv, where), where);
+  WholeLog whole = ReadRows(csv, own, where);
   const int rows = whole.log.rows();
   std::vector<MachineLog> pieces;
   if (whole.piece.empty()) {
@@ -356,6 +368,7 @@ std::vector<MachineLog> ParseLog(std::string_view csv, const LogColumns* columns
   for (MachineLog& piece : pieces) {
     CheckRows(piece, where);
     StartClock(piece);
+    FinishAngles(own, piece);
   }
   return pieces;
 }

@@ -243,6 +243,27 @@ TEST(MachineLog, AMotionHasOneLogInAnyConventionOfItsAngles) {
             seconds + "absolute = true\n"));
 }
 
+TEST(MachineLog, EachPieceOfWrappedAnglesBeginsNearestToHanging) {
+  const LogColumns columns = ParseLogColumns(R"(
+    time = "t"
+    angle1 = {column = "a", unit = "deg", wrap = 360}
+    angle2 = {column = "b", unit = "deg", wrap = 360}
+    piece = "n"
+    absolute = true
+  )",
+                                             "columns.toml");
+  const auto pieces =
+      ParseLog("n,t,a,b\n1,0,350,10\n1,1,200,220\n1,2,0,20\n2,0,181,179\n2,1,179,181\n", &columns,
+               "own.csv");
+  ASSERT_EQ(pieces.size(), 2);
+  constexpr double kDegree = std::numbers::pi / 180;
+  const double expected[][2] = {{-10, 20}, {-160, 20}, {0, 20}, {-179, -2}, {-181, 2}};
+  for (int k = 0; k < 5; ++k) {
+    const Joints& q = k < 3 ? pieces[0].angle[k] : pieces[1].angle[k - 3];
+    for (const int j : {0, 1}) EXPECT_NEAR(q[j], expected[k][j] * kDegree, 1e-12) << k;
+  }
+}
+
 TEST(MachineLog, APieceBeginsWhereItsColumnChanges) {
   const LogColumns columns = ParseLogColumns(
       "time = \"t\"\nangle1 = \"a\"\nangle2 = \"b\"\npiece = \"n\"\n", "columns.toml");
