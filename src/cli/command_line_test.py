@@ -45,9 +45,12 @@ class HelpTest(ProgramTest):
 
     @unittest.skipUnless(shutil.which("bash"), "needs bash")
     def test_completion(self):
-        for words, expected in (("upswing ev", {"eval"}), ("upswing eval --epis", {"--episodes", "--episodes-csv"})):
+        launcher = ROOT / "upswing"
+        for program, words, expected in ((UPSWING, "upswing ev", {"eval"}), (launcher, "./upswing ev", {"eval"}),
+                                         (launcher, "./upswing tes", {"test"}),
+                                         (UPSWING, "upswing eval --epis", {"--episodes", "--episodes-csv"})):
             script = (f"source <({UPSWING} completion bash); COMP_WORDS=({words}); "
-                      f"COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1)); _upswing {UPSWING}; echo ${{COMPREPLY[@]}}")
+                      f"COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1)); _upswing {program}; echo ${{COMPREPLY[@]}}")
             done = subprocess.run(["bash", "-c", script], check=True, capture_output=True, encoding="utf-8")
             self.assertEqual((set(done.stdout.split()), done.stderr), (expected, ""))
         self.assertTrue(self.succeed("completion", "zsh").endswith(self.succeed("completion", "bash")))

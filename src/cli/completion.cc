@@ -9,11 +9,12 @@
 namespace upswing {
 namespace {
 
-// The commands and the flags are the first words of the indented lines in --help.
+// The commands and the flags are the first words of the indented lines in --help. The launcher
+// heads its commands with "Commands:", the program with "Subcommands:".
 constexpr const char* kBash = R"(_upswing() {
   local word=${COMP_WORDS[COMP_CWORD]} names
   if [ "$COMP_CWORD" = 1 ]; then
-    names=$("$1" -h 2>/dev/null | sed -n '/^Subcommands:/,$s/^  \([a-z]*\) .*/\1/p')
+    names=$("$1" -h 2>/dev/null | sed -n '/ommands:$/,/^$/s/^  \([a-z]*\) .*/\1/p')
   else
     names=$("$1" "${COMP_WORDS[1]}" --help 2>/dev/null | sed -n 's/^  \(-[^ ]*\) .*/\1/p' | tr , '\n')
   fi
@@ -25,7 +26,7 @@ constexpr const char* kZsh = "autoload -U +X bashcompinit && bashcompinit\n";
 constexpr const char* kFish = R"(function __upswing_names
   set -l words (commandline -opc)
   if test (count $words) = 1
-    $words[1] -h 2>/dev/null | sed -n '/^Subcommands:/,$s/^  \([a-z]*\) .*/\1/p'
+    $words[1] -h 2>/dev/null | sed -n '/ommands:$/,/^$/s/^  \([a-z]*\) .*/\1/p'
   else
     $words[1] $words[2] --help 2>/dev/null | sed -n 's/^  \(-[^ ]*\) .*/\1/p' | tr , '\n'
   end
