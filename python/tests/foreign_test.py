@@ -544,6 +544,8 @@ class BadInput(InFolder, BadInputTest):
                         with_spaces(action_space=spaces.MultiDiscrete([2, 3])))
         self.refuse_env("env: expected finite bounds of the actions, got Box(-inf, inf",
                         with_spaces(action_space=spaces.Box(-np.inf, np.inf, (1,), np.float32)))
+        self.refuse_env("env: expected lower bounds of the actions below the upper ones, got Box(1.0",
+                        with_spaces(action_space=spaces.Box(1, 1, (1,), np.float32)))
         self.refuse_env("env: expected actions of floating-point numbers",
                         with_spaces(action_space=spaces.Box(0, 9, (1,), np.int64)))
         self.refuse_env("agent: expected an agent of dqn or ppo, because the actions of CartPole-v1",

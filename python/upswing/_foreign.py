@@ -182,9 +182,9 @@ def _symmetric(env: Any) -> Any:
     space = _single(env, "action_space")
     if not isinstance(space, spaces.Box) or space.dtype is None or space.dtype.kind != "f":
         return env
-    finite = np.isfinite(space.low).all() and np.isfinite(space.high).all()
-    if not finite or (space.low == -space.high).all():
-        return env
+    bounded = np.isfinite(space.low).all() and np.isfinite(space.high).all()
+    if not bounded or (space.low >= space.high).any() or (space.low == -space.high).all():
+        return env  # Spaces refuses unusable bounds
     warnings.warn(
         f"env: the bounds of the actions are not symmetric about 0 ({brief(space)}); the policy "
         "acts within -1 and 1: use it with gymnasium.wrappers.RescaleAction(env, -1, 1)",
