@@ -72,18 +72,23 @@ double ScaleOf(const std::string& unit, std::string_view quantity, const std::st
   throw BadInput(Concat(place, "unit: expected ", Join(names, ", "), ", got \"", unit, "\""));
 }
 
+/// A TOML value for an error: a text in quotes, a number or truth value without.
+std::string Shown(const toml::node& node) {
+  const std::string text = TextOf(node).value_or("another type");
+  return node.is_string() ? Concat("\"", text, "\"") : text;
+}
+
 /// The number of a TOML node.
 double NumberIn(const toml::node& node, Range range, const std::string& place) {
   const auto number = node.is_number() ? node.value<double>() : std::nullopt;
   if (number && std::isfinite(*number) && range.Contains(std::abs(*number))) return *number;
   throw BadInput(Concat(place, "expected a number of magnitude ", range.low, " to ", range.high,
-                        ", got ", TextOf(node).value_or("another type")));
+                        ", got ", Shown(node)));
 }
 
 std::string TextIn(const toml::node& node, const std::string& place) {
   if (node.is_string() && !node.as_string()->get().empty()) return node.as_string()->get();
-  throw BadInput(Concat(place, "expected the name of a column in quotes, got ",
-                        TextOf(node).value_or("another type")));
+  throw BadInput(Concat(place, "expected the name of a column in quotes, got ", Shown(node)));
 }
 
 /// Reads `"name"` or `{column = "name", unit = "deg", factor = -1}`. An angle may have the keys
@@ -129,8 +134,7 @@ bool SetColumn(LogColumns& columns, std::string_view key, const toml::node& node
         place, "expected it with an angle, such as angle1 = {column = \"a\", hanging = 180}"));
   } else if (key == "absolute") {
     if (!node.is_boolean()) {
-      throw BadInput(
-          Concat(place, "expected true or false, got ", TextOf(node).value_or("another type")));
+      throw BadInput(Concat(place, "expected true or false, got ", Shown(node)));
     }
     columns.absolute = node.as_boolean()->get();
   } else {

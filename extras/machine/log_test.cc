@@ -307,6 +307,13 @@ TEST(MachineLog, BadColumnFilesGetOneLineWithThePlace) {
             "columns.toml:4: velocity1: expected the name of a column in quotes, got 3");
   EXPECT_EQ(ComplaintAboutColumns(good + "absolute = 1\n"),
             "columns.toml:4: absolute: expected true or false, got 1");
+  EXPECT_EQ(ComplaintAboutColumns(good + "absolute = \"true\"\n"),
+            "columns.toml:4: absolute: expected true or false, got \"true\"");
+  EXPECT_EQ(ComplaintAboutColumns(good + "velocity1 = {column = \"w\", factor = \"-1\"}\n"),
+            "columns.toml:4: velocity1: factor: expected a number of magnitude 1e-09 to 1e+09, got "
+            "\"-1\"");
+  EXPECT_EQ(ComplaintAboutColumns(good + "velocity1 = \"\"\n"),
+            "columns.toml:4: velocity1: expected the name of a column in quotes, got \"\"");
   EXPECT_EQ(ComplaintAboutColumns(good + "absolute = true\nvelocity1 = \"w\"\n"),
             "columns.toml: expected velocity1 and velocity2, or neither, with absolute");
   EXPECT_EQ(ComplaintAboutColumns(good + "hanging = 3\n"),
