@@ -260,8 +260,8 @@ int RunHardware(const HardwareArguments& a) {
 }
 
 /// Scores a competitor by version 2 on machines drawn from a twin's posterior.
-int ScoreOnTwin(const ScoreArguments& a, const Twin& twin, const Competitor& competitor,
-                ThreadPool& pool) {
+void ScoreOnTwin(const ScoreArguments& a, const Twin& twin, const Competitor& competitor,
+                 ThreadPool& pool) {
   const TrialRules rules{.count = static_cast<int>(a.runs),
                          .pushes = !a.no_pushes,
                          .seed = static_cast<uint64_t>(a.seed)};
@@ -281,7 +281,7 @@ int ScoreOnTwin(const ScoreArguments& a, const Twin& twin, const Competitor& com
                                       {"successes", report.successes()},
                                       {"interval", {interval.low, interval.high}},
                                       {"mean_score", report.mean()}}));
-    return 0;
+    return;
   }
   fmt::print(
       "{} on {} of {}{}: {} of {} swing up and stay, {:.1f}% (95%: {:.1f}–{:.1f}%), mean "
@@ -290,12 +290,11 @@ int ScoreOnTwin(const ScoreArguments& a, const Twin& twin, const Competitor& com
       report.pushed ? ", pushed" : "", report.successes(), a.runs,
       100.0 * report.successes() / static_cast<double>(a.runs), 100 * interval.low,
       100 * interval.high, report.mean());
-  return 0;
 }
 
 /// Scores a competitor by version 3, in simulation or on machines drawn from a twin's posterior.
-int ScoreUptimes(const ScoreArguments& a, const std::optional<Twin>& twin,
-                 const Competitor& competitor, ThreadPool& pool) {
+void ScoreUptimes(const ScoreArguments& a, const std::optional<Twin>& twin,
+                  const Competitor& competitor, ThreadPool& pool) {
   const auto seed = static_cast<uint64_t>(a.seed);
   UptimeReport report{competitor, {}};
   {
@@ -314,7 +313,6 @@ int ScoreUptimes(const ScoreArguments& a, const std::optional<Twin>& twin,
     PrintUptimes(report, twin ? Concat("machines of ", Printable(twin->name)) : "simulation",
                  twin.has_value());
   }
-  return 0;
 }
 
 int RunScore(const ScoreArguments& a) {
@@ -334,11 +332,10 @@ int RunScore(const ScoreArguments& a) {
                 BoardCsv(a.version2() ? NominalLog(competitor) : UptimeLog(competitor, seed)));
     if (IsStandardStream(a.csv)) return 0;
   }
-  int code = 0;
   if (!a.version2()) {
-    code = ScoreUptimes(a, twin, competitor, pool);
+    ScoreUptimes(a, twin, competitor, pool);
   } else if (twin) {
-    code = ScoreOnTwin(a, *twin, competitor, pool);
+    ScoreOnTwin(a, *twin, competitor, pool);
   } else {
     const Stopwatch watch;
     BoardReport report;
@@ -352,7 +349,7 @@ int RunScore(const ScoreArguments& a) {
       PrintReport(report, watch.seconds());
     }
   }
-  if (a.as_json) return code;
+  if (a.as_json) return 0;
   if (!twin && !competitor.plant.empty()) {
     fmt::print("  designed for {}, not for the board's plant\n", competitor.plant);
   }
@@ -360,7 +357,7 @@ int RunScore(const ScoreArguments& a) {
     fmt::print("  all machines are equal, because the twin has no [covariance]\n");
   }
   if (!a.csv.empty()) fmt::print("  written {}\n", Printable(a.csv));
-  return code;
+  return 0;
 }
 
 /// Adds the arguments that the commands share. `version`: the default of the rules.
