@@ -193,7 +193,7 @@ void PrintRun(const fs::path& path, bool has_policy) {
                                                      FormatCount(state.best_step)));
 }
 
-/// A policy as JSON; null for what its file does not say.
+/// A policy as JSON; null where its file says nothing.
 ordered_json PolicyJson(const LoadedPolicy& loaded) {
   const Policy& policy = *loaded.policy;
   const PolicyInfo& info = policy.info();
