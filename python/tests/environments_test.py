@@ -326,7 +326,7 @@ class BadInput(BadInputTest):
                 "actions: expected one of continuous, levels": {"actions": "discrete"},
                 "delay: expected a multiple of 0.02": {"delay": 0.03},
                 'mass1: expected a number in [0.01, 100], got "nan"': {"mass1": np.nan},
-                'got "acrobot"; train on Gymnasium': {"agent": "acrobot"},
+                'got "acrobot-v1"; train on Gymnasium': {"agent": "acrobot-v1"},
                 'got "fsat"': {"agent": "fsat"},
                 "render_mode: expected": {"render_mode": "ansi"},
                 "/nothing/here.xml": {"model": "/nothing/here.xml"}}.items():
