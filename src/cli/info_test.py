@@ -52,7 +52,7 @@ class InfoTest(ProgramTest):
         self.refuse(["info", "sax"], "a shipped policy or a controller (d3qn, ", "did you mean sac?")
         self.refuse(["compare", "sac"], "expected runs too, whose episodes sac")
         (self.folder / "sac").mkdir()  # a folder here comes first
-        self.refuse(["info", "sac"], "sac/policy.safetensors: no such file")
+        self.refuse(["info", "sac"], "sac: expected a run with a policy.safetensors, got another folder")
 
     def test_plain_network(self):
         self.succeed(*small(agent="dqn", layer_norm=False))

@@ -164,9 +164,11 @@ LoadedPolicy LoadPolicy(const fs::path& path) {
   fs::path file = path;
   if (fs::is_directory(path)) {
     file = path / RunFolder::kPolicy;
-    if (fs::exists(path / RunFolder::kConfig) && !fs::exists(file)) {
-      throw BadInput(Concat(path.string(), ": expected a run with a policy.safetensors, got one ",
-                            "without; the first evaluation writes it"));
+    if (!fs::exists(file)) {
+      const bool is_run = fs::exists(path / RunFolder::kConfig);
+      throw BadInput(Concat(path.string(), ": expected a run with a policy.safetensors, got ",
+                            is_run ? "one without; the first evaluation writes it"
+                                   : "another folder, which comes before a policy of that name"));
     }
   }
   if (!fs::exists(file)) {
