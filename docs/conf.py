@@ -52,7 +52,21 @@ html_favicon = "_static/icon.svg"
 html_show_sourcelink = False
 html_copy_source = False
 html_show_sphinx = False
-html_theme_options = {"light_logo": "icon.svg", "dark_logo": "icon.svg"}
+FACE = {"font-stack": "'Hanken Grotesk', system-ui, sans-serif"}
+html_theme_options = {  # the page's face and colours (web/src/style)
+    "light_logo": "icon.svg", "dark_logo": "icon.svg",
+    "light_css_variables": FACE | {
+        "color-background-primary": "#fffdf8", "color-background-secondary": "#f4efe4",
+        "color-foreground-primary": "#1a2133", "color-brand-primary": "#08766b",
+        "color-brand-content": "#2456c4", "color-brand-visited": "#2456c4"},
+    "dark_css_variables": FACE | {
+        "color-background-primary": "#0b1020", "color-background-secondary": "#151c30",
+        "color-foreground-primary": "#ecf0f9", "color-brand-primary": "#35d0bd",
+        "color-brand-content": "#82abff", "color-brand-visited": "#82abff"}}
+templates_path = ["_templates"]
+html_sidebars = {"**": ["sidebar/brand.html", "page-link.html", "sidebar/search.html",
+                        "sidebar/scroll-start.html", "sidebar/navigation.html",
+                        "sidebar/scroll-end.html"]}
 
 
 def setup(app):

@@ -30,8 +30,8 @@ test('shares of an axis map to values, and angles repeat after a turn', () => {
 function direct(map: ValueMap, column: number, row: number): number {
   const there = {
     ...STATE,
-    [map.x.name]: valueAt(map.x, (column + 0.5) / map.size),
-    [map.y.name]: valueAt(map.y, (row + 0.5) / map.size),
+    [map.x.name]: valueAt(map.x, (column + 0.5) / map.columns),
+    [map.y.name]: valueAt(map.y, (row + 0.5) / map.columns),
   };
   world.reset(there);
   const { decision } = world;

@@ -3,7 +3,7 @@ import type { Plant, State } from './pendulum';
 import type { World } from './world';
 
 /// A map of the agent's value or torque over two of the four state variables; the others keep their
-/// present values.
+/// present values, or are 0.
 
 export type Variable = keyof State;
 export type Quantity = 'value' | 'torque';
@@ -41,12 +41,13 @@ export function valueOf(decision: Decision): number {
 
 /// A grid that is computed in slices, one at each frame, so that the page stays smooth.
 export class ValueMap {
-  readonly size: number; // cells along a side
+  readonly columns: number;
+  readonly rows: number; // 1: only the middle of y
   x = AXES.q1;
   y = AXES.q2;
   quantity: Quantity = 'value';
   atRest = false; // zero velocities instead of the present ones
-  /// The last complete map (size × size), rows from below: V in units of the network, or torque (N·m).
+  /// The last complete map (rows × columns), from below: V in units of the network, or torque (N·m).
   /// Null before there is one.
   cells: Float32Array | null = null;
   private begun: Float32Array;
@@ -54,9 +55,10 @@ export class ValueMap {
   private around: State | null = null; // values of the other variables
   private plant: Readonly<Plant> | null = null; // of the map in progress
 
-  constructor(size: number) {
-    this.size = size;
-    this.begun = new Float32Array(size * size);
+  constructor(columns: number, rows = columns) {
+    this.columns = columns;
+    this.rows = rows;
+    this.begun = new Float32Array(rows * columns);
   }
 
   /// Drops the map: other axes, another quantity or another agent.
@@ -78,7 +80,7 @@ export class ValueMap {
     this.plant = world.plant;
     this.around ??= this.atRest ? { ...world.state, w1: 0, w2: 0 } : world.state;
     do {
-      const [column, row] = [this.next % this.size, Math.floor(this.next / this.size)];
+      const [column, row] = [this.next % this.columns, Math.floor(this.next / this.columns)];
       const decision = world.decisionAt(this.stateAt(column, row, this.around));
       if (!decision) return null;
       this.begun[this.next] = this.quantity === 'torque' ? decision.torque : valueOf(decision);
@@ -94,8 +96,8 @@ export class ValueMap {
   private stateAt(column: number, row: number, around: State): State {
     return {
       ...around,
-      [this.x.name]: valueAt(this.x, (column + 0.5) / this.size),
-      [this.y.name]: valueAt(this.y, (row + 0.5) / this.size),
+      [this.x.name]: valueAt(this.x, (column + 0.5) / this.columns),
+      [this.y.name]: valueAt(this.y, (row + 0.5) / this.rows),
     };
   }
 }

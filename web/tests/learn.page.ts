@@ -234,7 +234,6 @@ test("the default agent's checkpoints, from untrained to final, are fetched on d
   const scrub = page.locator('#learn-scrub');
   // Its tests continued after its best policy, with episodes longer than a trial.
   await expect(scrub).toHaveAttribute('max', '250016');
-  await expect(page.locator('#learn-return-of')).toHaveText('in a test');
   await expect(page.getByRole('button', { name: 'Share this training' })).toBeDisabled();
   await stopTime(page);
   expect(await successes()).toBe(5);
@@ -472,6 +471,25 @@ test("a finger holds the slider under the chart, and the numbers match the worke
   await page.getByRole('link', { name: 'Learn', exact: true }).click();
   await expect(status(page)).toHaveText(/^(Learning …|Solved after)/); // it went on
   await page.evaluate(() => upswing.learn.stop());
+});
+
+test('a race waits for a bet, trains both sides and can be shared', async ({ stage: page }) => {
+  await open(page, '#learn=fast&seed=7&balance_weight=4&rival=dqn');
+  const [one, two] = [page.locator('#race-one'), page.locator('#race-two')];
+  await expect(one).toHaveText('Dueling Double DQN (balance weight 4)');
+  await expect(two).toHaveText('DQN');
+  expect(page.workers().length).toBe(0);
+  await two.click();
+  await expect(two).toHaveAttribute('aria-pressed', 'true');
+  await expect(page.locator('#race-result')).toHaveText('0 of 6 trainings have ended.');
+  expect(page.workers().length).toBe(6);
+  await expect(page.getByRole('radio', { name: 'DQN, seed 9' })).toBeVisible();
+  await expect(page).toHaveURL(/#learn=fast&seed=7&balance_weight=4&rival=dqn$/);
+  await expect(page.locator('.of-race')).toBeVisible();
+  await page.evaluate(() => upswing.learn.stop());
+  await expect(page.locator('#race-result')).toHaveText('The race was ended.');
+  await page.locator('#learn-rival').selectOption('');
+  await expect(page.locator('#race')).toBeHidden();
 });
 
 test('an agent chosen before the first report stays', async ({ stage: page }) => {

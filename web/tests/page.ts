@@ -37,11 +37,16 @@ interface Kept {
 ///
 /// `page` has its own browser context, and open() loads it. Tests that are not about loading take
 /// `stage`: one page for all tests of a Playwright worker, which open() only resets. Loading takes
-/// twenty times as long.
-export const test = base.extend<{ complains: boolean; stage: Page }, { kept: Kept }>({
+/// twenty times as long. With `smooth`, `page` draws at each frame of the screen.
+interface Options {
+  complains: boolean;
+  smooth: boolean;
+}
+export const test = base.extend<Options & { stage: Page }, { kept: Kept }>({
   complains: [false, { option: true }],
-  context: async ({ context, complains }, use) => {
-    await context.addInitScript(drawSeldom);
+  smooth: [false, { option: true }],
+  context: async ({ context, complains, smooth }, use) => {
+    if (!smooth) await context.addInitScript(drawSeldom);
     const complaints = complaintsOf(context);
     await use(context);
     if (!complains) expect(complaints).toEqual([]);

@@ -17,7 +17,7 @@ async function countFrames(page: Page): Promise<() => Promise<number>> {
   return () => page.evaluate(() => (globalThis as never as { framesAsked: number }).framesAsked);
 }
 
-/// Waits until the page has requested no frame for half a second, five times as long as a frame takes.
+/// Waits until the page has requested no frame for half a second, many times as long as a frame takes.
 async function settle(frames: () => Promise<number>): Promise<number> {
   let before = -1;
   await expect(async () => {
@@ -28,6 +28,9 @@ async function settle(frames: () => Promise<number>): Promise<number> {
   }).toPass({ intervals: [500] });
   return before;
 }
+
+// A page comes to rest after a number of frames.
+test.use({ smooth: true });
 
 test('a paused page asks for no frame until something changes', async ({ page }) => {
   await open(page, '#agent=fast&on=1');

@@ -1,3 +1,4 @@
+import { CONTROL_PERIOD } from '../pendulum';
 import type { Curve } from '../view/charts';
 
 /// A policy from some step of a training.
@@ -8,13 +9,22 @@ export interface Checkpoint {
   after?: { trials: number; updates: number; seconds: number };
 }
 
+/// Control steps of a trial (4 s), and of a test (10 s).
+export const TRIAL_STEPS = 4 / CONTROL_PERIOD;
+const TEST_STEPS = 10 / CONTROL_PERIOD;
+
+export interface Episode {
+  step: number; // of the training, at its end
+  reward: number; // mean of its steps
+}
+
 /// A training as the chart draws it and the scrubber moves through it.
 export interface Course {
   readonly name: string; // for the list of trainings
   readonly steps: number; // so far
   readonly running: boolean;
   /// Episodes of the training, called trials on the page. (Attempts are those on the stage.)
-  readonly episodes: readonly { step: number; return: number }[];
+  readonly episodes: readonly Episode[];
   readonly evaluations: readonly { step: number; success: number }[];
   readonly checkpoints: readonly Checkpoint[]; // the untrained policy first
   readonly newest: Checkpoint | null;
@@ -25,7 +35,7 @@ export interface Course {
 export class Recording implements Course {
   readonly name: string;
   readonly running = false;
-  readonly episodes: readonly { step: number; return: number }[];
+  readonly episodes: readonly Episode[];
   readonly evaluations: readonly { step: number; success: number }[];
   readonly checkpoints: readonly Checkpoint[];
 
@@ -37,7 +47,7 @@ export class Recording implements Course {
     fetch: (file: string) => Promise<ArrayBuffer>,
   ) {
     this.name = name;
-    this.episodes = steps.map((step, i) => ({ step, return: mean_return[i]! }));
+    this.episodes = steps.map((step, i) => ({ step, reward: mean_return[i]! / TEST_STEPS }));
     this.evaluations = steps.map((step, i) => ({ step, success: success_rate[i]! }));
     this.checkpoints = files.map(({ step, file }) => ({ step, file: once(() => fetch(file)) }));
   }

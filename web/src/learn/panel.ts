@@ -13,6 +13,8 @@ import { film, filmType } from './film';
 import { Filmstrip } from './filmstrip';
 import { Knobs, LEARNERS } from './knobs';
 import './learn.css';
+import { nameOf as contenderOf, RACE_SEEDS } from './race';
+import { RacePanel } from './race_panel';
 import { decodeRecipe, encodeRecipe, LARGEST_SEED } from './recipe';
 import { Scrubber } from './scrubber';
 import type { LearnStage } from './scrubber';
@@ -22,10 +24,10 @@ import { Session } from './session';
 /// recorded training of the default agent can be shown instead.
 
 const SEEDS_AT_ONCE = 4;
-/// Smallest returns of a trial of 4 s that prove balancing. A step earns at most 1.5 for energy and
-/// 1 for height, and 5 more only while both links are up.
-const DOWN = (2.5 * 4) / CONTROL_PERIOD;
-const UP = 5 / CONTROL_PERIOD; // for a second
+/// Smallest rewards per step of a trial of 4 s that prove balancing. A step earns at most 1.5 for
+/// energy and 1 for height, and 5 more only while both links are up.
+const DOWN = 2.5;
+const UP = 5 / 4; // for a second
 const PROOFS = [
   [DOWN + 2 * UP, 'for two seconds'],
   [DOWN + UP, 'for a second'],
@@ -63,6 +65,8 @@ export class LearnPanel {
   private readonly agent = element<HTMLSelectElement>('learn-agent');
   private readonly scrubber: Scrubber;
   private readonly strip: Filmstrip;
+  private readonly race: RacePanel;
+  private rival: string | undefined; // of the race that is shown
   private sessions: Session[] = [];
   private recording: Recording | null = null; // null: not requested
   private readonly taken = new WeakSet<Session>(); // policy taken over already
@@ -74,6 +78,10 @@ export class LearnPanel {
   constructor(page: LearnPage, recorded: string) {
     this.page = page;
     this.strip = new Filmstrip(page.world);
+    this.race = new RacePanel(
+      () => this.start(),
+      () => this.offerRace(),
+    );
     this.scrubber = new Scrubber(page, () => this.draw());
     button('learn-start', () => this.toggle());
     button('learn-again', () => this.start());
@@ -86,6 +94,7 @@ export class LearnPanel {
     button('learn-recorded', () => this.showRecording(recorded));
     element('learn-recorded').hidden = page.agents.recording(recorded) === null;
     this.agent.addEventListener('change', () => this.knobs.show(this.agent.value));
+    element('learn-panel').addEventListener('change', () => this.offerRace());
     const untrained = element<HTMLInputElement>('learn-untrained');
     untrained.addEventListener('change', () => void this.scrubber.showUntrained(untrained.checked));
     this.scrub.addEventListener('input', () => {
@@ -116,15 +125,37 @@ export class LearnPanel {
   start(): void {
     if (!this.knobs.check()) return;
     for (const session of this.sessions) session.stop();
-    const count = this.four.checked ? SEEDS_AT_ONCE : 1;
+    const { rival } = this.race;
+    const count = rival ? RACE_SEEDS : this.four.checked ? SEEDS_AT_ONCE : 1;
     const largest = LARGEST_SEED - (count - 1);
     const first = Math.min(Math.max(Math.round(Number(this.seed.value)) || 0, 0), largest);
     this.seed.value = String(first);
-    this.sessions = Array.from(
-      { length: count },
-      (_, i) => new Session(this.agent.value, first + i, this.knobs.changed, () => this.news()),
-    );
+    const own = { agent: this.agent.value, settings: this.knobs.changed };
+    this.sessions = [own, ...(rival ? [rival] : [])].flatMap(({ agent, settings }, side) => {
+      const contender = rival ? { name: contenderOf(agent, settings), side } : null;
+      return Array.from({ length: count }, (_, i) => {
+        const recipe = { agent, seed: first + i, settings };
+        return new Session(recipe, () => this.news(), contender);
+      });
+    });
+    this.rival = rival?.id;
+    this.race.begun();
     this.choose(this.sessions[0]!);
+  }
+
+  /// Offers a bet on a race of the chosen settings, if a rival is chosen.
+  private offerRace(): void {
+    this.race.offer(this.agent.value, this.knobs.changed);
+    this.four.disabled = this.race.rival !== null;
+  }
+
+  /// Both sides of the race that is shown; null without a race.
+  private get sides(): [Session[], Session[]] | null {
+    if (!this.rival || !this.session) return null;
+    return [0, 1].map((side) => this.sessions.filter((one) => one.side === side)) as [
+      Session[],
+      Session[],
+    ];
   }
 
   /// Starts the training of an address, unless it is shown already. Returns the problems of the
@@ -133,21 +164,29 @@ export class LearnPanel {
     const { recipe, problems } = decodeRecipe(hash, LEARNERS, (agent) =>
       this.knobs.settingsOf(agent),
     );
-    const known = this.sessions.some((one) => recipe && encodeRecipe(one) === encodeRecipe(recipe));
+    const same = (one: Session) =>
+      recipe !== null && encodeRecipe({ ...one, rival: this.rival }) === encodeRecipe(recipe);
+    const known = this.sessions.some(same);
     if (recipe && !known) {
       this.four.checked = false;
       this.agent.value = recipe.agent;
       this.knobs.show(recipe.agent);
       this.knobs.set(recipe.settings);
       this.seed.value = String(recipe.seed);
-      if (!prefersStill()) this.start();
+      this.race.choose(recipe.rival);
+      this.offerRace();
+      if (!prefersStill() && !recipe.rival) this.start(); // a race waits for a bet
     }
     return problems;
   }
 
   /// The shown training as the part of an address after #; without a training, only the view.
   get address(): string {
-    return this.session ? encodeRecipe(this.session) : 'learn';
+    const { session, rival, race } = this;
+    if (session) return encodeRecipe(rival ? { ...this.sessions[0]!, rival } : session);
+    if (!race.rival) return 'learn';
+    const [agent, seed] = [this.agent.value, Number(this.seed.value)];
+    return encodeRecipe({ agent, seed, settings: this.knobs.changed, rival: race.rival.id });
   }
 
   /// Ends all trainings.
@@ -283,6 +322,7 @@ export class LearnPanel {
     const question = `This replaces your own policy, ${ownName}, in this browser. Replace it?`;
     if (!file || (ownName !== null && !ownIsLearned && !confirm(question))) return;
     if (await this.page.keepLearned(file, true)) this.scrubber.again();
+    this.draw();
     note('It stays in this browser. The lists of agents mark it with "(yours)".');
   }
 
@@ -329,6 +369,13 @@ export class LearnPanel {
     return session && shown ? fileOf(session, shown) : null;
   }
 
+  /// Whether the policy on the stage is the visitor's own already.
+  private get isKept(): boolean {
+    const { session, scrubber, page } = this;
+    const shown = this.isAtNewest ? session?.newest : scrubber.checkpoint;
+    return shown !== undefined && shown !== null && page.agents.ownName === nameOf(session!, shown);
+  }
+
   /// Whether numbers and file belong to the newest policy: it is followed, or another agent is on
   /// the stage.
   private get isAtNewest(): boolean {
@@ -356,12 +403,16 @@ export class LearnPanel {
     const { session, scrubber } = this;
     const { course, onStage } = scrubber;
     this.drawnOnStage = onStage;
-    this.chart.draw(
-      course && !session ? [course] : this.sessions,
-      course,
-      onStage ? scrubber.step : null,
-    );
-    element('learn-return-of').textContent = course && !session ? 'in a test' : 'of a trial';
+    const { sides } = this;
+    if (sides) this.chart.drawRace(sides);
+    else
+      this.chart.draw(
+        course && !session ? [course] : this.sessions,
+        course,
+        onStage ? scrubber.step : null,
+      );
+    this.race.show(sides);
+    element('learn-figure').toggleAttribute('data-race', sides !== null);
     this.strip.show(session?.state === 'finished' ? session : null);
     const running = this.active.length > 0;
     const label = this.paused ? 'Resume training' : running ? 'Pause training' : 'Learn';
@@ -369,8 +420,15 @@ export class LearnPanel {
     element<HTMLButtonElement>('learn-again').disabled = this.sessions.length === 0;
     const has = session !== null && session.policy !== null;
     element<HTMLButtonElement>('learn-save').disabled = !has;
-    element<HTMLButtonElement>('learn-keep').disabled = !has;
-    element<HTMLButtonElement>('learn-share').disabled = session === null;
+    element<HTMLButtonElement>('learn-keep').disabled = !has || this.isKept;
+    // A sign of a training that goes on while something else is shown.
+    const goesOn = running && !this.paused;
+    document.documentElement.toggleAttribute('data-training', goesOn);
+    const link = document.querySelector<HTMLElement>('nav a[href="#learn"]')!;
+    link.title = goesOn ? 'A training is running' : '';
+    const share = element<HTMLButtonElement>('learn-share');
+    share.disabled = session === null;
+    share.textContent = sides ? 'Share this race' : 'Share this training';
     this.scrub.disabled = !course || course.checkpoints.length < 2;
     if (!course) return;
     const outputs = [...element('learn-courses').querySelectorAll('output')];
@@ -417,11 +475,15 @@ export class LearnPanel {
   }
 }
 
-function fileOf({ agent, seed, newest, state }: Session, { file, step }: Checkpoint): File | null {
-  if (!(file instanceof ArrayBuffer)) return null;
+function fileOf(session: Session, shown: Checkpoint): File | null {
+  const { file } = shown;
+  return file instanceof ArrayBuffer ? new File([file], nameOf(session, shown)) : null;
+}
+
+/// The name of a kept policy.
+function nameOf({ agent, seed, newest, state }: Session, { step }: Checkpoint): string {
   const isLast = state === 'finished' && step === newest?.step;
-  const earlier = isLast ? '' : `, ${step.toLocaleString('en')} steps`;
-  return new File([file], `learned here, ${agent}, seed ${seed}${earlier}`);
+  return `learned here, ${agent}, seed ${seed}${isLast ? '' : `, ${step.toLocaleString('en')} steps`}`;
 }
 
 const OF_RECORDING =
@@ -456,7 +518,7 @@ function milestone(session: Session): string {
   // With other reward weights, returns prove nothing.
   if (Object.keys(settings).some((name) => name.endsWith('_weight'))) return 'Learning …';
   for (const [proof, long] of PROOFS) {
-    const trial = episodes.findIndex((episode) => episode.return > proof);
+    const trial = episodes.findIndex(({ reward }) => reward > proof);
     if (trial >= 0) return `Upright ${long}: trial ${trial + 1}.`;
   }
   return 'Learning …';

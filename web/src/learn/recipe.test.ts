@@ -20,6 +20,12 @@ test('a recipe survives its address', () => {
   expect(decode(`#${encodeRecipe(recipe)}`)).toEqual({ recipe, problems: [] });
 });
 
+test('a race survives its address', () => {
+  const recipe = { agent: 'fast', seed: 1, settings: {}, rival: 'dqn' };
+  expect(encodeRecipe(recipe)).toBe('learn=fast&seed=1&rival=dqn');
+  expect(decode(`#${encodeRecipe(recipe)}`)).toEqual({ recipe, problems: [] });
+});
+
 test('an address with only the view is no recipe', () => {
   expect(decode('#learn')).toEqual({ recipe: null, problems: [] });
 });
@@ -31,6 +37,7 @@ test.each([
   ['learn=fast&gamma=2', {}, 'gamma: expected a number from 0 to 1, got "2"'],
   ['learn=fast&gamma=', {}, 'gamma: expected a number from 0 to 1, got ""'],
   ['learn=fast&double=1', {}, 'double: expected true or false, got "1"'],
+  ['learn=fast&rival=x', {}, 'rival: expected dqn, double, dueling, d3qn, sac, got "x"'],
   ['learn=fast&steps=1', {}, 'unknown setting "steps"'],
 ])('%s is refused in a line', (hash, settings, problem) => {
   const { recipe, problems } = decode(hash);

@@ -1,18 +1,21 @@
 import { quoted } from '../text';
 import type { LearnSettings, Setting } from './learner';
+import { RIVALS } from './race';
 
 /// A recipe gives the same agent, bit for bit, in any browser.
 export interface Recipe {
   agent: string;
   seed: number;
   settings: LearnSettings; // only changes of the agent's own settings
+  rival?: string | undefined; // ID of an agent to race against
 }
 
 export const LARGEST_SEED = 1e9;
 
 /// The part of an address after #, such as learn=fast&seed=42&balance_weight=0.
-export function encodeRecipe({ agent, seed, settings }: Recipe): string {
-  return new URLSearchParams({ learn: agent, seed: String(seed), ...settings }).toString();
+export function encodeRecipe({ agent, seed, settings, rival }: Recipe): string {
+  const fields = { learn: agent, seed: String(seed), ...settings, ...(rival ? { rival } : {}) };
+  return new URLSearchParams(fields).toString();
 }
 
 /// Reads such an address. Null if it names none of the `agents` that can learn here. `settingsOf`
@@ -34,15 +37,24 @@ export function decodeRecipe(
   const problems: string[] = [];
   const settings: Record<string, string> = {};
   let seed = 1;
+  let rival: string | undefined;
   for (const [name, text] of fields) {
     if (name === 'learn') continue;
+    if (name === 'rival' && RIVALS.some(({ id }) => id === text)) {
+      rival = text;
+      continue;
+    }
     const range = name === 'seed' ? SEED : known.find((one) => one.name === name);
-    const problem = range ? problemOf(range, text) : `unknown setting ${quoted(name)}`;
+    const problem = range
+      ? problemOf(range, text)
+      : name === 'rival'
+        ? `rival: expected ${RIVALS.map(({ id }) => id).join(', ')}, got ${quoted(text)}`
+        : `unknown setting ${quoted(name)}`;
     if (problem) problems.push(problem);
     else if (name === 'seed') seed = Number(text);
     else settings[name] = text;
   }
-  return { recipe: { agent, seed, settings }, problems };
+  return { recipe: { agent, seed, settings, ...(rival ? { rival } : {}) }, problems };
 }
 
 const SEED = { name: 'seed', value: '1', low: 0, high: LARGEST_SEED, whole: true };

@@ -1,21 +1,23 @@
 import { coreModule } from '../core';
 import type { LearnSettings, Report } from './learner';
-import type { Checkpoint, Course } from './course';
+import type { Recipe } from './recipe';
+import { TRIAL_STEPS } from './course';
+import type { Checkpoint, Course, Episode } from './course';
 import type { News, Order } from './worker';
 
-const APART = 1500; // steps between checkpoints, at first
 const MOST = 64; // checkpoints; when reached, every other one is removed
 
 /// A training in its own worker, with its results.
 export class Session implements Course {
   readonly name: string;
+  readonly side: number; // in a race, 0 or 1
   readonly agent: string;
   readonly seed: number;
   readonly settings: LearnSettings;
   state: 'starting' | 'learning' | 'paused' | 'finished' | 'failed' | 'stopped' = 'starting';
   reason = ''; // why it failed
   last: Report | null = null;
-  readonly episodes: { step: number; return: number }[] = [];
+  readonly episodes: Episode[] = [];
   readonly evaluations: { step: number; success: number; return: number }[] = [];
   checkpoints: Checkpoint[] = [];
   policy: ArrayBuffer | null = null; // latest one
@@ -23,13 +25,18 @@ export class Session implements Course {
   poses: Float32Array = new Float32Array(); // q1, q2 (rad) of each training pendulum
   updatesPerSecond = 0; // lately, evaluations included
   seconds = 0; // of the worker, without pauses
-  private apart = APART;
+  private apart = 0; // steps between checkpoints
   private readonly worker: Worker;
   private readonly onNews: () => void;
 
-  /// `onNews`: called after each change.
-  constructor(agent: string, seed: number, settings: LearnSettings, onNews: () => void) {
-    this.name = `seed ${seed}`;
+  /// `contender`: its name and side in a race. `onNews`: called after each change.
+  constructor(
+    { agent, seed, settings }: Recipe,
+    onNews: () => void,
+    contender: { name: string; side: number } | null = null,
+  ) {
+    this.name = contender ? `${contender.name}, seed ${seed}` : `seed ${seed}`;
+    this.side = contender?.side ?? 0;
     this.agent = agent;
     this.seed = seed;
     this.settings = settings;
@@ -38,7 +45,11 @@ export class Session implements Course {
     this.worker.onmessage = ({ data }: MessageEvent<News>) => this.hear(data);
     this.worker.onerror = (event) => {
       event.preventDefault();
-      this.fail('its worker could not start, or broke off');
+      this.fail(
+        navigator.onLine
+          ? 'its worker could not start, or broke off'
+          : 'the device is offline, and this part of the page has not been loaded yet',
+      );
     };
     this.tell({ kind: 'start', module: coreModule(), agent, seed, settings });
   }
@@ -94,7 +105,7 @@ export class Session implements Course {
   private hear(news: News): void {
     if (news.kind === 'failed') return this.fail(news.reason);
     if (news.kind === 'poses') return void (this.poses = news.poses);
-    const { report, policy, best, seconds } = news;
+    const { report, policy, best, seconds, isMark } = news;
     if (this.last && seconds > this.seconds) {
       const rate = (report.updates - this.last.updates) / (seconds - this.seconds);
       this.updatesPerSecond += 0.3 * (rate - this.updatesPerSecond);
@@ -102,11 +113,13 @@ export class Session implements Course {
     this.seconds = seconds;
     this.last = report;
     this.policy = policy;
-    this.episodes.push(...report.episodes);
+    for (const { step, return: sum } of report.episodes)
+      this.episodes.push({ step, reward: sum / TRIAL_STEPS });
     this.evaluations.push(...report.evaluations);
     if (best) this.best = best;
     const { steps: step, episodeCount: trials, updates } = report;
-    this.keep({ step, file: policy, after: { trials, updates, seconds } }, report.finished);
+    const checkpoint = { step, file: policy, after: { trials, updates, seconds } };
+    if (isMark) this.keep(checkpoint, report.finished);
     if (report.finished) {
       this.state = 'finished';
       this.worker.terminate();
@@ -116,12 +129,13 @@ export class Session implements Course {
     this.onNews();
   }
 
+  /// Keeps the same checkpoints of a seed each time.
   private keep(checkpoint: Checkpoint, always: boolean): void {
     const before = this.checkpoints.at(-1);
     if (before && !always && checkpoint.step - before.step < this.apart) return;
     this.checkpoints.push(checkpoint);
     if (this.checkpoints.length <= MOST) return;
     this.checkpoints = this.checkpoints.filter((_, i) => i % 2 === 0);
-    this.apart *= 2;
+    this.apart = this.checkpoints[1]!.step - this.checkpoints[0]!.step;
   }
 }

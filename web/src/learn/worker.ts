@@ -6,6 +6,8 @@ import type { LearnSettings, Report } from './learner';
 
 const SLICE = 30; // ms between checks for messages
 const REPORT_INTERVAL = 200; // ms between snapshots of the policy
+const PART = 4; // steps of all environments between looks at the clock
+const MARK = 12; // parts between the snapshots that every training with this seed makes
 
 export type Order =
   | {
@@ -24,6 +26,7 @@ export type News =
       policy: ArrayBuffer;
       best: ArrayBuffer | null;
       seconds: number; // including evaluations, without pauses
+      isMark: boolean; // whether every training with this seed makes this snapshot
     }
   | { kind: 'poses'; poses: Float32Array<ArrayBuffer> } // q1, q2 of each pendulum (rad)
   | { kind: 'failed'; reason: string };
@@ -35,8 +38,9 @@ let reportedAt = 0; // ms, time of the last report
 let ranBefore = 0; // ms, before the last pause
 let resumedAt = 0; // ms, time of the start or the last resumption
 let bestStep = 0;
+let parts = 0; // run so far
 
-function sendReport(): void {
+function sendReport(isMark: boolean): void {
   const report = learner!.report();
   const policy = learner!.policy();
   // The best policy, only when it is a new one.
@@ -44,7 +48,7 @@ function sendReport(): void {
   bestStep = report.bestStep;
   reportedAt = performance.now();
   const seconds = (ranBefore + reportedAt - resumedAt) / 1000;
-  send({ kind: 'report', report, policy, best, seconds }, best ? [policy, best] : [policy]);
+  send({ kind: 'report', report, policy, best, seconds, isMark }, best ? [policy, best] : [policy]);
 }
 
 function show(): void {
@@ -63,8 +67,11 @@ function work(): void {
   try {
     const begin = performance.now();
     let more = true;
-    while (more && performance.now() - begin < SLICE) more = learner.run(4);
-    if (!more || performance.now() - reportedAt >= REPORT_INTERVAL) sendReport();
+    while (more && performance.now() - begin < SLICE) {
+      more = learner.run(PART);
+      if (more && ++parts % MARK === 0) sendReport(true);
+    }
+    if (!more || performance.now() - reportedAt >= REPORT_INTERVAL) sendReport(!more);
     if (more) show();
     if (more) schedule();
     else end();
@@ -103,7 +110,7 @@ onmessage = async ({ data }: MessageEvent<Order>): Promise<void> => {
   try {
     learner = new Learner(await Core.start(module), agent, seed, settings);
     resumedAt = performance.now();
-    sendReport();
+    sendReport(true);
   } catch (error) {
     return fail(error);
   }

@@ -302,6 +302,7 @@ export class Agents {
     const bytes = await file.arrayBuffer().catch(() => {
       throw new BadInput('it cannot be read');
     });
+    if (!isSafetensors(bytes)) throw new BadInput('it is not a safetensors file');
     const own = { name: file.name, bytes, learned };
     const agent = this.addOwn(own);
     this.own = own;
@@ -334,6 +335,13 @@ export class Agents {
     this.loaded.set(agent.id, agent);
     return agent;
   }
+}
+
+/// Whether a file begins as a safetensors file: the length of a header that it can hold, then {.
+function isSafetensors(bytes: ArrayBuffer): boolean {
+  if (bytes.byteLength < 9) return false;
+  const view = new DataView(bytes);
+  return view.getBigUint64(0, true) <= bytes.byteLength - 8 && view.getUint8(8) === 0x7b;
 }
 
 async function fetchPolicy(file: string): Promise<ArrayBuffer> {

@@ -20,7 +20,9 @@ export async function fetchBytes(
       throw new BadInput(
         abort.signal.aborted
           ? `${address}: nothing arrived for ${PATIENCE} s`
-          : `${address} cannot be fetched`,
+          : navigator.onLine
+            ? `${address} cannot be fetched`
+            : `${address} cannot be fetched, because the device is offline`,
       );
     }
   };

@@ -1,6 +1,8 @@
 import { element } from './dom';
 import { prefersStill } from './motion';
 
+const SECONDS_TO_TRY = 12; // until an example shows its result
+
 /// Room for three columns; the same width as in style/page.css.
 const wide = matchMedia('(min-width: 75em)');
 
@@ -42,6 +44,7 @@ export function listenToExamples(again: () => void): void {
     const link = (event.target as HTMLElement).closest<HTMLAnchorElement>('a[href^="#"]');
     if (!link) return;
     showStage();
+    setTimeout(() => (link.dataset.tried = ''), 1000 * SECONDS_TO_TRY);
     if (link.hash === location.hash) again();
   });
 }

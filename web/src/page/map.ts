@@ -9,8 +9,8 @@ import { Scale } from '../view/scale';
 import type { World } from '../world';
 import { element } from './dom';
 
-const CELLS = 36; // along a side
-const MILLISECONDS = 2; // per frame
+const CELLS = 72; // along a side
+const MILLISECONDS = 3; // per frame
 const FRAMES = 3; // drawn at each third frame, computed at the others
 const WAY = 4; // s of the trajectory to draw
 const MARKS = 24; // steps of the mark along a side
@@ -32,14 +32,13 @@ export class MapPanel {
   };
   private policy: Policy | null = null; // of the map
   private key = ''; // state and plant of the complete map
-  private mixed = false; // whether the policy has changed since the map was begun
   private seen = false; // on the screen
   /// Whether the map still has to be computed for the present state.
   busy = false;
   private range: [number, number] = [0, 1];
   private frame = 0;
   private mark: [number, number] | null = null; // shares of both axes, moved by keys
-  private readonly scales = [...document.querySelectorAll<HTMLElement>('.scale')].map(
+  private readonly scales = [...document.querySelectorAll<HTMLElement>('.scale:not(.of-ring)')].map(
     (place) => new Scale(place),
   );
 
@@ -88,28 +87,24 @@ export class MapPanel {
     return this.chart.canvas;
   }
 
-  /// Uses the map as the background of the stage, with poses at rest. With `learning` it shows only
-  /// colours, of the training's latest policy.
-  ground(is: boolean, learning: boolean): void {
-    if (is !== this.map.atRest) this.reset();
-    if (is !== this.map.atRest || learning !== this.chart.bare) this.clear();
-    this.map.atRest = is;
-    if (this.chart.bare === learning) return;
-    this.chart.bare = learning;
-    this.canvas.element.tabIndex = learning ? -1 : 0; // behind the pendulum it is a picture
-    this.canvas.element.ariaHidden = String(learning);
+  /// Shows poses at rest, or with the present velocities.
+  set atRest(rest: boolean) {
+    if (rest === this.map.atRest) return;
+    this.map.atRest = rest;
+    this.reset();
+  }
+
+  /// Values at the ends of the colours; null: no map of the value is on the screen.
+  get valueRange(): [number, number] | null {
+    const { map } = this;
+    return this.seen && map.cells && map.quantity === 'value' ? this.range : null;
   }
 
   /// Call at each frame.
   draw(world: World, history: History): void {
     this.busy = false;
     if (!this.seen || !world.policy) return;
-    if (this.policy !== world.policy) {
-      // A training brings policies faster than a map is complete, so the map mixes policies and is
-      // computed once more.
-      if (this.chart.bare && this.policy) this.mixed = true;
-      else this.clear();
-    }
+    if (this.policy !== world.policy) this.clear();
     this.policy = world.policy;
     if (!world.policy.isQuick) {
       element('map-value').textContent = 'not for one that plans';
@@ -129,14 +124,13 @@ export class MapPanel {
       const rest = map.atRest ? { w1: 0, w2: 0 } : {};
       return JSON.stringify([{ ...state, ...rest, [map.x.name]: 0, [map.y.name]: 0 }, plant]);
     };
-    if (map.cells && !this.mixed && keyOf(world.state) === this.key) {
+    if (map.cells && keyOf(world.state) === this.key) {
       this.busy = false;
       return;
     }
     const begunIn = map.work(world, MILLISECONDS);
     if (!begunIn) return;
-    this.key = this.mixed ? '' : keyOf(begunIn);
-    this.mixed = false;
+    this.key = keyOf(begunIn);
     const [low, high] = (this.range = this.rangeOf(map.cells!, world));
     const known = Number.isFinite(high - low);
     element('map-value').textContent = known ? this.said(world) : 'not estimated';

@@ -4,6 +4,7 @@ import { LearnPanel } from '../learn/panel';
 import type { State } from '../pendulum';
 import type { Mujoco } from '../mujoco';
 import { Scene, TRAIL_SECONDS } from '../view/scene';
+import { quoted } from '../text';
 import type { World } from '../world';
 import { Address } from './address';
 import { AgentPanel } from './agent_panel';
@@ -17,11 +18,12 @@ import { Hand } from './hand';
 import { listenToKeys } from './keys';
 import { listenToExamples, placeCharts } from './layout';
 import { MapPanel } from './map';
-import { warn } from './message';
+import { note, warn } from './message';
 import { prefersStill } from './motion';
 import { lightNouns } from './nouns';
 import { Pose } from './pose';
 import { save } from './save';
+import { Ring } from './ring';
 import { RANGES, Settings } from './settings';
 import { BEGINNING, decode, disturbanceOf, encode, OWN, problemText } from './share';
 import type { Shared } from './share';
@@ -46,6 +48,7 @@ export class Page {
   private readonly badge = new Badge();
   private readonly dashboard = new Dashboard();
   private readonly map = new MapPanel((where) => this.start(where));
+  private readonly ring = new Ring(document.querySelectorAll('.scale.of-ring'));
   readonly learn: LearnPanel;
   private readonly tour: Tour;
   readonly twin: Twin;
@@ -78,7 +81,7 @@ export class Page {
         this.changed();
       },
       listed: () => this.twin.list(),
-      brought: (file) => void this.openFile(file),
+      brought: (file) => void this.bring(file),
     });
     this.learn = new LearnPanel(this, agents.list[0]!.id);
     this.tour = new Tour(
@@ -189,7 +192,7 @@ export class Page {
       warn('The pendulum spun too fast to be computed; it hangs again.');
     }
     this.draw();
-    if (this.map.busy) this.frames.wake();
+    if (this.map.busy || this.ring.busy) this.frames.wake();
   }
 
   /// Changes to another agent. If it cannot be loaded, shows the reason, keeps the old one and
@@ -207,6 +210,12 @@ export class Page {
     return true;
   }
 
+  /// Takes a file that the visitor opened or dropped, and says so.
+  private async bring(file: File): Promise<void> {
+    if (!(await this.openFile(file))) return;
+    note(`${quoted(this.agents.ownName!)} is the agent now. It stays in this browser.`);
+  }
+
   /// Call when a training has begun: the address becomes its recipe.
   learned(): void {
     this.arranged();
@@ -217,8 +226,8 @@ export class Page {
   private arranged(): void {
     const { view, step } = document.documentElement.dataset;
     this.learning = view === 'learn' || step === 'learn';
-    this.map.ground(view !== 'everything', this.learning);
-    this.map.canvas.element.toggleAttribute('data-idle', this.learning && !this.learn.begun);
+    this.map.atRest = view !== 'everything';
+    this.ring.shown = (this.learning && this.learn.begun) || step === 'map';
     if (!this.learning) this.learn.leave();
   }
 
@@ -387,6 +396,8 @@ export class Page {
 
   private draw(): void {
     const { world } = this;
+    this.ring.follow(world, this.map.valueRange);
+    this.scene.ring = this.ring.colors;
     const trail = prefersStill() ? [] : this.history.from(world.time - TRAIL_SECONDS);
     this.scene.draw(world, this.clock.state, trail);
     this.twin.draw(this.clock, prefersStill());

@@ -251,7 +251,7 @@ function verdictOf(onMany: boolean, one: number, many: number, raced: number): s
 }
 
 const RIGHT = 'You were right';
-const LOST = 'You lost';
+export const LOST = 'You lost';
 const MANY_HOLDS = 'only the agent that learned on many balances it.';
 const ONE_HOLDS = 'only the agent that learned on one balances it.';
 const BOTH_HOLD = 'A draw: both balance it.';

@@ -1,7 +1,7 @@
 import type { Moment, World } from '../world';
 import { button, element, write } from './dom';
 import { prefersStill } from './motion';
-import { makeSteps } from './steps';
+import { LOST, makeSteps } from './steps';
 import type { Stage, Step } from './steps';
 import type { Scene } from '../view/scene';
 
@@ -105,7 +105,9 @@ export class Tour {
 
   private say(text: string): void {
     const answer = this.now && section(this.now).querySelector('.answer');
-    if (answer) write(answer, text);
+    if (!answer) return;
+    write(answer, text);
+    answer.classList.toggle('lost', text.startsWith(LOST));
   }
 }
 

@@ -74,11 +74,13 @@ export class Canvas {
 
   /// Fills the area between a line and the height `bottom`.
   area(points: readonly (readonly [number, number])[], bottom: number, color: string): void {
+    this.fill([[points[0]![0], bottom], ...points, [points.at(-1)![0], bottom]], color);
+  }
+
+  fill(points: readonly (readonly [number, number])[], color: string): void {
     const { context } = this;
     context.beginPath();
-    context.moveTo(points[0]![0], bottom);
     for (const [x, y] of points) context.lineTo(x, y);
-    context.lineTo(points.at(-1)![0], bottom);
     context.fillStyle = this.color(color);
     context.fill();
   }
@@ -93,6 +95,14 @@ export class Canvas {
     this.context.arc(x, y, radius, 0, 2 * Math.PI);
     this.context.fillStyle = this.color(color);
     this.context.fill();
+  }
+
+  circle(x: number, y: number, radius: number, color: string, width: number): void {
+    this.context.beginPath();
+    this.context.arc(x, y, radius, 0, 2 * Math.PI);
+    this.context.strokeStyle = this.color(color);
+    this.context.lineWidth = width;
+    this.context.stroke();
   }
 
   private resize(): void {

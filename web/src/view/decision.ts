@@ -13,8 +13,7 @@ const BOTTOM = 16; // pixels, for the torques below a chart
 const NAME = 13; // pixels, for the name of their axis
 const ROOMY = 90; // pixels of height that leave room for that name
 const TOP = 4;
-const MARK = 8; // pixels, over a bar that hangs
-const SCALE = 38; // pixels, for the costs next to such bars
+const SCALE = 38; // pixels, for the costs next to Q-values
 const CUT_OFF = 0.005; // smallest share that gets a number
 const EASE = 0.2; // share of the way to a bar's new height and colour, at each drawing
 
@@ -51,16 +50,15 @@ export class DecisionChart {
     return this.canvas.height - BOTTOM - this.below;
   }
 
-  /// Q-values differ little compared with their size. So each bar hangs from the best one, as long
-  /// as its torque costs reward, with a mark above it in the colour of recent choices.
+  /// Q-values differ little compared with their size. So the chart shows only the upper ends of the
+  /// bars: the tallest reaches the top, and each other one is lower by the reward that it costs.
   private drawQ({ q, action, torques }: QDecision, rewardScale: number): void {
     const { canvas, bottom } = this;
     const cost = (i: number) => (q[action]! - q[i]!) / rewardScale;
     // The scale grows at once and shrinks slowly.
     const most = 1.1 * Math.max(...torques.map((_, i) => cost(i)));
     this.room = Math.max(most, 0.1, 0.95 * this.room);
-    const top = TOP + MARK;
-    const y = (points: number) => top + (points / this.room) * (bottom - top);
+    const y = (points: number) => TOP + 2 + (points / this.room) * (bottom - TOP - 2);
     const round = roundBelow(0.9 * this.room);
     for (const points of [0, round]) {
       const ends: [number, number][] = [
@@ -69,15 +67,9 @@ export class DecisionChart {
       ];
       canvas.line(ends, 'grid', 1);
     }
-    canvas.text('best', SCALE - 4, top, 'right');
+    canvas.text('best', SCALE - 4, y(0) + 3, 'right');
     canvas.text(signed(-round), SCALE - 4, y(round), 'right');
-    this.drawBars(torques, action, SCALE, cost, (cost) => [top, y(cost) - top]);
-    this.bars.forEach(({ chosen }, i) => {
-      const width = (canvas.width - SCALE) / torques.length;
-      canvas.context.globalAlpha = chosen;
-      canvas.rectangle(SCALE + i * width + 2.5, TOP, width - 5, MARK - 1, 'torque');
-    });
-    canvas.context.globalAlpha = 1;
+    this.drawBars(torques, action, SCALE, cost, (cost) => [y(cost), bottom - y(cost)]);
   }
 
   /// Bars from 0 to 1.

@@ -15,6 +15,7 @@ const BEAM = [
   [UPRIGHT - SOFT, 1],
   [UPRIGHT + SOFT, 0],
 ] as const;
+const RING = 0.07; // width of the coloured band, in lengths of the pendulum
 const FAR = 1.15; // end of the light, in lengths of the pendulum
 const SHADES = 16; // steps of the trace from new to old
 const FRESH = 1.6; // s, time in which the trace loses most of its light
@@ -87,6 +88,25 @@ function beamOf(owner: Canvas, color: string, radius: number): HTMLCanvasElement
   context.fillRect(0, 0, 2 * radius, 2 * radius);
   beams.set(owner, { color, radius, beam });
   return beam;
+}
+
+/// A band of colours outside the circle within the tip's reach, clockwise from below.
+export function drawRing(
+  canvas: Canvas,
+  [x, y]: Place,
+  reach: number,
+  colors: readonly string[],
+): void {
+  if (colors.length === 0) return;
+  const { context } = canvas;
+  const band = context.createConicGradient(Math.PI / 2, x, y);
+  colors.forEach((color, i) => band.addColorStop((i + 0.5) / colors.length, color));
+  const width = RING * reach;
+  context.beginPath();
+  context.arc(x, y, reach + width, 0, 2 * Math.PI);
+  context.strokeStyle = band;
+  context.lineWidth = width;
+  context.stroke();
 }
 
 /// The path of the tip like a long exposure. `points`: oldest first, with their `ages` (s).

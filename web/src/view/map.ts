@@ -4,7 +4,7 @@ import type { State } from '../pendulum';
 import { Canvas } from './canvas';
 import { signed } from './charts';
 
-type Color = readonly [number, number, number];
+export type Color = readonly [number, number, number];
 type Names = [string, string, string]; // at the ends of an axis, and in its middle
 type Widths = [number, number, number]; // pixels
 
@@ -35,7 +35,6 @@ export class MapChart {
   private readonly image: HTMLCanvasElement = document.createElement('canvas');
   private pixels: ImageData | null = null; // of the image
   private shown: Float32Array | null = null; // 0 to 1, eased towards the map
-  bare = false; // only colours, without names and trajectory
 
   /// Drops the map, so that the next one appears at once.
   clear(): void {
@@ -64,8 +63,7 @@ export class MapChart {
     const { canvas } = this;
     canvas.clear();
     const { width, height } = canvas;
-    if (!this.bare) this.nameAxes(map.x, map.y);
-    else if (!map.cells || Number.isNaN(low)) return;
+    this.nameAxes(map.x, map.y);
     if (!map.cells) return canvas.text('computing …', width / 2, height / 2, 'center');
     if (Number.isNaN(low)) return canvas.text('not estimated', width / 2, height / 2, 'center');
     // An even map gets the middle colour.
@@ -75,8 +73,8 @@ export class MapChart {
     map.cells.forEach((cell, i) => {
       shown[i]! += EASE * (shareOf(cell) - shown[i]!);
     });
-    this.paint(map.size, COLORS[map.quantity]);
-    if (this.bare) return canvas.context.drawImage(this.image, 0, 0, width, height);
+    this.paint(map.columns, COLORS[map.quantity]);
+    canvas.context.imageSmoothingQuality = 'high';
     canvas.context.drawImage(this.image, LEFT, 0, width - LEFT, height - BOTTOM);
     this.drawWay(map, way, now);
     if (mark) this.drawMark(...mark);
@@ -141,12 +139,12 @@ export class MapChart {
     canvas.context.rect(LEFT, 0, canvas.width - LEFT, canvas.height - BOTTOM);
     canvas.context.clip();
     canvas.context.lineJoin = 'round';
-    for (const [color, line, dot] of [
-      ['map-rim', 4, 7],
-      ['map-way', 2, 5],
+    for (const [color, line] of [
+      ['map-rim', 4],
+      ['map-way', 2],
     ] as const) {
       for (const piece of pieces) canvas.line(piece, color, line);
-      canvas.disc(...place(now), dot, color);
+      canvas.circle(...place(now), 6, color, line);
     }
     canvas.context.restore();
   }
@@ -178,7 +176,7 @@ export class MapChart {
 }
 
 /// The colour at a share of a scale.
-function between(colors: readonly Color[], share: number): Color {
+export function between(colors: readonly Color[], share: number): Color {
   const at = Math.min(Math.max(share, 0), 1) * (colors.length - 1) || 0;
   const i = Math.min(Math.floor(at), colors.length - 2);
   const [a, b] = [colors[i]!, colors[i + 1]!];

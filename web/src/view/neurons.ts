@@ -2,6 +2,10 @@ import type { Neurons } from '../neurons';
 import { Canvas } from './canvas';
 
 const LEFT = 84; // px, for the names of the rows
+const INPUTS = ['cos θ₁', 'sin θ₁', 'ω₁', 'cos θ₂', 'sin θ₂', 'ω₂', 'energy', 'height'];
+const SHORT = ['cos₁', 'sin₁', 'ω₁', 'cos₂', 'sin₂', 'ω₂', 'E', 'h'];
+const ROOM = 46; // px, for a whole name
+const NAMES = 16; // px, above the inputs
 const GAP = 4; // px, between rows
 const EASE = 0.3; // share of the way to a new brightness, at each drawing
 const FADE = 0.98; // factor of a row's reference brightness per drawing
@@ -28,13 +32,23 @@ export class NeuronChart {
       this.rows = layers.map(({ length }) => ({ shown: new Float32Array(length), most: 0 }));
     }
     this.neurons = neurons;
-    const height = (canvas.height - GAP * (layers.length - 1)) / layers.length;
+    const named = observation.length === INPUTS.length ? NAMES : 0;
+    if (named > 0) this.nameInputs();
+    const height = (canvas.height - named - GAP * (layers.length - 1)) / layers.length;
     layers.forEach((layer, i) => {
-      const y = i * (height + GAP);
+      const y = named + i * (height + GAP);
       const name = i === 0 ? `${layer.length} inputs` : `${layer.length} neurons`;
       canvas.text(name, LEFT - 8, y + height / 2, 'right');
       this.drawRow(layer, this.rows[i]!, y, height);
     });
+  }
+
+  /// Each name above its input.
+  private nameInputs(): void {
+    const { canvas } = this;
+    const width = (canvas.width - LEFT) / INPUTS.length;
+    const names = width < ROOM ? SHORT : INPUTS;
+    names.forEach((name, k) => canvas.text(name, LEFT + (k + 0.5) * width, NAMES / 2, 'center'));
   }
 
   private drawRow(layer: Float32Array, row: Row, y: number, height: number): void {

@@ -5,7 +5,15 @@ import type { Moment, World } from '../world';
 import { Canvas } from './canvas';
 import { drawLabel } from './labels';
 import type { Anchor, Label } from './labels';
-import { drawHousing, drawHub, drawJoint, drawLight, drawRod, drawTrace } from './machine';
+import {
+  drawHousing,
+  drawHub,
+  drawJoint,
+  drawLight,
+  drawRing,
+  drawRod,
+  drawTrace,
+} from './machine';
 import { Sparks } from './sparks';
 
 export const TRAIL_SECONDS = 20; // of the world's time: a whole swing-up
@@ -27,6 +35,8 @@ export class Scene {
   labels: readonly Label[] = [];
   /// Other pendulums, drawn faintly: q1, q2 [rad] of each.
   ghosts: ArrayLike<number> = [];
+  /// Colours of the circle, clockwise from below; empty: none.
+  ring: readonly string[] = [];
   /// Thing that glows because its word was touched: link1, link2, motor or goal.
   lit: string | null = null;
 
@@ -79,6 +89,7 @@ export class Scene {
     if (!(this.scale > 0)) return; // hidden
     canvas.clear();
     drawLight(canvas, this.at(PIVOT), this.scale * reach, this.glow('goal', world));
+    drawRing(canvas, this.at(PIVOT), this.scale * reach, this.ring);
     this.drawGhosts(plant);
     const tipOf = (s: State) => this.at(pointOn(plant, s, 2, plant.length2).position);
     const points = [...trail.map((moment) => tipOf(moment.state)), tipOf(state)];

@@ -1,0 +1,83 @@
+import type { LearnSettings } from './learner';
+import type { Session } from './session';
+
+/// A race of two settings, each trained with the same seeds.
+
+export const RACE_SEEDS = 3;
+
+/// An agent to race against.
+export interface Rival {
+  readonly id: string; // in addresses
+  readonly name: string;
+  readonly agent: string; // named agent that learns in the page
+  readonly settings: LearnSettings;
+}
+
+export const RIVALS: readonly Rival[] = [
+  {
+    id: 'dqn',
+    name: 'DQN',
+    agent: 'fast',
+    settings: { double: 'false', dueling: 'false' },
+  },
+  { id: 'double', name: 'Double DQN', agent: 'fast', settings: { dueling: 'false' } },
+  { id: 'dueling', name: 'Dueling DQN', agent: 'fast', settings: { double: 'false' } },
+  { id: 'd3qn', name: 'Dueling Double DQN', agent: 'fast', settings: {} },
+  { id: 'sac', name: 'SAC', agent: 'sac-fast', settings: {} },
+];
+
+/// A contender's name: that of a rival with the same settings, or of its agent with what differs.
+export function nameOf(agent: string, settings: LearnSettings): string {
+  const own = RIVALS.filter((rival) => rival.agent === agent);
+  const same = own.find((rival) => sameSettings(rival.settings, settings));
+  if (same) return same.name;
+  const whole = own.find((rival) => Object.keys(rival.settings).length === 0)!;
+  const changes = Object.entries(settings).map(([name, value]) => `${name} ${value}`);
+  return `${whole.name} (${changes.join(', ').replaceAll('_', ' ')})`;
+}
+
+function sameSettings(a: LearnSettings, b: LearnSettings): boolean {
+  const names = Object.keys({ ...a, ...b });
+  return names.every((name) => a[name] === b[name]);
+}
+
+/// A side's runs: steps to solve, infinite where a run ended without; null while one goes on.
+export function stepsToSolve(sessions: readonly Session[]): number[] | null {
+  if (sessions.some(({ state }) => state !== 'finished' && state !== 'failed')) return null;
+  return sessions.map(({ last }) => (last?.solved ? last.steps : Infinity)).sort((a, b) => a - b);
+}
+
+/// The side that needed fewer steps in the median, and whether each of its runs did; null for a
+/// draw.
+export function winnerOf(
+  one: readonly number[],
+  two: readonly number[],
+): { side: 0 | 1; always: boolean } | null {
+  const median = (steps: readonly number[]) => steps[Math.floor(steps.length / 2)]!;
+  if (median(one) === median(two)) return null;
+  const side = median(one) < median(two) ? 0 : 1;
+  const [fewer, more] = side === 0 ? [one, two] : [two, one];
+  return { side, always: fewer.at(-1)! < more[0]! };
+}
+
+/// The result in words, for two names and their sorted steps to solve.
+export function resultOf(
+  names: readonly [string, string],
+  all: readonly [number[], number[]],
+): string {
+  const winner = winnerOf(...all);
+  const [one, two] = names.map((name, side) => `${name}: ${rangeOf(all[side]!)}`);
+  const runs = `Steps to solve, smallest to largest of ${all[0].length} seeds. ${one}. ${two}.`;
+  if (!winner) return `A draw. ${runs}`;
+  const first = names[winner.side]!;
+  return winner.always
+    ? `${first} wins with every seed. ${runs}`
+    : `${first} wins in the median, but not with every seed: chance matters, too. ${runs}`;
+}
+
+function rangeOf(sorted: readonly number[]): string {
+  const [low, high] = [sorted[0]!, sorted.at(-1)!].map((steps) =>
+    Number.isFinite(steps) ? steps.toLocaleString('en') : 'not solved',
+  );
+  return low === high ? low! : `${low} to ${high}`;
+}
