@@ -3,6 +3,7 @@
 
   docs.py build FOLDER    a static site, which works from any folder and from file://
   docs.py serve FOLDER    serves a folder on this machine only
+  docs.py join FOLDER     links the page in FOLDER and the documentation in FOLDER/docs to each other
 
 Sphinx builds from build/docs-work, which gets the pages of docs/ and the generated pages of the
 reference. Unchanged pages are not rebuilt.
@@ -80,7 +81,8 @@ def stage_pages(stage):
             stage.write(name, path.read_bytes())
     for root_name, name in ROOT_PAGES.items():
         stage_page(stage, ROOT / root_name, name)
-    stage.write("_static/icon.svg", (ROOT / "web/public/icon.svg").read_bytes())
+    for name in ("icon.svg", "fonts/hanken-grotesk.woff2", "fonts/bricolage-grotesque.woff2"):
+        stage.write(f"_static/{name}", (ROOT / "web/public" / name).read_bytes())
 
 
 def stage_page(stage, path, name):
@@ -358,15 +360,34 @@ def serve(folder):
     return 1
 
 
+PAGE = "http://localhost:4173/"  # of ./upswing demo, where the documentation links to it
+
+
+def join(site):
+    page = site / "index.html"
+    text = page.read_text(encoding="utf-8")
+    text = text.replace('class="no-site"', 'class="no-site" hidden')
+    page.write_text(re.sub(r'(class="site"[^>]*?) hidden(?:="")?', r"\1", text), encoding="utf-8")
+    for path in (site / "docs").rglob("*.html"):
+        text = path.read_text(encoding="utf-8")
+        root = os.path.relpath(site, path.parent) + "/"
+        new = text.replace(f'href="{PAGE}', f'href="{root}').replace(f">{PAGE}#", ">#")
+        if new != text:
+            path.write_text(new, encoding="utf-8")
+    return 0
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("action", choices=("build", "serve"))
+    parser.add_argument("action", choices=("build", "serve", "join"))
     parser.add_argument("folder", type=Path)
     parser.add_argument("--jobs", default="auto", help="processes of Sphinx")
     arguments = parser.parse_args()
     if arguments.action == "serve":
         return serve(arguments.folder)
+    if arguments.action == "join":
+        return join(arguments.folder)
     return build(arguments.folder, arguments.jobs)
 
 

@@ -14,8 +14,8 @@ Builds the documentation into build/docs: static pages with search, which work f
 Doxygen and, into build/docs-venv, Sphinx, if they are missing.
 
   --serve        serve it on this machine only
-  --site FOLDER  write a complete web site: a landing page, the page of ./upswing demo in page/ and the
-                 documentation in docs/; FOLDER must be new or empty
+  --site FOLDER  write a complete web site: the page of ./upswing demo, and the documentation in docs/;
+                 FOLDER must be new or empty
 
 Examples:
   ./upswing docs
@@ -98,14 +98,14 @@ quoted() {
   esac
 }
 
-# Moves the landing page, the page and the documentation to their folder, complete or not at all.
+# Moves the page and the documentation to their folder, complete or not at all.
 write_site() {
   tmp=$(mktemp -d "$(dirname -- "$dist")/.upswing-site.XXXXXX") || fail "cannot write next to $dist"
   trap 'rm -rf "$tmp"' EXIT
   trap 'exit 130' INT
   trap 'exit 143' TERM
-  { cp "$root/docs/landing/index.html" "$root/web/public/icon.svg" "$tmp/" &&
-    cp -R "$page" "$tmp/page" && cp -R "$docs" "$tmp/docs" &&
+  { cp -R "$page/." "$tmp" && cp -R "$docs" "$tmp/docs" &&
+    python3 -B "$root/tools/docs.py" join "$tmp" &&
     # GitHub Pages leaves out folders such as _static unless this file is there.
     : >"$tmp/.nojekyll"; } || fail "could not copy the site (see above)"
   chmod =rwx "$tmp" # mode from the umask

@@ -343,13 +343,26 @@ class Site(ProgramTest):
             for address in loaded:
                 self.assertFalse(re.match(r"(?:[a-z]+:)?//", address), f"{page.name}: {address}")
             self.assertNotIn('href="/', text, page.name)
-        landing = text_of("docs/landing/index.html")
-        for target in re.findall(r'href="docs/([^"]+)"', landing):
-            self.assertTrue((site / target).exists(), target)
         for header in ("base/env.h", "rl/dqn.h"):
             page = site / "reference/cpp-api" / f"{header.split('/', maxsplit=1)[0]}.html"
             self.assertIn(header, page.read_text(encoding="utf-8"))
         self.assertIn("Dqn", (site / "reference/cpp-api/rl.html").read_text(encoding="utf-8"))
+
+        # As one site with the page, each links to the other.
+        whole = self.folder / "whole"
+        whole.mkdir()
+        site.rename(whole / "docs")
+        (whole / "index.html").write_text(text_of("web/index.html"), encoding="utf-8")
+        subprocess.run([self.python, "-B", ROOT / "tools/docs.py", "join", whole], check=True)
+        shown = re.findall(r'class="site"[^>]*>', (whole / "index.html").read_text(encoding="utf-8"))
+        self.assertEqual(len(shown), 2)
+        for tag in shown:
+            self.assertNotIn("hidden", tag)
+        tour = (whole / "docs/start/page-tour.html").read_text(encoding="utf-8")
+        self.assertIn('href="../../#learn=fast', tour)
+        self.assertIn('href="../../"', tour)
+        for page in (whole / "docs").rglob("*.html"):
+            self.assertNotIn('href="http://localhost', page.read_text(encoding="utf-8"), page.name)
 
 
 class Launcher(ProgramTest):
