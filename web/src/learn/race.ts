@@ -26,7 +26,8 @@ export const RIVALS: readonly Rival[] = [
   { id: 'sac', name: 'SAC', agent: 'sac-fast', settings: {} },
 ];
 
-/// A contender's name: that of a rival with the same settings, or of its agent with what differs.
+/// A contender's name: a rival's name if it has the same settings, otherwise the agent's name and
+/// the changed settings.
 export function nameOf(agent: string, settings: LearnSettings): string {
   const own = RIVALS.filter((rival) => rival.agent === agent);
   const same = own.find((rival) => sameSettings(rival.settings, settings));
@@ -41,7 +42,8 @@ function sameSettings(a: LearnSettings, b: LearnSettings): boolean {
   return names.every((name) => a[name] === b[name]);
 }
 
-/// A side's runs: steps to solve, infinite where a run ended without; null while one goes on.
+/// Sorted steps to solve of a side's runs; infinite for a run that did not solve the task. Null
+/// before all have ended.
 export function stepsToSolve(sessions: readonly Session[]): number[] | null {
   if (sessions.some(({ state }) => state !== 'finished' && state !== 'failed')) return null;
   return sessions.map(({ last }) => (last?.solved ? last.steps : Infinity)).sort((a, b) => a - b);
