@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,6 +17,16 @@ namespace upswing {
 
 /// Names and values, in a fixed order.
 using Metrics = std::vector<std::pair<std::string, double>>;
+
+/// What a DQN agent learned from the first transition (s, a) of its last minibatch, in units of its
+/// values, and how it explores.
+struct UpdateExample {
+  double torque;                 // N·m, of a
+  double guess, corrected;       // Q(s, a; θ) before and after the update
+  double reward, target;         // Σ γᵏ r, and y
+  double epsilon;                // probability of a random torque
+  int64_t remembered, capacity;  // transitions in the replay memory
+};
 
 /// A learner. The training loop calls Act, Observe and Learn once per step of the environments.
 class Agent {
@@ -35,6 +46,9 @@ class Agent {
   virtual int64_t steps() const = 0;
   /// Gradient steps since the beginning of the training.
   virtual int64_t updates() const = 0;
+
+  /// An example of the last update; nothing before the first one, or if the agent gives none.
+  virtual std::optional<UpdateExample> LastUpdate() const { return std::nullopt; }
 
   /// Metrics of learning since the last call, such as the mean loss. They are columns of
   /// metrics.csv.

@@ -79,4 +79,16 @@ void Dqn::State(const Archive& archive) {
   archive.Check(online_.steps() == updates_, "adam/steps", "one for each update");
 }
 
+std::optional<UpdateExample> Dqn::LastUpdate() const {
+  if (updates_ == 0 || q_taken_.empty()) return std::nullopt;
+  const int a = static_cast<int>(batch().action[0]);
+  std::vector<float> q(torques_.size());
+  auto activations = online_.network().MakeActivations(1, false);
+  online_.network().Forward(online_.theta(), {batch().obs.data(), 1, D_}, {0, 1}, activations,
+                            {q.data(), 1, static_cast<int>(q.size())});
+  return UpdateExample{
+      torques_[a],     q_taken_[0],        q[a], batch().reward[0], y_[0], epsilon(),
+      replay().size(), replay().capacity()};
+}
+
 }  // namespace upswing

@@ -393,6 +393,26 @@ TEST(Dqn, LearnsToStayNearZero) {
   }
 }
 
+TEST(Dqn, TheExampleOfTheFirstUpdateMovesTheGuessToTheTarget) {
+  DqnConfig config = SmallDqn();
+  config.batch = 1;  // so that no other transition moves the guess
+  ThreadPool pool(1);
+  for (const uint64_t seed : {1, 2, 3, 4, 5}) {
+    Dqn agent(config, ToyEnv::Spec(1), seed, pool);
+    ToyEnv env(1, seed);
+    while (agent.updates() == 0) {
+      EXPECT_FALSE(agent.LastUpdate().has_value());
+      Walk(agent, env, 1);
+    }
+    const UpdateExample example = agent.LastUpdate().value();
+    EXPECT_GT((example.corrected - example.guess) * (example.target - example.guess), 0);
+    EXPECT_NE(std::ranges::find(kTorques, example.torque), kTorques.end());
+    EXPECT_EQ(example.epsilon, agent.epsilon());
+    EXPECT_EQ(example.remembered, agent.replay().size());
+    EXPECT_EQ(example.capacity, 1000);
+  }
+}
+
 TEST(Dqn, TheNumberOfThreadsChangesNoBit) {
   DqnConfig config = SmallDqn();
   config.batch = 128;  // four slices

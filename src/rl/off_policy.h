@@ -40,6 +40,8 @@ class OffPolicyAgent : public Agent {
   bool UpdateIsDue() const { return updates_ < updates_due(); }
   /// Draws a minibatch: uniformly, or by priority if prioritized. Mirrors half of it if `mirror`.
   const Minibatch& Sample();
+  /// The minibatch of the last Sample.
+  const Minibatch& batch() const { return batch_; }
   /// Sets the priorities of the last Sample from td_error_, if prioritized.
   void UpdatePriorities();
   /// Polyak rate of the evaluated policy: `tau` times the ratio of the current to the initial

@@ -400,6 +400,11 @@ UPSWING_EXPORT(learner_report) int LearnerReport(Learner* learner) {
   return Guarded([&] { return SetText(learner->Report()); });
 }
 
+/// Leaves an example of the last update as JSON; null if there is none.
+UPSWING_EXPORT(learner_last_update) int LearnerLastUpdate(Learner* learner) {
+  return Guarded([&] { return SetText(learner->LastUpdate()); });
+}
+
 /// Leaves the current policy, or the best evaluated one (empty: none yet), as a file.
 UPSWING_EXPORT(learner_policy) int LearnerPolicy(Learner* learner, int best) {
   return Guarded([&] {

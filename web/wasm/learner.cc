@@ -65,6 +65,15 @@ json Learner::Report() {
   return report;
 }
 
+json Learner::LastUpdate() const {
+  const std::optional<UpdateExample> example = training_.agent().LastUpdate();
+  if (!example) return nullptr;
+  return {{"torque", example->torque},         {"guess", example->guess},
+          {"corrected", example->corrected},   {"reward", example->reward},
+          {"target", example->target},         {"epsilon", example->epsilon},
+          {"remembered", example->remembered}, {"capacity", example->capacity}};
+}
+
 std::vector<std::byte> Learner::policy() const { return FileOf(*training_.policy()); }
 
 std::vector<std::byte> Learner::Poses() const {
@@ -87,7 +96,9 @@ void Learner::OnEpisode(const TrainState& state, const FinishedEpisode& episode)
 void Learner::OnEvaluation(const TrainState& state, const Evaluation& evaluation) {
   evaluations_.push_back({{"step", state.steps},
                           {"success", evaluation.success_rate()},
-                          {"return", evaluation.reward_sum.mean}});
+                          {"return", evaluation.reward_sum.mean},
+                          {"expected", evaluation.value},
+                          {"attained", evaluation.discounted_return}});
 }
 
 void Learner::OnBest(const TrainState& /*state*/, const Policy& policy) { best_ = FileOf(policy); }

@@ -25,6 +25,9 @@ class Learner : private TrainObserver {
   /// Progress, and events since the last call.
   nlohmann::json Report();
 
+  /// An example of the last update; null if there is none.
+  nlohmann::json LastUpdate() const;
+
   /// The current policy and the best evaluated one (empty: none yet), as files.
   std::vector<std::byte> policy() const;
   const std::vector<std::byte>& best() const { return best_; }
