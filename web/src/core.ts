@@ -51,6 +51,7 @@ interface Exports {
   learner_close(learner: number): void;
   learner_run(learner: number, steps: number): number;
   learner_report(learner: number): number;
+  learner_last_update(learner: number): number;
   learner_policy(learner: number, best: number): number;
   learner_poses(learner: number): number;
   agent_settings(agent: number, bytes: number): number;

@@ -473,6 +473,43 @@ test("a finger holds the slider under the chart, and the numbers match the worke
   await page.evaluate(() => upswing.learn.stop());
 });
 
+test('a slow start shows one update after another: guess, target, correction', async ({
+  stage: page,
+}) => {
+  await openLearn(page);
+  await page.getByRole('button', { name: 'Learn', exact: true }).click();
+  const guess = page.locator('#lesson-guess');
+  await expect(guess).toContainText('Will it correct this guess up or down?');
+  await expect(page.locator('#lesson-memory-text')).toHaveText(/^[\d,]+ of 100,000 steps$/);
+  const slow = await page.evaluate(() =>
+    Number(document.getElementById('learn-trials')!.textContent),
+  );
+  expect(slow).toBeLessThan(100);
+  const asked = await guess.textContent();
+  await page.getByRole('button', { name: 'Up', exact: true }).click();
+  const answer = await page.locator('#lesson-answer').textContent();
+  const parts =
+    /^(Right|No): .* brought (.*), and from there it expects (.*) more\. The target is (.*), so the guess (.*) became (.*?)[.:]/
+      .exec(answer!)!
+      .map((part) => Number(part.replace('−', '-').replaceAll(',', '')));
+  const [, , reward, next, target, before] = parts as [
+    number,
+    number,
+    number,
+    number,
+    number,
+    number,
+  ];
+  expect(Math.abs(reward + next - target)).toBeLessThan(0.16); // rounded to a tenth each
+  expect(asked).toContain(`worth ${String(before).replace('-', '−')}. Will`);
+  // Rounding may hide a small difference.
+  if (Math.abs(target - before) > 0.1) expect(answer!.startsWith('Right')).toBe(target > before);
+  await page.getByRole('button', { name: 'Another update' }).click();
+  await expect(guess).not.toHaveText(asked!);
+  await page.getByLabel('slow start').uncheck();
+  await page.locator('#learn-start').click();
+});
+
 test('a race waits for a bet, trains both sides and can be shared', async ({ stage: page }) => {
   await open(page, '#learn=fast&seed=7&balance_weight=4&rival=dqn');
   const [one, two] = [page.locator('#race-one'), page.locator('#race-two')];

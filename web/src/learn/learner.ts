@@ -11,7 +11,28 @@ export interface Report {
   bestStep: number; // of the best evaluation; 0: none
   bestSuccess: number;
   episodes: { step: number; return: number }[];
-  evaluations: { step: number; success: number; return: number }[];
+  evaluations: Test[];
+}
+
+/// An evaluation.
+export interface Test {
+  step: number;
+  success: number; // share of the starts
+  return: number;
+  expected: number; // discounted return that the agent expected at the starts, and got
+  attained: number;
+}
+
+/// What a DQN agent learned from one remembered step, in units of its values (rl/agent.h).
+export interface UpdateExample {
+  torque: number; // N·m
+  guess: number; // of all rewards to come, before the update
+  corrected: number; // the same after it
+  reward: number; // of the step and those joined with it
+  target: number;
+  epsilon: number; // share of random torques
+  remembered: number; // steps
+  capacity: number;
 }
 
 /// Settings by their names in the program, such as { learning_rate: '1e-3' }.
@@ -41,6 +62,12 @@ export class Learner {
   report(): Report {
     this.core.expect(this.core.exports.learner_report(this.learner));
     return JSON.parse(this.core.text) as Report;
+  }
+
+  /// An example of the last update; null before the first one, and for SAC.
+  lastUpdate(): UpdateExample | null {
+    this.core.expect(this.core.exports.learner_last_update(this.learner));
+    return JSON.parse(this.core.text) as UpdateExample | null;
   }
 
   /// The current policy, as a file.

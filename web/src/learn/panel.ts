@@ -13,6 +13,7 @@ import { film, filmType } from './film';
 import { Filmstrip } from './filmstrip';
 import { Knobs, LEARNERS } from './knobs';
 import './learn.css';
+import { Lesson } from './lesson';
 import { nameOf as contenderOf, RACE_SEEDS } from './race';
 import { RacePanel } from './race_panel';
 import { decodeRecipe, encodeRecipe, LARGEST_SEED } from './recipe';
@@ -66,6 +67,8 @@ export class LearnPanel {
   private readonly scrubber: Scrubber;
   private readonly strip: Filmstrip;
   private readonly race: RacePanel;
+  private readonly lesson = new Lesson();
+  private readonly slow = element<HTMLInputElement>('learn-slow');
   private rival: string | undefined; // of the race that is shown
   private sessions: Session[] = [];
   private recording: Recording | null = null; // null: not requested
@@ -94,6 +97,9 @@ export class LearnPanel {
     button('learn-recorded', () => this.showRecording(recorded));
     element('learn-recorded').hidden = page.agents.recording(recorded) === null;
     this.agent.addEventListener('change', () => this.knobs.show(this.agent.value));
+    this.slow.addEventListener('change', () => {
+      if (!this.slow.checked) for (const session of this.sessions) session.hurry();
+    });
     element('learn-panel').addEventListener('change', () => this.offerRace());
     const untrained = element<HTMLInputElement>('learn-untrained');
     untrained.addEventListener('change', () => void this.scrubber.showUntrained(untrained.checked));
@@ -135,7 +141,7 @@ export class LearnPanel {
       const contender = rival ? { name: contenderOf(agent, settings), side } : null;
       return Array.from({ length: count }, (_, i) => {
         const recipe = { agent, seed: first + i, settings };
-        return new Session(recipe, () => this.news(), contender);
+        return new Session(recipe, () => this.news(), contender, count === 1 && this.slow.checked);
       });
     });
     this.rival = rival?.id;
@@ -203,7 +209,10 @@ export class LearnPanel {
       return { count: '', milestone: sentence(session) };
     }
     const { episodeCount } = session.last;
-    const count = `Trial ${episodeCount.toLocaleString('en')}, ${swinging(session.steps)}`;
+    const { example, slow } = session;
+    const random = example && slow ? `${Math.round(100 * example.epsilon)}% random torques` : '';
+    const trial = `Trial ${(episodeCount + (slow ? 1 : 0)).toLocaleString('en')}`;
+    const count = `${trial}, ${random || swinging(session.steps)}`;
     return { count, milestone: milestone(session) };
   }
 
@@ -400,7 +409,7 @@ export class LearnPanel {
   }
 
   private draw(): void {
-    const { session, scrubber } = this;
+    const { session, scrubber, page } = this;
     const { course, onStage } = scrubber;
     this.drawnOnStage = onStage;
     const { sides } = this;
@@ -412,6 +421,7 @@ export class LearnPanel {
         onStage ? scrubber.step : null,
       );
     this.race.show(sides);
+    this.lesson.show(session, page.world.policy?.rewardScale ?? 1);
     element('learn-figure').toggleAttribute('data-race', sides !== null);
     this.strip.show(session?.state === 'finished' ? session : null);
     const running = this.active.length > 0;

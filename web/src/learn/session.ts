@@ -1,5 +1,5 @@
 import { coreModule } from '../core';
-import type { LearnSettings, Report } from './learner';
+import type { LearnSettings, Report, Test, UpdateExample } from './learner';
 import type { Recipe } from './recipe';
 import { TRIAL_STEPS } from './course';
 import type { Checkpoint, Course, Episode } from './course';
@@ -18,7 +18,9 @@ export class Session implements Course {
   reason = ''; // why it failed
   last: Report | null = null;
   readonly episodes: Episode[] = [];
-  readonly evaluations: { step: number; success: number; return: number }[] = [];
+  readonly evaluations: Test[] = [];
+  example: UpdateExample | null = null; // of the last update
+  slow: boolean; // whether its start is still slow
   checkpoints: Checkpoint[] = [];
   policy: ArrayBuffer | null = null; // latest one
   best: ArrayBuffer | null = null; // best evaluated one
@@ -29,12 +31,15 @@ export class Session implements Course {
   private readonly worker: Worker;
   private readonly onNews: () => void;
 
-  /// `contender`: its name and side in a race. `onNews`: called after each change.
+  /// `contender`: its name and side in a race. `slow`: whether it starts slowly. `onNews`: called
+  /// after each change.
   constructor(
     { agent, seed, settings }: Recipe,
     onNews: () => void,
     contender: { name: string; side: number } | null = null,
+    slow = false,
   ) {
+    this.slow = slow;
     this.name = contender ? `${contender.name}, seed ${seed}` : `seed ${seed}`;
     this.side = contender?.side ?? 0;
     this.agent = agent;
@@ -51,7 +56,7 @@ export class Session implements Course {
           : 'the device is offline, and this part of the page has not been loaded yet',
       );
     };
-    this.tell({ kind: 'start', module: coreModule(), agent, seed, settings });
+    this.tell({ kind: 'start', module: coreModule(), agent, seed, settings, slow });
   }
 
   get running(): boolean {
@@ -85,6 +90,12 @@ export class Session implements Course {
     this.tell({ kind: 'resume' });
   }
 
+  /// Ends a slow start.
+  hurry(): void {
+    this.slow = false;
+    this.tell({ kind: 'hurry' });
+  }
+
   /// Ends the training; its results stay.
   stop(): void {
     if (this.active) this.state = 'stopped';
@@ -106,6 +117,8 @@ export class Session implements Course {
     if (news.kind === 'failed') return this.fail(news.reason);
     if (news.kind === 'poses') return void (this.poses = news.poses);
     const { report, policy, best, seconds, isMark } = news;
+    this.example = news.example;
+    this.slow &&= news.slow;
     if (this.last && seconds > this.seconds) {
       const rate = (report.updates - this.last.updates) / (seconds - this.seconds);
       this.updatesPerSecond += 0.3 * (rate - this.updatesPerSecond);

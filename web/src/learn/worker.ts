@@ -1,13 +1,18 @@
 import { Core } from '../core';
 import { Learner } from './learner';
-import type { LearnSettings, Report } from './learner';
+import type { LearnSettings, Report, UpdateExample } from './learner';
 
 /// Learns in its own thread, in slices, and reports its progress.
 
 const SLICE = 30; // ms between checks for messages
 const REPORT_INTERVAL = 200; // ms between snapshots of the policy
 const PART = 4; // steps of all environments between looks at the clock
-const MARK = 12; // parts between the snapshots that every training with this seed makes
+const MARK = 48; // steps between the snapshots that every training with this seed makes
+// A slow start: the first trials run in real time, those after them twice as fast, and so on.
+const TRIAL = 200; // steps
+const DOUBLINGS = 6;
+const STEPS_PER_SECOND = 50;
+const TICK = 16; // ms
 
 export type Order =
   | {
@@ -16,8 +21,9 @@ export type Order =
       agent: string;
       seed: number;
       settings: LearnSettings;
+      slow: boolean; // whether it starts slowly
     }
-  | { kind: 'pause' | 'resume' };
+  | { kind: 'pause' | 'resume' | 'hurry' };
 
 export type News =
   | {
@@ -26,6 +32,8 @@ export type News =
       policy: ArrayBuffer;
       best: ArrayBuffer | null;
       seconds: number; // including evaluations, without pauses
+      example: UpdateExample | null;
+      slow: boolean;
       isMark: boolean; // whether every training with this seed makes this snapshot
     }
   | { kind: 'poses'; poses: Float32Array<ArrayBuffer> } // q1, q2 of each pendulum (rad)
@@ -38,7 +46,10 @@ let reportedAt = 0; // ms, time of the last report
 let ranBefore = 0; // ms, before the last pause
 let resumedAt = 0; // ms, time of the start or the last resumption
 let bestStep = 0;
-let parts = 0; // run so far
+let ran = 0; // steps of all environments
+let slow = false;
+let due = 0; // steps in a slow start
+let tickedAt = 0; // ms, time of the last tick in a slow start
 
 function sendReport(isMark: boolean): void {
   const report = learner!.report();
@@ -48,7 +59,9 @@ function sendReport(isMark: boolean): void {
   bestStep = report.bestStep;
   reportedAt = performance.now();
   const seconds = (ranBefore + reportedAt - resumedAt) / 1000;
-  send({ kind: 'report', report, policy, best, seconds, isMark }, best ? [policy, best] : [policy]);
+  const example = learner!.lastUpdate();
+  const news = { kind: 'report', report, policy, best, seconds, example, slow, isMark } as const;
+  send(news, best ? [policy, best] : [policy]);
 }
 
 function show(): void {
@@ -60,6 +73,25 @@ function send(news: News, transfer: Transferable[] = []): void {
   postMessage(news, { transfer });
 }
 
+/// Makes `count` steps. False once the training is finished.
+function advance(count: number): boolean {
+  const more = learner!.run(count);
+  ran += count;
+  if (more && ran % MARK === 0) sendReport(true);
+  return more;
+}
+
+/// Makes the steps that are due in a slow start. False once the training is finished.
+function advanceSlowly(now: number): boolean {
+  const doublings = Math.floor(ran / TRIAL);
+  due += (Math.min(now - tickedAt, 2 * TICK) / 1000) * STEPS_PER_SECOND * 2 ** doublings;
+  tickedAt = now;
+  let more = true;
+  for (; more && due >= 1; --due) more = advance(1);
+  slow = doublings < DOUBLINGS;
+  return more;
+}
+
 /// Trains for a slice and schedules the next, until the training ends or is paused.
 function work(): void {
   scheduled = false;
@@ -67,10 +99,8 @@ function work(): void {
   try {
     const begin = performance.now();
     let more = true;
-    while (more && performance.now() - begin < SLICE) {
-      more = learner.run(PART);
-      if (more && ++parts % MARK === 0) sendReport(true);
-    }
+    if (slow) more = advanceSlowly(begin);
+    else while (more && performance.now() - begin < SLICE) more = advance(PART - (ran % PART));
     if (!more || performance.now() - reportedAt >= REPORT_INTERVAL) sendReport(!more);
     if (more) show();
     if (more) schedule();
@@ -95,11 +125,14 @@ const next = new MessageChannel();
 next.port1.onmessage = work;
 
 function schedule(): void {
-  if (!scheduled) next.port2.postMessage(null);
+  if (scheduled) return;
   scheduled = true;
+  if (slow) setTimeout(work, TICK);
+  else next.port2.postMessage(null);
 }
 
 onmessage = async ({ data }: MessageEvent<Order>): Promise<void> => {
+  if (data.kind === 'hurry') return void (slow = false);
   if (data.kind !== 'start') {
     paused = data.kind === 'pause';
     if (paused) ranBefore += performance.now() - resumedAt;
@@ -107,6 +140,7 @@ onmessage = async ({ data }: MessageEvent<Order>): Promise<void> => {
     return schedule();
   }
   const { module, agent, seed, settings } = data;
+  slow = data.slow;
   try {
     learner = new Learner(await Core.start(module), agent, seed, settings);
     resumedAt = performance.now();
