@@ -153,7 +153,7 @@ test('Q-values that are not finite do not spoil the chart for later ones', async
   const during = await painted();
   expect(during).toBeLessThan(before / 2);
   await page.evaluate(() => upswing.world.look());
-  expect(await painted()).toBeGreaterThan(0.9 * before);
+  expect(await painted()).toBeGreaterThan(0.8 * before); // the scale shrinks slowly
 });
 
 test('sliders extend to a plant or link beyond their range', async ({ stage: page }) => {

@@ -34,7 +34,7 @@ export class Lesson {
     if (!this.shown) this.ask(example, rewardScale);
   }
 
-  /// Asks what becomes of a guess.
+  /// Asks whether a guess will go up or down.
   private ask(example: UpdateExample, rewardScale: number): void {
     const scaled = (value: number) => value / rewardScale;
     this.shown = {

@@ -302,7 +302,7 @@ export class Agents {
     const bytes = await file.arrayBuffer().catch(() => {
       throw new BadInput('it cannot be read');
     });
-    if (!isSafetensors(bytes)) throw new BadInput('it is not a safetensors file');
+    if (!isSafetensors(bytes)) throw new BadInput('not a valid safetensors file');
     const own = { name: file.name, bytes, learned };
     const agent = this.addOwn(own);
     this.own = own;
