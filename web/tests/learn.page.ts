@@ -136,7 +136,7 @@ test('an agent that learns in the tour stays, and equals that of Node and the pr
   await expect.poll(learned).toBe('d3qn');
   await page.locator('#tour-next').click();
   await expect.poll(learned).toBe('fast');
-  await page.getByRole('button', { name: 'Step 9:' }).click();
+  await page.getByRole('button', { name: 'Step 8:' }).click();
   await page.getByRole('link', { name: 'Everything, with your own agent' }).click();
   await expect(page.locator('#charts')).toBeVisible();
   await expect(page.locator('#agent')).toHaveValue('own');

@@ -35,7 +35,7 @@ console.log('docs/figures/page.png');
 /// The README's film: the agent swings up, is shoved twice, and recovers. 25 frames a second.
 await visit({ viewport: { width: 1200, height: 760 }, colorScheme: 'dark' }, async (page) => {
   const folder = mkdtempSync(join(tmpdir(), 'upswing-film-'));
-  await page.goto(`${server.address}#tour=5`);
+  await page.goto(`${server.address}#tour=4`);
   await ready(page);
   await page.evaluate(stop);
   await page.evaluate(() => {

@@ -95,7 +95,9 @@ function watch(stage: Stage): Step {
       if (await stage.begin({ agent: SMALL_AGENT, on })) void stage.choose(NOMINAL_AGENT);
     },
     answer: (world) =>
-      heldFor(world) > HELD ? 'Balanced. Can you do that? Press Next and try it.' : '',
+      heldFor(world) > HELD
+        ? 'Balanced, after 80 minutes of practice. Can you do that? Press Next and try it.'
+        : '',
   };
 }
 
@@ -146,24 +148,6 @@ function learn(stage: Stage): Step {
       start.textContent = stage.learn.paused ? 'Resume' : milestone === '' ? 'Learn' : 'Start over';
       write(element('tour-count'), count);
       return milestone;
-    },
-  };
-}
-
-function agent(stage: Stage): Step {
-  const on = button('tour-agent', () => stage.setAgentOn(!stage.world.agentOn));
-  return {
-    id: 'agent',
-    agents: [NOMINAL_AGENT],
-    labels: ({ torque }) => (torque === 0 ? [] : [{ at: 'motor', text: 'its torque' }]),
-    async begin() {
-      await enter(stage, { agent: NOMINAL_AGENT, on: false });
-    },
-    answer(world) {
-      on.ariaPressed = String(world.agentOn);
-      return world.agentOn && heldFor(world) > HELD
-        ? 'It practised for 80 minutes of swinging, which a computer simulates within seconds.'
-        : '';
     },
   };
 }
@@ -330,5 +314,5 @@ function enter(stage: Stage, shared: Partial<Shared>): Promise<boolean> {
 }
 
 export function makeSteps(stage: Stage): Step[] {
-  return [watch, motor, learn, agent, shove, bet, values, map, end].map((make) => make(stage));
+  return [watch, motor, learn, shove, bet, values, map, end].map((make) => make(stage));
 }
