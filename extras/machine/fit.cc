@@ -14,8 +14,8 @@
 #include "base/text.h"
 #include "pendulum/posterior.h"
 
-// Symbols: θ values shared by all windows, x start state of a window, r residuals, J = ∂r/∂θ,
-// K = ∂r/∂x; H.. blocks of the Gauss-Newton matrix, g. gradients.
+// Symbols: θ values to identify, c constants that follow from θ in a session, x start state of a
+// window, r residuals; H.. blocks of the Gauss-Newton matrix, g. gradients.
 namespace upswing::machine {
 namespace {
 
@@ -30,46 +30,48 @@ constexpr double kStartWeight = 0.05;
 // Limits of the scales of the robust cost.
 constexpr double kSmallestScale = 1e-5, kLargestScale = 0.1;  // rad
 constexpr double kSmallestTorqueScale = 1e-3;                 // N·m
+constexpr double kFirstLag = 0.005;                           // s
 
-/// Typical size of a value, for finite differences.
-double ScaleOf(const std::string& name) {
-  static const std::map<std::string, double, std::less<>> kScales{
-      {"delay", 0.002},   {"lag", 0.005},    {"current_delay", 0.002}, {"current_inertia", 0.002},
-      {"zero1", 0.02},    {"zero2", 0.02},   {"armature", 0.003},      {"damping1", 0.02},
-      {"damping2", 0.02}, {"coulomb1", 0.1}, {"coulomb2", 0.1},        {"inertia1", 0.01},
-      {"inertia2", 0.01}};
-  const auto found = kScales.find(name);
-  return found == kScales.end() ? 0.2 : found->second;
+/// Number of constants: those of the motion without the start, zeros, current_delay and
+/// current_inertia.
+constexpr int kConstants = kTangents - 4 + 4;
+using Constants = Eigen::Matrix<double, kConstants, 1>;
+using ConstantsMatrix = Eigen::Matrix<double, kConstants, kConstants>;
+
+Constants ConstantsOf(const Twin& twin) {
+  const Manipulator m = BodyOf(twin);
+  const Actuator& motor = twin.actuator;
+  Constants c;
+  c << m.J1, m.J2, m.b, m.a, m.G1, m.G2, m.d1, m.d2, m.f1, m.f2, motor.delay, motor.lag,
+      twin.sensors.zero1, twin.sensors.zero2, motor.current_delay, motor.current_inertia;
+  return c;
+}
+
+/// Typical differences of a value: standard deviations of its prior.
+struct Deviations {
+  double sessions;  // of a session's value about the machine's; 0: a tenth of the guess
+  double guess;     // of the machine's value about a guess without covariance; 0: half of the guess
+};
+
+/// Encoders' zeros in rad, dry friction in N·m, times in s.
+Deviations DeviationsOf(const std::string& name) {
+  static const std::map<std::string, Deviations, std::less<>> kDeviations{
+      {"zero1", {0.05, 0.05}},          {"zero2", {0.05, 0.05}},
+      {"coulomb1", {0.03, 0.1}},        {"coulomb2", {0.03, 0.1}},
+      {"damping1", {0.003, 0.02}},      {"damping2", {0.003, 0.02}},
+      {"armature", {0.001, 0.005}},     {"current_inertia", {0.0005, 0.005}},
+      {"delay", {0.001, 0.005}},        {"lag", {0.001, 0.005}},
+      {"current_delay", {0.001, 0.005}}};
+  const auto found = kDeviations.find(name);
+  return found == kDeviations.end() ? Deviations{0, 0} : found->second;
 }
 
 /// An entry of θ: a setting of the twin; or, with a session, that session's deviation from it.
 struct Value {
   std::string name;
-  double scale;
   int session;  // -1: all
-  Range range;
-  double prior;      // weight of the prior about `guess`; 0: none
-  double guess = 0;  // at first
+  Range range = {};
 };
-
-/// Whether a value changes the torques. If so, its derivatives need the drives of all logs again.
-bool ChangesDrive(const std::string& name) { return name == "delay" || name == "lag"; }
-
-/// Prior standard deviation of a session's value about the machine's value: encoders' zeros in rad,
-/// dry friction in N·m. 0: all sessions share the value.
-double SessionDeviation(const std::string& name) {
-  if (name == "zero1" || name == "zero2") return 0.05;
-  return name == "coulomb1" || name == "coulomb2" ? 0.03 : 0;
-}
-
-/// Prior standard deviation of a value about the first guess; 0: none. Motors take milliseconds:
-/// without reported torques, much larger delays can imitate friction.
-double PriorDeviation(const std::string& name) {
-  return name == "delay" || name == "lag" || name == "current_delay" ? 0.005 : 0;  // s
-}
-
-/// The weight of a prior with this standard deviation; 0: none.
-double WeightOf(double deviation) { return deviation > 0 ? 1 / (deviation * deviation) : 0; }
 
 /// A window with its free start state.
 struct Shot {
@@ -78,35 +80,50 @@ struct Shot {
   int session;        // index
 };
 
-/// The twin in a session, ready to predict.
-struct Model {
-  Manipulator body;
-  Joints zero;             // rad
-  double current_delay;    // s
-  double current_inertia;  // kg·m²
+/// The residuals of one kind in a window: the mean of their squares over the rows, and its
+/// derivatives by start state and constants.
+struct Squares {
+  double mean = 0;                                                     // rad² or (N·m)²
+  Eigen::Matrix<double, 4 + kConstants, 4 + kConstants> H = H.Zero();  // half of the second one
+  Eigen::Matrix<double, 4 + kConstants, 1> g = g.Zero();               // half of the first one
 };
 
-/// Residuals of a window, predicted minus measured. A column for each joint.
-struct Residuals {
-  Eigen::MatrixX2d angle;   // (rows × 2), rad
-  Eigen::MatrixX2d torque;  // (rows × 2), N·m; no rows if the log lacks reported torques
-};
-
-/// A window's share in the normal equations.
+/// The residuals of a window.
 struct Share {
-  double cost = 0;
-  double squares = 0, torque_squares = 0;  // means over rows, rad² and (N·m)²
+  Squares angle, torque;
+};
+
+/// A window's part of the normal equations, without its start state: g += g + change, and so on.
+struct Reduced {
+  ConstantsMatrix H;
+  Constants g;
+};
+
+/// A window's part of the normal equations, weighted.
+struct Block {
   Matrix4d Hxx;
   Vector4d gx;
-  MatrixXd Hxt, Htt;  // (4 × n), (n × n)
-  VectorXd gt;
+  Eigen::Matrix<double, 4, kConstants> Hxc;
+  ConstantsMatrix Hcc;
+  Constants gc;
+
+  /// Eliminates the start state, damped.
+  Reduced Eliminate(double damping) const {
+    const Eigen::Matrix<double, kConstants, 4> half = Hxc.transpose() * Inverse(damping);
+    return {Hcc - half * Hxc, gc - half * gx};
+  }
+  Matrix4d Inverse(double damping) const {
+    Matrix4d damped = Hxx;
+    damped.diagonal() *= 1 + damping;
+    return damped.inverse();
+  }
 };
 
 class Problem {
  public:
-  Problem(std::span<const MachineLog> logs, const Twin& first,
-          const std::vector<std::string>& names, const FitConfig& config, ThreadPool* pool)
-      : logs_(logs), twin_(first), pool_(pool) {
+  Problem(std::span<const MachineLog> logs, const Twin& first, const Structure& structure,
+          const FitConfig& config, ThreadPool* pool)
+      : logs_(logs), twin_(first), adapts_(config.adapts), pool_(pool) {
     twin_.sessions.clear();
     twin_.uncertain.clear();
     twin_.covariance.clear();
@@ -116,31 +133,9 @@ class Problem {
     twin_.plant.center2 = link2.c;
     twin_.plant.inertia1 = link1.I;
     twin_.plant.inertia2 = link2.I;
-    std::map<std::string, int> sessions;
-    for (const MachineLog& log : logs) {
-      const auto [place, is_new] =
-          sessions.emplace(SessionOf(log.name), static_cast<int>(sessions_.size()));
-      if (is_new) sessions_.push_back(place->first);
-      session_of_.push_back(place->second);
-      reported_.push_back({HasTorque(log.measured, 0), HasTorque(log.measured, 1)});
-    }
-    const Options options = OptionsOf(twin_);
-    for (const std::string& name : names) {
-      const Option& option = *options.Find(name, "identify").front();
-      values_.push_back(
-          {name, ScaleOf(name), -1, UncertainRange(option), WeightOf(PriorDeviation(name))});
-      if (SessionDeviation(name) == 0) continue;
-      for (int s = 0; s < static_cast<int>(sessions_.size()); ++s) {
-        values_.push_back({name, ScaleOf(name), s, {}, WeightOf(SessionDeviation(name))});
-      }
-    }
-    theta_.resize(size());
-    for (int i = 0; i < size(); ++i) {
-      theta_(i) = values_[i].session < 0 ? options.Get(values_[i].name)->number() : 0;
-      // The model counts lags below 10 µs as equal, so the derivative at lag 0 is 0.
-      if (values_[i].name == "lag" && theta_(i) == 0) theta_(i) = values_[i].scale;
-      values_[i].guess = theta_(i);
-    }
+    FindSessions();
+    FindValues(structure);
+    SetPrior(first);
     for (const LogWindow& w :
          CutWindows(logs, config.windows, first.plant.length1, first.plant.length2)) {
       const Vector4d x(w.start.q1, w.start.q2, w.start.w1, w.start.w2);
@@ -151,7 +146,171 @@ class Problem {
   int size() const { return static_cast<int>(values_.size()); }
   int windows() const { return static_cast<int>(shots_.size()); }
 
-  /// The twin with the values θ of a session.
+  /// One step of the method; false if no step decreases the cost any more.
+  bool Step(double tolerance) {
+    const std::vector<Share> shares = Linearize();
+    SetScales(shares);
+    const std::vector<MatrixXd> slopes = Slopes();
+    const std::vector<Block> blocks = BlocksOf(shares);
+    double before = PriorCost(theta_);
+    for (int w = 0; w < windows(); ++w)
+      before += Cost(shares[w]) + StartCost(shots_[w], shots_[w].x);
+    for (; damping_ < 1e6; damping_ *= 8) {
+      std::vector<Reduced> sums(sessions_.size(), {ConstantsMatrix::Zero(), Constants::Zero()});
+      for (int w = 0; w < windows(); ++w) {
+        const Reduced r = blocks[w].Eliminate(damping_);
+        sums[shots_[w].session].H += r.H;
+        sums[shots_[w].session].g += r.g;
+      }
+      MatrixXd A = prior_;
+      VectorXd b = prior_ * (theta_ - guess_);
+      for (size_t s = 0; s < sums.size(); ++s) {
+        A += slopes[s].transpose() * sums[s].H * slopes[s];
+        b += slopes[s].transpose() * sums[s].g;
+      }
+      A.diagonal() *= 1 + damping_;
+      A.diagonal().array() += 1e-12;
+      for (int i = 0; i < size(); ++i) {
+        // A value that would leave its range stays at the limit.
+        const bool stays =
+            b(i) > 0 ? theta_(i) <= values_[i].range.low : theta_(i) >= values_[i].range.high;
+        if (stays) Forget(i, A, b);
+      }
+      VectorXd theta = theta_ - A.ldlt().solve(b);
+      for (int i = 0; i < size(); ++i) {
+        theta(i) = std::clamp(theta(i), values_[i].range.low, values_[i].range.high);
+      }
+      std::vector<Vector4d> starts;
+      for (int w = 0; w < windows(); ++w) {
+        const Constants change = slopes[shots_[w].session] * (theta - theta_);
+        starts.push_back(shots_[w].x -
+                         blocks[w].Inverse(damping_) * (blocks[w].gx + blocks[w].Hxc * change));
+      }
+      const double after = CostAt(theta, starts);
+      if (!(after < before)) continue;
+      theta_ = theta;
+      for (int w = 0; w < windows(); ++w) shots_[w].x = starts[w];
+      damping_ = std::max(damping_ / 5, 1e-7);
+      return before - after > tolerance * std::abs(before);
+    }
+    return false;
+  }
+
+  FitResult Result() {
+    const std::vector<Share> shares = Linearize();
+    FitResult result;
+    result.twin = TwinAt(theta_, -1);
+    Covariances(shares, result.twin);
+    for (int s = 0; s < static_cast<int>(sessions_.size()) && !adapts_; ++s) {
+      const Twin own = TwinAt(theta_, s);
+      Session& session = result.twin.sessions.emplace_back();
+      session.name = sessions_[s];
+      for (const Value& v : values_) {
+        if (v.session == s) session.values.emplace_back(v.name, NumberIn(own, v.name));
+      }
+    }
+    std::vector<double> errors, torque_errors;
+    for (const Share& s : shares) {
+      errors.push_back(std::sqrt(s.angle.mean));
+      if (s.torque.mean > 0) torque_errors.push_back(std::sqrt(s.torque.mean));
+    }
+    result.windows = windows();
+    result.error = Median(errors);
+    result.torque_error = Median(torque_errors);
+    return result;
+  }
+
+ private:
+  static double NumberIn(Twin twin, const std::string& name) {
+    return OptionsOf(twin).Get(name)->number();
+  }
+
+  /// Makes A x = b ask for x(i) = 0.
+  template <typename Right>
+  static void Forget(int i, MatrixXd& A, Right& b) {
+    A.row(i).setZero();
+    A.col(i).setZero();
+    A(i, i) = 1;
+    b.row(i).setZero();
+  }
+
+  void FindSessions() {
+    std::map<std::string, int> sessions;
+    for (const MachineLog& log : logs_) {
+      const auto [place, is_new] =
+          sessions.emplace(adapts_ ? "" : SessionOf(log.name), static_cast<int>(sessions_.size()));
+      if (is_new) sessions_.push_back(place->first);
+      session_of_.push_back(place->second);
+      reported_.push_back({HasTorque(log.measured, 0), HasTorque(log.measured, 1)});
+    }
+  }
+
+  void FindValues(const Structure& structure) {
+    const Options options = OptionsOf(twin_);
+    std::vector<double> theta;
+    for (const std::string& name : structure.values) {
+      const Option& option = *options.Find(name, "identify").front();
+      // The model counts lags below 10 µs as equal, so the derivative at lag 0 is 0.
+      const bool moves = name == "lag" && option.number() == 0;
+      values_.push_back({name, -1, UncertainRange(option)});
+      theta.push_back(moves ? kFirstLag : option.number());
+      if (adapts_ || std::ranges::count(structure.of_session, name) == 0) continue;
+      for (int s = 0; s < static_cast<int>(sessions_.size()); ++s) {
+        values_.push_back({name, s});
+        theta.push_back(0);
+      }
+    }
+    theta_ = guess_ = Eigen::Map<VectorXd>(theta.data(), size());
+  }
+
+  /// Sets the prior. An identification has one of the sessions' deviations, and of the times:
+  /// motors take milliseconds, and without reported torques much larger delays can imitate
+  /// friction.
+  void SetPrior(const Twin& first) {
+    prior_ = MatrixXd::Zero(size(), size());
+    if (adapts_) {
+      MatrixXd covariance = MatrixXd::Zero(size(), size());
+      std::vector<int> known(size(), -1);  // rows of the first guess's covariance
+      const int n = static_cast<int>(first.uncertain.size());
+      for (int i = 0; i < size(); ++i) {
+        const auto found = std::ranges::find(first.uncertain, values_[i].name);
+        const int row = static_cast<int>(found - first.uncertain.begin());
+        if (row < n && first.covariance[row * n + row] > 0) known[i] = row;
+      }
+      for (int i = 0; i < size(); ++i) {
+        for (int j = 0; j < size(); ++j) {
+          if (known[i] < 0 || known[j] < 0) continue;
+          covariance(i, j) = first.covariance[known[i] * n + known[j]];
+        }
+        const double wide = DeviationsOf(values_[i].name).guess;
+        if (known[i] < 0) {
+          covariance(i, i) = std::pow(wide > 0 ? wide : std::abs(guess_(i)) / 2, 2);
+        }
+        covariance(i, i) *= 1 + 1e-6;
+      }
+      const VectorXd scale = covariance.diagonal().cwiseSqrt().cwiseInverse();
+      prior_ = scale.asDiagonal() *
+               MatrixXd(scale.asDiagonal() * covariance * scale.asDiagonal()).inverse() *
+               scale.asDiagonal();
+      return;
+    }
+    for (int i = 0; i < size(); ++i) {
+      const Value& v = values_[i];
+      const bool is_time = v.name == "delay" || v.name == "lag" || v.name == "current_delay";
+      if (v.session >= 0) {
+        prior_(i, i) = std::pow(SessionDeviation(v.name), -2);
+      } else if (is_time) {
+        prior_(i, i) = std::pow(DeviationsOf(v.name).guess, -2);
+      }
+    }
+  }
+
+  double SessionDeviation(const std::string& name) const {
+    const double deviation = DeviationsOf(name).sessions;
+    return deviation > 0 ? deviation : std::abs(NumberIn(twin_, name)) / 10;
+  }
+
+  /// The twin with the values θ of a session; of the machine for -1.
   Twin TwinAt(const VectorXd& theta, int session) const {
     Twin twin = twin_;
     const Options options = OptionsOf(twin);
@@ -161,101 +320,226 @@ class Problem {
       const Option& option = *options.Get(values_[i].name);
       double& value = *std::get<double*>(option.target);
       value = values_[i].session < 0 ? theta(i) : value + theta(i);
-      value = std::clamp(value, option.range.low, option.range.high);
+      const Range range = UncertainRange(option);
+      value = std::clamp(value, range.low, range.high);
     }
     return twin;
   }
 
-  /// One step of the method; false if no step decreases the cost any more.
-  bool Step(double tolerance) {
-    SetScales();
-    const std::vector<Share> shares = Linearize();
-    double before = PriorCost(theta_);
-    MatrixXd H = MatrixXd::Zero(size(), size());
-    VectorXd g = VectorXd::Zero(size());
-    AddPrior(H, g);
-    for (const Share& share : shares) before += share.cost;
-    for (; damping_ < 1e6; damping_ *= 8) {
-      MatrixXd A = H;
-      VectorXd b = g;
-      std::vector<Matrix4d> inverses;
-      for (const Share& s : shares) {
-        Matrix4d Hxx = s.Hxx;
-        Hxx.diagonal() *= 1 + damping_;
-        inverses.push_back(Hxx.inverse());
-        A += s.Htt - s.Hxt.transpose() * inverses.back() * s.Hxt;
-        b += s.gt - s.Hxt.transpose() * inverses.back() * s.gx;
-      }
-      A.diagonal() *= 1 + damping_;
-      A.diagonal().array() += 1e-12;
-      VectorXd theta = theta_ - A.ldlt().solve(b);
+  /// ∂c/∂θ of each session (kConstants × n).
+  std::vector<MatrixXd> Slopes() const {
+    std::vector<MatrixXd> slopes;
+    for (int s = 0; s < static_cast<int>(sessions_.size()); ++s) {
+      MatrixXd& slope = slopes.emplace_back(MatrixXd::Zero(kConstants, size()));
+      int common = 0;  // index of the machine's value; those of the sessions follow it
       for (int i = 0; i < size(); ++i) {
-        const Value& v = values_[i];
-        theta(i) = std::clamp(theta(i), v.range.low, v.range.high);
+        if (values_[i].session < 0) {
+          common = i;
+          constexpr double h = 1e-7;
+          VectorXd above = theta_, below = theta_;
+          above(i) += h;
+          below(i) -= h;
+          slope.col(i) = (ConstantsOf(TwinAt(above, s)) - ConstantsOf(TwinAt(below, s))) / (2 * h);
+        } else if (values_[i].session == s) {
+          slope.col(i) = slope.col(common);
+        }
       }
-      const VectorXd change = theta - theta_;
-      std::vector<Vector4d> starts;
-      for (size_t w = 0; w < shares.size(); ++w) {
-        const Share& s = shares[w];
-        starts.push_back(shots_[w].x - inverses[w] * (s.gx + s.Hxt * change));
-      }
-      const double after = CostAt(theta, starts);
-      if (!(after < before)) continue;
-      theta_ = theta;
-      for (size_t w = 0; w < shots_.size(); ++w) shots_[w].x = starts[w];
-      damping_ = std::max(damping_ / 5, 1e-7);
-      return before - after > tolerance * std::abs(before);
     }
-    return false;
+    return slopes;
   }
 
-  FitResult Result() {
-    const std::vector<Share> shares = Linearize();
-    // The sandwich estimate: right also where the model's residuals are not white.
-    MatrixXd A = MatrixXd::Zero(size(), size()), meat = A;
-    for (int i = 0; i < size(); ++i) A(i, i) = values_[i].prior;
-    std::vector<double> errors, torque_errors;
-    // Windows overlap, so neighbours share rows: the scores of several in a row count as one.
-    constexpr size_t kBlock = 6;
-    int blocks = 0;
-    VectorXd block = VectorXd::Zero(size());
-    for (size_t w = 0; w < shares.size(); ++w) {
-      const Share& s = shares[w];
-      const MatrixXd half = s.Hxt.transpose() * s.Hxx.inverse();
-      A += s.Htt - half * s.Hxt;
-      block += s.gt - half * s.gx;
-      if (w + 1 == shares.size() || shots_[w + 1].window.log != shots_[w].window.log ||
-          (w + 1) % kBlock == 0) {
-        meat += block * block.transpose();
-        block.setZero();
-        ++blocks;
+  /// Calls `f(window, twin, drive)` for all windows at θ, in parallel.
+  template <typename F>
+  void ForEachWindow(const VectorXd& theta, const F& f) const {
+    std::vector<Twin> twins;
+    for (int s = 0; s < static_cast<int>(sessions_.size()); ++s) twins.push_back(TwinAt(theta, s));
+    std::vector<Drive> drives;
+    for (size_t i = 0; i < logs_.size(); ++i) {
+      drives.push_back(Drive::Commanded(logs_[i], twins[session_of_[i]]));
+    }
+    ParallelFor(pool_, windows(),
+                [&](int w) { f(w, twins[shots_[w].session], drives[shots_[w].window.log]); });
+  }
+
+  std::vector<Share> Linearize() const {
+    std::vector<Share> shares(shots_.size());
+    ForEachWindow(theta_, [&](int w, const Twin& twin, const Drive& drive) {
+      shares[w] = ShareOf(shots_[w], shots_[w].x, twin, drive, true);
+    });
+    return shares;
+  }
+
+  double CostAt(const VectorXd& theta, const std::vector<Vector4d>& starts) const {
+    std::vector<double> costs(shots_.size());
+    ForEachWindow(theta, [&](int w, const Twin& twin, const Drive& drive) {
+      costs[w] =
+          Cost(ShareOf(shots_[w], starts[w], twin, drive, false)) + StartCost(shots_[w], starts[w]);
+    });
+    double cost = PriorCost(theta);
+    for (const double c : costs) cost += c;
+    return cost;
+  }
+
+  /// The residuals of a window from the start x, predicted minus measured, with derivatives if
+  /// `linearizes`.
+  Share ShareOf(const Shot& shot, const Vector4d& x, const Twin& twin, const Drive& drive,
+                bool linearizes) const {
+    const MachineLog& log = logs_[shot.window.log];
+    const auto [index, first, last, start] = shot.window;
+    const Actuator& motor = twin.actuator;
+    Motion motion;
+    MotionTangents tangents;
+    Predict(BodyOf(twin), drive, {twin.sensors.zero1, twin.sensors.zero2}, {x(0), x(1), x(2), x(3)},
+            log, first, last, motor.current_delay, motion, linearizes ? &tangents : nullptr);
+    const int rows = last - first;
+    Share share;
+    Eigen::Matrix<double, 4 + kConstants, Eigen::Dynamic> J(4 + kConstants,
+                                                            linearizes ? 2 * rows : 0);
+    VectorXd r = VectorXd::Zero(2 * rows);
+    const auto square = [&](Squares& s) {
+      s.mean = r.squaredNorm() / rows;
+      if (!linearizes) return;
+      s.H = J * J.transpose() / rows;
+      s.g = J * r / rows;
+    };
+    for (int k = 0; k < rows; ++k) {
+      for (int j = 0; j < 2; ++j) {
+        const int i = 2 * k + j;
+        r(i) = motion.angle[k][j] - log.angle[first + k][j];
+        if (!linearizes) continue;
+        J.col(i) << tangents.angle.col(i), -tangents.angle(0, i), -tangents.angle(1, i), 0, 0;
+        J(kTangents + j, i) += 1;
       }
-      errors.push_back(std::sqrt(s.squares));
-      if (s.torque_squares > 0) torque_errors.push_back(std::sqrt(s.torque_squares));
+    }
+    square(share.angle);
+    if (log.measured.empty()) return share;
+    int cursor = 0;
+    r.setZero();
+    if (linearizes) J.setZero();
+    for (int k = 0; k < rows; ++k) {
+      DriveTangents of_torque;
+      const double time = log.time[first + k] - motor.current_delay;
+      const Joints torque = drive.At(time, cursor, linearizes ? &of_torque : nullptr);
+      for (int j = 0; j < 2; ++j) {
+        if (!reported_[index][j]) continue;
+        const int i = 2 * k + j;
+        r(i) = torque[j] - motor.current_inertia * motion.acceleration[k][j] -
+               log.measured[first + k][j];
+        if (!linearizes) continue;
+        const Eigen::Matrix<double, kTangents, 1> slope =
+            -motor.current_inertia * tangents.acceleration.col(i);
+        J.col(i) << slope, -slope(0), -slope(1),
+            of_torque.by_delay[j] + motor.current_inertia * tangents.jerk[k][j],
+            -motion.acceleration[k][j];
+        J(kTangents - 2, i) += of_torque.by_delay[j];
+        J(kTangents - 1, i) += of_torque.by_lag[j];
+      }
+    }
+    square(share.torque);
+    return share;
+  }
+
+  /// The blocks of the windows. The robust cost ln(1 + r²/s²) weighs squares by 1 / (s² + r²).
+  std::vector<Block> BlocksOf(const std::vector<Share>& shares) const {
+    const Vector4d prior = kStartWeight * kStartDeviation.cwiseAbs2().cwiseInverse();
+    std::vector<Block> blocks;
+    for (int w = 0; w < windows(); ++w) {
+      const auto& [angle, torque] = shares[w];
+      const double a = 1 / (scale_ * scale_ + angle.mean);
+      const double t = 1 / (torque_scale_ * torque_scale_ + torque.mean);
+      const auto H = (a * angle.H + t * torque.H).eval();
+      const auto g = (a * angle.g + t * torque.g).eval();
+      Block& b = blocks.emplace_back();
+      b.Hxx = H.topLeftCorner<4, 4>();
+      b.Hxx.diagonal() += prior;
+      b.Hxc = H.topRightCorner<4, kConstants>();
+      b.Hcc = H.bottomRightCorner<kConstants, kConstants>();
+      b.gx = g.head<4>() + prior.cwiseProduct(shots_[w].x - shots_[w].cubic);
+      b.gc = g.tail<kConstants>();
+    }
+    return blocks;
+  }
+
+  /// Cost of a window's residuals: ln(1 + r²/s²) of the mean square of both kinds.
+  double Cost(const Share& s) const {
+    return std::log1p(s.angle.mean / (scale_ * scale_)) +
+           std::log1p(s.torque.mean / (torque_scale_ * torque_scale_));
+  }
+  static double StartCost(const Shot& shot, const Vector4d& x) {
+    return kStartWeight * (x - shot.cubic).cwiseQuotient(kStartDeviation).squaredNorm();
+  }
+  double PriorCost(const VectorXd& theta) const {
+    return (theta - guess_).dot(prior_ * (theta - guess_));
+  }
+
+  /// Sets the scales of the robust cost to the windows' median errors.
+  void SetScales(const std::vector<Share>& shares) {
+    std::vector<double> errors, torque_errors;
+    for (const Share& s : shares) {
+      errors.push_back(std::sqrt(s.angle.mean));
+      torque_errors.push_back(std::sqrt(s.torque.mean));
+    }
+    scale_ = std::clamp(Median(errors), kSmallestScale, kLargestScale);
+    torque_scale_ = std::max(Median(torque_errors), kSmallestTorqueScale);
+  }
+
+  /// Covariance (n × n) of θ. An identification takes the sandwich estimate, right also where the
+  /// residuals are not white. An adaptation has too few windows for it.
+  MatrixXd CovarianceOf(const std::vector<Share>& shares) const {
+    const std::vector<MatrixXd> slopes = Slopes();
+    const std::vector<Block> blocks = BlocksOf(shares);
+    MatrixXd A = prior_, meat = MatrixXd::Zero(size(), size());
+    // Windows overlap, so neighbours share rows: the scores of several in a row count as one.
+    constexpr int kInARow = 6;
+    int count = 0;
+    VectorXd sum = VectorXd::Zero(size());
+    for (int w = 0; w < windows(); ++w) {
+      const Reduced r = blocks[w].Eliminate(0);
+      const MatrixXd& slope = slopes[shots_[w].session];
+      A += slope.transpose() * r.H * slope;
+      sum += slope.transpose() * r.g;
+      if (w + 1 == windows() || shots_[w + 1].window.log != shots_[w].window.log ||
+          (w + 1) % kInARow == 0) {
+        meat += sum * sum.transpose();
+        sum.setZero();
+        ++count;
+      }
     }
     // The fit makes the scores smaller than those of the true values: MacKinnon and White (1985),
-    // HC1, with blocks as observations.
-    meat *= static_cast<double>(blocks) / std::max(1, blocks - size());
+    // HC1, with these sums as observations.
+    meat *= static_cast<double>(count) / std::max(1, count - size());
+    if (adapts_) meat = A;
     // A value at the limit of its range is taken as known.
     for (int i = 0; i < size(); ++i) {
       const Value& v = values_[i];
       if (theta_(i) > v.range.low && theta_(i) < v.range.high) continue;
-      A.row(i).setZero();
-      A.col(i).setZero();
-      meat.row(i).setZero();
+      Forget(i, A, meat);
       meat.col(i).setZero();
-      A(i, i) = 1;
     }
     A.diagonal().array() += 1e-12;
     const MatrixXd inverse = A.ldlt().solve(MatrixXd::Identity(size(), size()));
-    FitResult result = Combine(inverse * meat * inverse);
-    result.windows = windows();
-    result.error = Median(errors);
-    result.torque_error = Median(torque_errors);
-    return result;
+    const MatrixXd covariance = inverse * meat * inverse;
+    return (covariance + covariance.transpose()) / 2;
   }
 
- private:
+  /// Sets the names and the covariance of the machine's values.
+  void Covariances(const std::vector<Share>& shares, Twin& twin) const {
+    const MatrixXd covariance = CovarianceOf(shares);
+    std::vector<int> own;  // the entries of θ without a session
+    for (int i = 0; i < size(); ++i) {
+      if (values_[i].session >= 0) continue;
+      own.push_back(i);
+      twin.uncertain.push_back(values_[i].name);
+    }
+    const int n = static_cast<int>(own.size());
+    const MatrixXd between = BetweenSessions(n);
+    for (int i = 0; i < n; ++i) {
+      for (int j = 0; j < n; ++j) {
+        twin.covariance.push_back(covariance(own[i], own[j]) + between(i, j));
+      }
+    }
+  }
+
   /// Covariance (n × n) of the differences between sessions, for n values of the machine. The prior
   /// counts as one session. So a single session, which shows no differences, gets the prior's
   /// covariance.
@@ -266,8 +550,8 @@ class Problem {
     for (int i = 0; i < size(); ++i) {
       if (values_[i].session < 0) {
         ++column;
-        squares(column, column) = std::pow(SessionDeviation(values_[i].name), 2);
       } else {
+        squares(column, column) = std::pow(SessionDeviation(values_[i].name), 2);
         difference(values_[i].session, column) = theta_(i);
       }
     }
@@ -277,236 +561,16 @@ class Problem {
     return squares / std::max<double>(std::ssize(seen), 1);
   }
 
-  /// The machine's values. Their covariance includes the covariance between sessions.
-  FitResult Combine(const MatrixXd& covariance) const {
-    FitResult result;
-    result.twin = TwinAt(theta_, -1);
-    std::vector<int> own;  // the entries of θ without a session
-    for (int i = 0; i < size(); ++i) {
-      if (values_[i].session >= 0) continue;
-      own.push_back(i);
-      result.twin.uncertain.push_back(values_[i].name);
-    }
-    const MatrixXd between = BetweenSessions(static_cast<int>(own.size()));
-    for (size_t i = 0; i < own.size(); ++i) {
-      for (size_t j = 0; j < own.size(); ++j) {
-        const double both = (covariance(own[i], own[j]) + covariance(own[j], own[i])) / 2;
-        result.twin.covariance.push_back(both + between(i, j));
-      }
-    }
-    for (int s = 0; s < static_cast<int>(sessions_.size()); ++s) {
-      const Twin own = TwinAt(theta_, s);
-      result.twin.sessions.push_back({sessions_[s], own.sensors.zero1, own.sensors.zero2,
-                                      own.plant.coulomb1, own.plant.coulomb2});
-    }
-    return result;
-  }
-
-  double PriorCost(const VectorXd& theta) const {
-    double cost = 0;
-    for (int i = 0; i < size(); ++i) {
-      const double off = theta(i) - values_[i].guess;
-      cost += values_[i].prior * off * off;
-    }
-    return cost;
-  }
-  void AddPrior(MatrixXd& H, VectorXd& g) const {
-    for (int i = 0; i < size(); ++i) {
-      H(i, i) += values_[i].prior;
-      g(i) += values_[i].prior * (theta_(i) - values_[i].guess);
-    }
-  }
-
-  /// Models of all sessions, and drives of all logs, at θ.
-  std::vector<Model> ModelsAt(const VectorXd& theta) const {
-    std::vector<Model> models;
-    for (int s = 0; s < static_cast<int>(sessions_.size()); ++s)
-      models.push_back(ModelAt(theta, s));
-    return models;
-  }
-  Model ModelAt(const VectorXd& theta, int session) const {
-    const Twin twin = TwinAt(theta, session);
-    return {BodyOf(twin),
-            {twin.sensors.zero1, twin.sensors.zero2},
-            twin.actuator.current_delay,
-            twin.actuator.current_inertia};
-  }
-  std::vector<Drive> DrivesAt(const VectorXd& theta) const {
-    const Twin twin = TwinAt(theta, 0);
-    std::vector<Drive> drives;
-    for (const MachineLog& log : logs_) drives.push_back(Drive::Commanded(log, twin));
-    return drives;
-  }
-
-  Residuals ResidualsOf(const Shot& shot, const Vector4d& x, const Model& model, const Drive& drive,
-                        Motion& motion) const {
-    const MachineLog& log = logs_[shot.window.log];
-    const auto [index, first, last, start] = shot.window;
-    Predict(model.body, drive, model.zero, {x(0), x(1), x(2), x(3)}, log, first, last,
-            model.current_delay, motion);
-    const int rows = last - first;
-    Residuals r;
-    r.angle.resize(rows, 2);
-    r.torque.resize(log.measured.empty() ? 0 : rows, 2);
-    int cursor = 0;
-    for (int k = 0; k < rows; ++k) {
-      for (int j = 0; j < 2; ++j) r.angle(k, j) = motion.angle[k][j] - log.angle[first + k][j];
-      if (log.measured.empty()) continue;
-      const Joints torque = drive.At(log.time[first + k] - model.current_delay, cursor);
-      for (int j = 0; j < 2; ++j) {
-        r.torque(k, j) = 0;
-        if (!reported_[shot.window.log][j]) continue;
-        r.torque(k, j) = torque[j] - model.current_inertia * motion.acceleration[k][j] -
-                         log.measured[first + k][j];
-      }
-    }
-    return r;
-  }
-
-  static double MeanSquare(const Eigen::MatrixX2d& r) {
-    return r.rows() == 0 ? 0 : r.squaredNorm() / static_cast<double>(r.rows());
-  }
-
-  /// Cost of a window's residuals: ln(1 + r²/s²) of the mean square of both kinds.
-  double Cost(const Residuals& r) const {
-    return std::log1p(MeanSquare(r.angle) / (scale_ * scale_)) +
-           std::log1p(MeanSquare(r.torque) / (torque_scale_ * torque_scale_));
-  }
-  static double StartCost(const Shot& shot, const Vector4d& x) {
-    return kStartWeight * (x - shot.cubic).cwiseQuotient(kStartDeviation).squaredNorm();
-  }
-
-  double CostAt(const VectorXd& theta, const std::vector<Vector4d>& starts) const {
-    const std::vector<Model> models = ModelsAt(theta);
-    const std::vector<Drive> drives = DrivesAt(theta);
-    std::vector<double> costs(shots_.size());
-    ParallelFor(pool_, windows(), [&](int w) {
-      Motion motion;
-      const Shot& shot = shots_[w];
-      costs[w] = Cost(ResidualsOf(shot, starts[w], models[shot.session], drives[shot.window.log],
-                                  motion)) +
-                 StartCost(shot, starts[w]);
-    });
-    double cost = PriorCost(theta);
-    for (const double c : costs) cost += c;
-    return cost;
-  }
-
-  std::vector<Share> Linearize() const {
-    // Models and drives at θ, and with each value a little larger and smaller.
-    const auto moved = [&](int i, double sign) {
-      VectorXd theta = theta_;
-      theta(i) += sign * Difference(i);
-      return theta;
-    };
-    const std::vector<Model> models = ModelsAt(theta_);
-    const std::vector<Drive> drives = DrivesAt(theta_);
-    std::vector<std::array<std::vector<Drive>, 2>> moved_drives(size());
-    std::vector<std::array<std::vector<Model>, 2>> moved_models(size());
-    for (int i = 0; i < size(); ++i) {
-      if (values_[i].session >= 0) continue;
-      for (const int side : {0, 1}) {
-        const VectorXd theta = moved(i, side == 0 ? 1 : -1);
-        if (ChangesDrive(values_[i].name)) moved_drives[i][side] = DrivesAt(theta);
-        moved_models[i][side] = ModelsAt(theta);
-      }
-    }
-    std::vector<Share> shares(shots_.size());
-    ParallelFor(pool_, windows(), [&](int w) {
-      const Shot& shot = shots_[w];
-      const int log = shot.window.log;
-      Motion motion;
-      const Residuals r = ResidualsOf(shot, shot.x, models[shot.session], drives[log], motion);
-      const int rows = static_cast<int>(r.angle.size()), more = static_cast<int>(r.torque.size());
-      MatrixXd J = MatrixXd::Zero(rows + more, size()), K(rows + more, 4);
-      const auto difference = [&](const Residuals& a, const Residuals& b, double h) {
-        VectorXd d(rows + more);
-        d.head(rows) = (a.angle - b.angle).reshaped() / (2 * h);
-        d.tail(more) = (a.torque - b.torque).reshaped() / (2 * h);
-        return d;
-      };
-      int common = 0;  // index of the machine's value; those of the sessions follow it
-      for (int i = 0; i < size(); ++i) {
-        if (values_[i].session >= 0) {
-          // A session's deviation is added to the machine's value.
-          if (values_[i].session == shot.session) J.col(i) = J.col(common);
-          continue;
-        }
-        common = i;
-        std::array<Residuals, 2> sides;
-        for (const int side : {0, 1}) {
-          const auto& own = moved_drives[i][side];
-          sides[side] = ResidualsOf(shot, shot.x, moved_models[i][side][shot.session],
-                                    own.empty() ? drives[log] : own[log], motion);
-        }
-        J.col(i) = difference(sides[0], sides[1], Difference(i));
-      }
-      for (int i = 0; i < 4; ++i) {
-        const double h = 1e-5;
-        Vector4d above = shot.x, below = shot.x;
-        above(i) += h;
-        below(i) -= h;
-        K.col(i) =
-            difference(ResidualsOf(shot, above, models[shot.session], drives[log], motion),
-                       ResidualsOf(shot, below, models[shot.session], drives[log], motion), h);
-      }
-      shares[w] = ShareOf(shot, r, J, K);
-    });
-    return shares;
-  }
-
-  double Difference(int i) const { return 1e-4 * values_[i].scale; }
-
-  Share ShareOf(const Shot& shot, const Residuals& r, const MatrixXd& J, const MatrixXd& K) const {
-    Share s;
-    s.squares = MeanSquare(r.angle);
-    s.torque_squares = MeanSquare(r.torque);
-    s.cost = Cost(r) + StartCost(shot, shot.x);
-    // The robust cost weighs a window's residuals by 1 / (1 + r²/s²).
-    const int rows = static_cast<int>(r.angle.size()), more = static_cast<int>(r.torque.size());
-    VectorXd weight(rows + more), residual(rows + more);
-    const auto weight_of = [](double square, double scale, double n) {
-      return 1 / (1 + square / (scale * scale)) / (scale * scale * n);
-    };
-    weight.head(rows).setConstant(weight_of(s.squares, scale_, rows / 2.0));
-    weight.tail(more).setConstant(weight_of(s.torque_squares, torque_scale_, more / 2.0));
-    residual << r.angle.reshaped(), r.torque.reshaped();
-    const MatrixXd WK = weight.asDiagonal() * K, WJ = weight.asDiagonal() * J;
-    const Vector4d prior = kStartWeight * kStartDeviation.cwiseAbs2().cwiseInverse();
-    s.Hxx = K.transpose() * WK;
-    s.Hxx.diagonal() += prior;
-    s.gx = WK.transpose() * residual + prior.cwiseProduct(shot.x - shot.cubic);
-    s.Hxt = WK.transpose() * J;
-    s.Htt = J.transpose() * WJ;
-    s.gt = WJ.transpose() * residual;
-    return s;
-  }
-
-  /// Sets the scales of the robust cost to the windows' median errors.
-  void SetScales() {
-    const std::vector<Model> models = ModelsAt(theta_);
-    const std::vector<Drive> drives = DrivesAt(theta_);
-    std::vector<double> errors(shots_.size()), torque_errors(shots_.size());
-    ParallelFor(pool_, windows(), [&](int w) {
-      Motion motion;
-      const Shot& shot = shots_[w];
-      const Residuals r =
-          ResidualsOf(shot, shot.x, models[shot.session], drives[shot.window.log], motion);
-      errors[w] = std::sqrt(MeanSquare(r.angle));
-      torque_errors[w] = std::sqrt(MeanSquare(r.torque));
-    });
-    scale_ = std::clamp(Median(errors), kSmallestScale, kLargestScale);
-    torque_scale_ = std::max(Median(torque_errors), kSmallestTorqueScale);
-  }
-
   std::span<const MachineLog> logs_;
   Twin twin_;
+  bool adapts_;
   ThreadPool* pool_;
   std::vector<std::string> sessions_;
   std::vector<int> session_of_;                // of each log
   std::vector<std::array<bool, 2>> reported_;  // of each log: whether the joints report torques
   std::vector<Value> values_;
-  VectorXd theta_;
+  VectorXd theta_, guess_;  // (n) now, and at first
+  MatrixXd prior_;          // (n × n) inverse covariance about the guess; 0: none
   std::vector<Shot> shots_;
   double damping_ = 1e-3;
   double scale_ = kLargestScale, torque_scale_ = 1;  // rad, N·m
@@ -514,10 +578,9 @@ class Problem {
 
 }  // namespace
 
-FitResult Fit(std::span<const MachineLog> logs, const Twin& first,
-              const std::vector<std::string>& names, const FitConfig& config, ThreadPool* pool,
-              const Progress& progress) {
-  Problem problem(logs, first, names, config, pool);
+FitResult Fit(std::span<const MachineLog> logs, const Twin& first, const Structure& structure,
+              const FitConfig& config, ThreadPool* pool, const Progress& progress) {
+  Problem problem(logs, first, structure, config, pool);
   if (problem.windows() == 0) {
     throw BadInput(Concat("identify: expected logs with a motion of ", config.windows.seconds,
                           " s away from upright, got none in ",

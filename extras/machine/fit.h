@@ -15,11 +15,21 @@
 /// robust cost; the start states are eliminated window by window.
 namespace upswing::machine {
 
+/// The values to identify, by name. Other values stay at the first guess.
+struct Structure {
+  std::string name;
+  std::vector<std::string> values;
+  std::vector<std::string> of_session = {};  // values that differ between sessions
+};
+
 /// Settings of an identification.
 struct FitConfig {
   WindowRules windows = {1, 0.5};  // seconds, hop
   int iterations = 40;
   double tolerance = 1e-5;  // least relative decrease of the cost in an iteration
+  // Adapts the first guess to a new session, that of all logs. Its covariance is the prior. Values
+  // without a covariance have a wide prior.
+  bool adapts = false;
 };
 
 /// The result of an identification.
@@ -30,11 +40,10 @@ struct FitResult {
   double torque_error = 0;  // median rms error of the reported torques, N·m; NaN without them
 };
 
-/// Identifies the twin's values called `names`. `first` is the initial guess, and has the values of
-/// all others. Throws BadInput if no window of the logs keeps the rules, if a name is unknown, or
-/// if the predictions stay hopelessly wrong.
-FitResult Fit(std::span<const MachineLog> logs, const Twin& first,
-              const std::vector<std::string>& names, const FitConfig& config, ThreadPool* pool,
-              const Progress& progress = nullptr);
+/// Identifies the values of a structure. `first` is the initial guess, and has all other values.
+/// Throws BadInput if no window of the logs keeps the rules, if a name is unknown, or if the
+/// predictions stay hopelessly wrong.
+FitResult Fit(std::span<const MachineLog> logs, const Twin& first, const Structure& structure,
+              const FitConfig& config, ThreadPool* pool, const Progress& progress = nullptr);
 
 }  // namespace upswing::machine

@@ -110,7 +110,9 @@ TEST(Fit, FindsTheMachineBehindItsLogs) {
     const uint64_t seed = 100 + 10 * static_cast<uint64_t>(draw);
     const auto logs =
         given != nullptr ? LogsOf(machine, 12, 10, seed) : LogsOf(machine, 3, 5, seed);
-    const FitResult fit = Fit(logs, FirstGuess(), kValues, kWindowsInARow, &pool);
+    const FitResult fit =
+        Fit(logs, FirstGuess(), {"", kValues, {"coulomb1", "coulomb2", "zero1", "zero2"}},
+            kWindowsInARow, &pool);
     const Manipulator truth = BodyOf(machine), found = BodyOf(fit.twin);
     const auto note = [&](const char* name, double got, double true_value) {
       errors[name].push_back(got / true_value - 1);
@@ -170,7 +172,9 @@ std::vector<double> CovarianceOfZeros(const std::vector<double>& zeros) {
     logs.back().name = std::string("session ") + "abcd"[logs.size() - 1];
   }
   ThreadPool pool(2);
-  return Fit(logs, FirstGuess(), {"zero1", "zero2"}, kWindowsInARow, &pool).twin.covariance;
+  return Fit(logs, FirstGuess(), {"", {"zero1", "zero2"}, {"zero1", "zero2"}}, kWindowsInARow,
+             &pool)
+      .twin.covariance;
 }
 
 TEST(Fit, CountsThePriorAsASessionInTheCovarianceBetweenSessions) {
@@ -200,7 +204,7 @@ TEST(Fit, FindsTheTimesOfTheMotorsAndPredictsWithThemBest) {
     Twin first = machine;
     first.actuator = {.passive_limit = 6, .current_inertia = 0.002};
     const Actuator found =
-        Fit(logs, first, {"delay", "lag", "current_delay"}, {}, &pool).twin.actuator;
+        Fit(logs, first, {"", {"delay", "lag", "current_delay"}}, {}, &pool).twin.actuator;
     EXPECT_NEAR(found.delay, delay, 1e-4);
     EXPECT_NEAR(found.lag, machine.actuator.lag, 1e-4);
     EXPECT_NEAR(found.current_delay, machine.actuator.current_delay, 1e-4);
@@ -228,7 +232,7 @@ TEST(Fit, AJointWithoutReportedTorqueLeavesTheReportsUnknown) {
   Twin first = machine;
   first.actuator.current_delay = first.actuator.current_inertia = 0.001;
   const Actuator found =
-      Fit(logs, first, {"current_delay", "current_inertia"}, {}, &pool).twin.actuator;
+      Fit(logs, first, {"", {"current_delay", "current_inertia"}}, {}, &pool).twin.actuator;
   EXPECT_NEAR(found.current_delay, machine.actuator.current_delay, 1e-4);
   EXPECT_NEAR(found.current_inertia, machine.actuator.current_inertia, 5e-5);
 }

@@ -12,6 +12,7 @@ namespace upswing::machine {
 namespace {
 
 constexpr double kJudgedSeconds = 1;  // length of the windows that choose a structure
+constexpr double kWorthwhile = 0.95;  // largest error of a better structure, as a share of the best
 
 /// The fold of each log: the logs of a session are dealt in turn. If all sessions have a single
 /// log, the sessions are dealt instead. Throws BadInput for a single log.
@@ -48,24 +49,26 @@ void ExpectCommands(const MachineLog& log) {
 
 std::vector<Structure> Structures(bool has_motors) {
   std::vector<Structure> structures;
-  std::vector<std::string> values{"center1", "inertia1", "inertia2"};
+  Structure now{"", {"center1", "inertia1", "inertia2"}};
   const auto add = [&](const char* name, const std::vector<std::string>& more) {
-    values.insert(values.end(), more.begin(), more.end());
-    structures.push_back({name, values});
+    now.name = name;
+    now.values.insert(now.values.end(), more.begin(), more.end());
+    structures.push_back(now);
   };
-  if (!has_motors) {
-    add("rigid links", {"length1"});
-    add("and viscous friction", {"damping1", "damping2"});
-    add("and dry friction", {"coulomb1", "coulomb2"});
-    add("and zeros of each session", {"zero1", "zero2"});
-    return structures;
-  }
-  add("rigid links", {"center2"});
+  add("rigid links", {has_motors ? "center2" : "length1"});
   add("and viscous friction", {"damping1", "damping2"});
-  add("and dry friction", {"coulomb1", "coulomb2"});
-  add("and inertia of the motors", {"armature"});
-  add("and delay and lag of the motors", {"delay", "lag", "current_delay", "current_inertia"});
+  now.of_session = {"coulomb1", "coulomb2"};
+  add("and dry friction of each session", now.of_session);
+  if (has_motors) {
+    add("and inertia of the motors", {"armature"});
+    add("and delay and lag of the motors", {"delay", "lag", "current_delay", "current_inertia"});
+  }
+  now.of_session.insert(now.of_session.end(), {"zero1", "zero2"});
   add("and zeros of each session", {"zero1", "zero2"});
+  if (!has_motors) return structures;
+  now.of_session.insert(now.of_session.end(),
+                        {"center1", "center2", "inertia1", "inertia2", "armature"});
+  add("and a body of each session", {});
   return structures;
 }
 
@@ -77,16 +80,21 @@ Identification Identify(std::span<const MachineLog> logs, const Twin& first,
   const int n = static_cast<int>(logs.size());
   const double fits = 1.0 + config.folds * static_cast<double>(structures.size());
   double done = 0;
-  const auto fit = [&](std::span<const MachineLog> own, const Twin& guess, const Structure& s) {
+  const auto fit = [&](std::span<const MachineLog> own, const Twin& guess, const Structure& s,
+                       const FitConfig& how) {
     const auto part = [&](double step, double steps) {
       if (progress) progress(done + step / steps, fits);
     };
-    FitResult r = Fit(own, guess, s.values, config.fit, pool, part);
+    FitResult r = Fit(own, guess, s, how, pool, part);
     ++done;
     return r;
   };
 
   result.chosen = static_cast<int>(structures.size()) - 1;
+  // A comparison needs less than a result: windows in a row, and fewer digits.
+  FitConfig rough = config.fit;
+  rough.windows.hop = rough.windows.seconds;
+  rough.tolerance = std::max(1e-4, rough.tolerance);
   if (config.folds >= 2) {
     const std::vector<int> fold = Folds(logs, config.folds);
     double best = 0;
@@ -99,7 +107,7 @@ Identification Identify(std::span<const MachineLog> logs, const Twin& first,
           if (fold[i] != f) others.push_back(logs[i]);
         }
         // Each structure begins with the values of the one before it.
-        guesses[f] = fit(others, guesses[f], structures[s]).twin;
+        guesses[f] = fit(others, guesses[f], structures[s], rough).twin;
         for (int i = 0; i < n; ++i) {
           if (fold[i] == f) twins[i] = InSession(guesses[f], logs[i]);
         }
@@ -110,13 +118,13 @@ Identification Identify(std::span<const MachineLog> logs, const Twin& first,
       });
       const double error = PooledMedian(errors);
       result.structures.push_back({structures[s], error});
-      if (s > 0 && !(error < best)) continue;
+      if (s > 0 && !(error < kWorthwhile * best)) continue;
       best = error;
       result.chosen = s;
       result.left_out = twins;
     }
   }
-  result.fit = fit(logs, first, structures[result.chosen]);
+  result.fit = fit(logs, first, structures[result.chosen], config.fit);
   MeasureLoop(logs, result.fit.twin);
   return result;
 }

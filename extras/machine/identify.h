@@ -10,12 +10,6 @@
 /// Identification with a choice of the model's structure on runs that were left out.
 namespace upswing::machine {
 
-/// A structure: the names of the values to identify. Other values stay at the first guess.
-struct Structure {
-  std::string name;
-  std::vector<std::string> values;
-};
-
 /// The structures to choose from. Each adds values to the structure before it. `has_motors`:
 /// whether the logs have torques. A motion without torques determines only ratios of masses; then
 /// the centre of link 2 stays at the first guess.

@@ -218,11 +218,14 @@ void PrintTwin(const Identification& found) {
                  option.number(), option.unit);
     }
   }
-  fmt::print("\nsession                          zero 1  zero 2  friction 1  friction 2\n");
+  if (twin.sessions.empty()) return;
+  fmt::print("\nsession                        ");
+  for (const auto& [name, number] : twin.sessions.front().values) fmt::print(" {:>8}", name);
   for (const Session& s : twin.sessions) {
-    fmt::print("  {:<30} {:>7.4f} {:>7.4f} {:>11.4f} {:>11.4f}\n", Shortened(Printable(s.name), 30),
-               s.zero1, s.zero2, s.coulomb1, s.coulomb2);
+    fmt::print("\n  {:<30}", Shortened(Printable(s.name), 30));
+    for (const auto& [name, number] : s.values) fmt::print("{:>8.4f} ", number);
   }
+  fmt::print("\n");
 }
 
 void PrintIdentification(const Identification& found, size_t logs) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pendulum/friction.h"
 #include "pendulum/runge_kutta.h"
 
 namespace upswing::machine {
@@ -10,13 +11,48 @@ namespace {
 
 constexpr double kShortestLag = 1e-5;  // s; shorter lags count as this one
 
+using StateTangents = Eigen::Matrix<double, kTangents, 4>;
+using JointTangents = Eigen::Matrix<double, kTangents, 2>;
+
+/// Derivatives of the acceleration q̈ in state s, from those of the state. The equations of motion
+/// F(q̈, s, p) = M q̈ + h = τ are linear in the constants p, so M dq̈ = dτ - ∂F/∂s ds - ∂F/∂p dp.
+JointTangents AccelerationTangents(const Manipulator& m, const PendulumState& s, const Joints& a,
+                                   const DriveTangents& torque, const StateTangents& state) {
+  const auto& [q1, q2, w1, w2] = s;
+  const double sin1 = std::sin(q1), cos1 = std::cos(q1), sin2 = std::sin(q2), cos2 = std::cos(q2);
+  const double sin12 = sin1 * cos2 + cos1 * sin2, cos12 = cos1 * cos2 - sin1 * sin2;
+  const double c = (2 * w1 + w2) * w2, bs = m.b * sin2;  // c, w1²: as in the velocity terms
+  const auto slope = [](double w) {
+    return kFrictionSlope / (1 + kFrictionSlope * kFrictionSlope * w * w);
+  };
+  Eigen::Matrix<double, 4, 2> by_state;  // ∂F/∂s
+  by_state << m.G1 * cos1 + m.G2 * cos12, m.G2 * cos12,
+      -bs * (2 * a[0] + a[1]) - m.b * cos2 * c + m.G2 * cos12,
+      -bs * a[0] + m.b * cos2 * w1 * w1 + m.G2 * cos12,  //
+      -2 * bs * w2 + m.d1 + m.f1 * slope(w1), 2 * bs * w1, -2 * bs * (w1 + w2),
+      m.d2 + m.f2 * slope(w2);
+  Eigen::Matrix<double, 12, 2> direct;  // ∂F/∂p, and -∂τ/∂delay, -∂τ/∂lag
+  direct << a[0], 0, a[0] + a[1], a[0] + a[1], cos2 * (2 * a[0] + a[1]) - sin2 * c,
+      cos2 * a[0] + sin2 * w1 * w1, 0, a[1], sin1, 0, sin12, sin12, w1, 0, 0, w2,
+      DryFriction(1, w1), 0, 0, DryFriction(1, w2), -torque.by_delay[0], -torque.by_delay[1],
+      -torque.by_lag[0], -torque.by_lag[1];
+  JointTangents force = state * by_state;
+  force.bottomRows<12>() += direct;
+  const MassMatrix M = m.Mass(cos2);
+  Eigen::Matrix2d inverse;
+  inverse << M.M22, -M.M12, -M.M12, M.M11;
+  return force * (inverse / -M.det());
+}
+
 }  // namespace
 
 Drive::Drive(double delay, double lag) : delay_(delay), lag_(std::max(lag, kShortestLag)) {}
 
 void Drive::Add(double time, const Joints& command) {
   int cursor = static_cast<int>(times_.size()) - 1;
-  starts_.push_back(At(time + delay_, cursor));
+  DriveTangents tangents;
+  starts_.push_back(At(time + delay_, cursor, &tangents));
+  slopes_.push_back(tangents.by_lag);
   times_.push_back(time);
   commands_.push_back(command);
 }
@@ -27,6 +63,7 @@ void Drive::Forget(double time) {
   times_.erase(times_.begin(), times_.begin() + n);
   commands_.erase(commands_.begin(), commands_.begin() + n);
   starts_.erase(starts_.begin(), starts_.begin() + n);
+  slopes_.erase(slopes_.begin(), slopes_.begin() + n);
 }
 
 Drive Drive::Commanded(const MachineLog& log, const Twin& twin) {
@@ -65,7 +102,7 @@ int Drive::Find(double time, int& cursor) const {
   return found;
 }
 
-Joints Drive::At(double time, int& cursor) const {
+Joints Drive::At(double time, int& cursor, DriveTangents* tangents) const {
   if (times_.empty()) return {};
   time -= delay_;
   const int event = Find(time, cursor);
@@ -77,8 +114,12 @@ Joints Drive::At(double time, int& cursor) const {
     return {a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])};
   }
   if (event < 0) return {};
-  const double decay = std::exp(-(time - times_[event]) / lag_);
+  const double age = time - times_[event], decay = std::exp(-age / lag_);
   const Joints &command = commands_[event], &start = starts_[event];
+  for (int j = 0; j < 2 && tangents != nullptr; ++j) {
+    tangents->by_delay[j] = (start[j] - command[j]) * decay / lag_;
+    tangents->by_lag[j] = slopes_[event][j] * decay + tangents->by_delay[j] * age / lag_;
+  }
   return {command[0] + (start[0] - command[0]) * decay,
           command[1] + (start[1] - command[1]) * decay};
 }
@@ -97,23 +138,54 @@ int MotionSteps(double seconds) {
 }
 
 PendulumState StepMotion(const Manipulator& body, const Drive& drive, const PendulumState& now,
-                         double time, double h, int& cursor, Joints& acceleration) {
-  const Joints u1 = drive.At(time + h / 2, cursor), u2 = drive.At(time + h, cursor);
+                         double time, double h, int& cursor, Joints& acceleration,
+                         StepTangents* tangents) {
+  DriveTangents half, full;
+  const Joints u1 = drive.At(time + h / 2, cursor, tangents != nullptr ? &half : nullptr);
+  const Joints u2 = drive.At(time + h, cursor, tangents != nullptr ? &full : nullptr);
+  const auto acceleration_at = [&](const PendulumState& s, double share) {
+    return body.Acceleration(s, share < 1 ? u1 : u2);
+  };
+  if (tangents == nullptr) {
+    const PendulumState next = RungeKuttaStep(now, acceleration, h, acceleration_at);
+    acceleration = body.Acceleration(next, u2);
+    return next;
+  }
+  // The derivatives of each stage, as RungeKuttaStep makes it.
+  const auto rate_of = [](const StepTangents& t) {
+    StateTangents rate;
+    rate << t.state.rightCols<2>(), t.acceleration;
+    return rate;
+  };
+  StepTangents stage = *tangents;
+  StateTangents sum = rate_of(stage);
+  int stages = 1;
   const PendulumState next =
       RungeKuttaStep(now, acceleration, h, [&](const PendulumState& s, double share) {
-        return body.Acceleration(s, share < 1 ? u1 : u2);
+        const Joints a = acceleration_at(s, share);
+        stage.state = tangents->state + h * share * rate_of(stage);
+        stage.acceleration = AccelerationTangents(body, s, a, share < 1 ? half : full, stage.state);
+        sum += (++stages < 4 ? 2 : 1) * rate_of(stage);
+        return a;
       });
   acceleration = body.Acceleration(next, u2);
+  tangents->state += h / 6 * sum;
+  tangents->acceleration = AccelerationTangents(body, next, acceleration, full, tangents->state);
   return next;
 }
 
 void Predict(const Manipulator& body, const Drive& drive, const Joints& zero,
              const PendulumState& start, const MachineLog& log, int first, int last,
-             double acceleration_age, Motion& motion) {
+             double acceleration_age, Motion& motion, MotionTangents* tangents) {
   const int rows = last - first;
   motion.angle.resize(rows);
   motion.velocity.resize(rows);
   motion.acceleration.resize(rows);
+  if (tangents != nullptr) {
+    tangents->angle.resize(kTangents, 2 * rows);
+    tangents->acceleration.resize(kTangents, 2 * rows);
+    tangents->jerk.resize(rows);
+  }
   const double begin = log.time[first], end = log.time[last - 1];
   const int steps = MotionSteps(end - begin);
   const double h = std::max((end - begin) / steps, 1e-9);
@@ -122,12 +194,20 @@ void Predict(const Manipulator& body, const Drive& drive, const Joints& zero,
   now.q1 -= zero[0];
   now.q2 -= zero[1];
   int cursor = 0;
-  Joints k1 = body.Acceleration(now, drive.At(begin, cursor));
+  DriveTangents of_torque;
+  Joints k1 = body.Acceleration(now, drive.At(begin, cursor, &of_torque));
+  StepTangents before, t;
+  if (tangents != nullptr) {
+    before.state.setIdentity();
+    before.acceleration = AccelerationTangents(body, now, k1, of_torque, before.state);
+  }
   int row = 0, late_row = 0;
   for (int step = 0; step < steps; ++step) {
     const double time = begin + step * h;
     Joints after = k1;
-    const PendulumState next = StepMotion(body, drive, now, time, h, cursor, after);
+    if (tangents != nullptr) t = before;
+    const PendulumState next =
+        StepMotion(body, drive, now, time, h, cursor, after, tangents != nullptr ? &t : nullptr);
 
     const bool is_last = step + 1 == steps;
     for (; row < rows && (is_last || log.time[first + row] < time + h); ++row) {
@@ -135,6 +215,13 @@ void Predict(const Manipulator& body, const Drive& drive, const Joints& zero,
       const PendulumState s = StateBetween(now, next, h, share);
       motion.angle[row] = {s.q1 + zero[0], s.q2 + zero[1]};
       motion.velocity[row] = {s.w1, s.w2};
+      if (tangents == nullptr) continue;
+      // The cubic of StateBetween.
+      const double rest = 1 - share, a = rest * rest, b = share * share;
+      tangents->angle.middleCols<2>(2 * row) =
+          a * (1 + 2 * share) * before.state.leftCols<2>() +
+          b * (1 + 2 * rest) * t.state.leftCols<2>() +
+          h * share * rest * (rest * before.state.rightCols<2>() - share * t.state.rightCols<2>());
     }
     for (; late_row < rows; ++late_row) {
       const double moment = log.time[first + late_row] - acceleration_age;
@@ -142,10 +229,15 @@ void Predict(const Manipulator& body, const Drive& drive, const Joints& zero,
       const double share = std::clamp((moment - time) / h, 0.0, 1.0);
       for (int j = 0; j < 2; ++j) {
         motion.acceleration[late_row][j] = k1[j] + share * (after[j] - k1[j]);
+        if (tangents != nullptr) tangents->jerk[late_row][j] = (after[j] - k1[j]) / h;
       }
+      if (tangents == nullptr) continue;
+      tangents->acceleration.middleCols<2>(2 * late_row) =
+          (1 - share) * before.acceleration + share * t.acceleration;
     }
     now = next;
     k1 = after;
+    if (tangents != nullptr) before = t;
   }
 }
 

@@ -141,6 +141,50 @@ TEST(Predict, RepeatsTheMotionOfTheSimulatedMachine) {
   }
 }
 
+/// Differences of predictions are the reference.
+TEST(Predict, KnowsItsDerivatives) {
+  const Twin twin = MachineWithLag();
+  const MachineLog log = RunLoop(twin, {.seconds = 0.5, .start = {0.5, -0.3, 0, 0}},
+                                 [](const CycleInput& in) -> Joints {
+                                   return {1.5 * std::sin(6 * in.time), std::cos(4 * in.time)};
+                                 });
+  std::array<double, kTangents> values{0.5, -0.3, 1, 2};
+  const Manipulator body = BodyOf(twin);
+  const auto* constants = &body.J1;
+  std::copy(constants, constants + 10, values.begin() + 4);
+  values[14] = 0.0023;  // no event is at an end of a step, where the derivative jumps
+  values[15] = twin.actuator.lag;
+  const auto predict = [&](const std::array<double, kTangents>& v, MotionTangents* tangents) {
+    Twin other = twin;
+    other.actuator.delay = v[14];
+    other.actuator.lag = v[15];
+    Motion motion;
+    Predict({v[4], v[5], v[6], v[7], v[8], v[9], v[10], v[11], v[12], v[13]},
+            Drive::Commanded(log, other), {}, {v[0], v[1], v[2], v[3]}, log, 2, log.rows(), 0.003,
+            motion, tangents);
+    return motion;
+  };
+  MotionTangents tangents;
+  predict(values, &tangents);
+  for (int i = 0; i < kTangents; ++i) {
+    const double h = 1e-6 * std::max(0.01, std::abs(values[i]));
+    auto above = values, below = values;
+    above[i] += h;
+    below[i] -= h;
+    const Motion a = predict(above, nullptr), b = predict(below, nullptr);
+    for (int k = 0; k < log.rows() - 2; k += 20) {
+      for (int j = 0; j < 2; ++j) {
+        const double angle = (a.angle[k][j] - b.angle[k][j]) / (2 * h);
+        const double acceleration = (a.acceleration[k][j] - b.acceleration[k][j]) / (2 * h);
+        EXPECT_NEAR(tangents.angle(i, 2 * k + j), angle, 1e-4 * (1 + std::abs(angle))) << i;
+        EXPECT_NEAR(tangents.acceleration(i, 2 * k + j), acceleration,
+                    1e-3 * (1 + std::abs(acceleration)))
+            << i;
+      }
+    }
+  }
+}
+
 TEST(CutWindows, StartInTheTrueState) {
   Twin twin = MachineWithLag();
   MachineLog log;

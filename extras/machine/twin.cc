@@ -78,7 +78,12 @@ void ReadSessions(const toml::table& table, const std::string& where, Twin& twin
     }
     Session& session = twin.sessions.emplace_back();
     session.name = std::string(name.str());
-    ApplyTable(OptionsOf(session), *node.as_table(), where, /*flat=*/true);
+    Twin own;
+    const Options options = OptionsOf(own);
+    ApplyTable(options, *node.as_table(), where, /*flat=*/true);
+    for (const auto& [key, value] : *node.as_table()) {
+      session.values.emplace_back(key.str(), options.Find(key.str(), where).front()->number());
+    }
   }
 }
 
@@ -158,25 +163,19 @@ void LoopTiming::Describe(Options& o) {
   o.Add(&late, "late", {0, 1}, "s", "largest lateness of these");
 }
 
-void Session::Describe(Options& o) {
-  o.Add(&zero1, "zero1", {-1, 1}, "rad", "measured angle of joint 1 that hangs");
-  o.Add(&zero2, "zero2", {-1, 1}, "rad", "measured angle of a straight joint 2");
-  o.Add(&coulomb1, "coulomb1", {0, 10}, "N·m", "dry friction of joint 1");
-  o.Add(&coulomb2, "coulomb2", {0, 10}, "N·m", "dry friction of joint 2");
-}
-
 std::string SessionOf(const std::string& log) {
-  std::string session;
-  for (const char c : log) {
-    if (c < '0' || c > '9') session += c;
-  }
   constexpr int kFolders = 2;
-  size_t begin = session.size();
+  size_t begin = log.size();
   for (int i = 0; i <= kFolders && begin != std::string::npos && begin > 0; ++i) {
-    begin = session.rfind('/', begin - 1);
+    begin = log.rfind('/', begin - 1);
   }
-  if (begin != std::string::npos && begin < session.size()) session.erase(0, begin + 1);
-  return session.substr(0, session.find(".csv"));
+  std::string session = log.substr(begin < log.size() ? begin + 1 : 0);
+  session.resize(std::min(session.size(), session.find(".csv", session.rfind('/') + 1)));
+  constexpr std::string_view kDigits = "0123456789";
+  const size_t last = session.find_last_of(kDigits);
+  if (last == std::string::npos || session.find('/', last) != std::string::npos) return session;
+  const size_t before = session.find_last_not_of(kDigits, last) + 1;
+  return session.erase(before, last + 1 - before);
 }
 
 void Twin::Describe(Options& options) {
@@ -233,9 +232,8 @@ std::string TwinText(const Twin& twin) {
   text += "\n" + OptionsOf(disturbance).Toml(/*comments=*/true, [](const Option&) { return true; });
   for (const Session& session : twin.sessions) {
     text += Concat("\n[sessions.", Quoted(session.name), "]\n");
-    const Options options = OptionsOf(session);
-    for (const Option& option : options.all()) {
-      text += Concat(option.name, " = ", option.text(), "\n");
+    for (const auto& [value, number] : session.values) {
+      text += Concat(value, " = ", FormatNumber(number), "\n");
     }
   }
   if (twin.uncertain.empty()) return text;
@@ -254,12 +252,14 @@ Twin InSession(const Twin& twin, const MachineLog& log) {
   const std::string name = SessionOf(log.name);
   for (const Session& session : twin.sessions) {
     if (session.name != name) continue;
-    own.sensors.zero1 = session.zero1;
-    own.sensors.zero2 = session.zero2;
-    own.plant.coulomb1 = session.coulomb1;
-    own.plant.coulomb2 = session.coulomb2;
-    const Options known = OptionsOf(session);
-    Forget(own, [&](const std::string& value) { return known.Get(value) != nullptr; });
+    const Options options = OptionsOf(own);
+    for (const auto& [value, number] : session.values) {
+      *std::get<double*>(options.Get(value)->target) = number;
+    }
+    Forget(own, [&](const std::string& uncertain) {
+      return std::ranges::count(session.values, uncertain, &std::pair<std::string, double>::first) >
+             0;
+    });
     break;
   }
   return own;

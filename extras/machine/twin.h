@@ -2,6 +2,7 @@
 
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/options.h"
@@ -55,20 +56,16 @@ struct LoopTiming {
   void Describe(Options& options);
 };
 
-/// A session: logs between which the machine was not touched. Two things change from session to
-/// session. The encoders are set to zero while the links hang, and dry friction holds the links a
-/// little off. Dry friction itself changes with temperature and wear.
+/// A session: logs between which the machine was not touched. The encoders are set to zero while
+/// the links hang, and dry friction holds the links a little off. Dry friction itself changes with
+/// temperature and wear, and screws or cables move.
 struct Session {
   std::string name;
-  double zero1 = 0, zero2 = 0;        // as in MachineSensors, rad
-  double coulomb1 = 0, coulomb2 = 0;  // as in Plant, N·m
-
-  /// Declares each setting in `options`: name, range, unit, help.
-  void Describe(Options& options);
+  std::vector<std::pair<std::string, double>> values;  // settings of the twin, by name
 };
 
-/// The session of a log: its path without digits and ending, from two folders above. Logs whose
-/// paths differ only in digits are of one session.
+/// The session of a log: its path from two folders above, without the last number of the file's
+/// name and without its ending. Files that differ only in that number are of one session.
 std::string SessionOf(const std::string& log);
 
 /// A machine's model, and how certain its values are.
@@ -86,8 +83,8 @@ struct Twin {
   void Describe(Options& options);
 };
 
-/// The machine in a log's session, whose zeros and friction are known; the twin itself if the log
-/// is of another session.
+/// The machine in a log's session, whose values are known; the twin itself if the log is of another
+/// session.
 Twin InSession(const Twin& twin, const MachineLog& log);
 
 /// Reads a twin from a TOML document. `where` names it in messages. Values that the document leaves

@@ -27,7 +27,8 @@ Twin SomeTwin() {
   twin.loop.late_share = 0.01;
   twin.uncertain = {"center2", "zero1", "lag"};
   twin.covariance = {4e-6, 1e-6, 0, 1e-6, 9e-4, 0, 0, 0, 1e-8};
-  twin.sessions = {{"day/run-", 0.02, -0.03, 0.12, 0.08}, {"other", 0, 0, 0.09, 0.07}};
+  twin.sessions = {{"day/run-", {{"coulomb1", 0.12}, {"zero1", 0.02}, {"zero2", -0.03}}},
+                   {"other", {}}};
   return twin;
 }
 
@@ -50,7 +51,7 @@ TEST(Twin, SurvivesTheRoundTrip) {
   EXPECT_EQ(again.uncertain, twin.uncertain);
   EXPECT_EQ(again.covariance, twin.covariance);
   ASSERT_EQ(again.sessions.size(), 2u);
-  EXPECT_EQ(again.sessions[0].zero2, -0.03);
+  EXPECT_EQ(again.sessions[0].values.size(), 3u);
   EXPECT_EQ(again.actuator.current_inertia, 0.0025);
   EXPECT_EQ(again.loop.late_share, 0.01);
 }
@@ -140,10 +141,12 @@ TEST(Twin, RefusesUnknownNamesAndRanges) {
   EXPECT_NE(MessageFor("[actuator]\nlag = 0.01").find("[plant]"), std::string::npos);
 }
 
-TEST(SessionOf, LeavesOutDigitsAndFarFolders) {
-  EXPECT_EQ(SessionOf("/data/2023/C.1/pushed/acrobot-07.csv.gz"), "C./pushed/acrobot-");
-  EXPECT_EQ(SessionOf("C.1/pushed/acrobot-01.csv"), "C./pushed/acrobot-");
+TEST(SessionOf, LeavesOutTheLastNumberAndFarFolders) {
+  EXPECT_EQ(SessionOf("/data/2023/C.1/pushed/acrobot-07.csv.gz"), "C.1/pushed/acrobot-");
+  EXPECT_EQ(SessionOf("C.1/pushed/acrobot-01.csv"), "C.1/pushed/acrobot-");
   EXPECT_EQ(SessionOf("run12.csv"), "run");
+  EXPECT_EQ(SessionOf("20230629-143339.csv.gz"), "20230629-");
+  EXPECT_EQ(SessionOf("day2/log.csv"), "day2/log");
   EXPECT_EQ(SessionOf("log"), "log");
 }
 

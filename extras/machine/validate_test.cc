@@ -70,15 +70,16 @@ TEST(Identify, ChoosesFrictionAndFindsTheSessions) {
   first.plant.coulomb1 = first.plant.coulomb2 = 0;
   IdentifyConfig config;
   config.folds = 2;
-  config.fit = {.windows = {1, 1}, .iterations = 6};
+  config.fit = {.windows = {1, 1}, .iterations = 8};
   const auto logs = LogsOfTwoDays();
   const Identification found = Identify(logs, first, config, nullptr);
-  ASSERT_EQ(found.structures.size(), 6u);
-  EXPECT_EQ(found.structures[found.chosen].structure.name, "and zeros of each session");
+  ASSERT_EQ(found.structures.size(), 7u);
+  // The last structure, with a body of each session, is as good.
+  EXPECT_GE(found.chosen, 5);
   EXPECT_NEAR(found.fit.twin.plant.coulomb1, 0.16, 0.005);
   ASSERT_EQ(found.fit.twin.sessions.size(), 2u);
-  EXPECT_NEAR(found.fit.twin.sessions[0].zero1, 0.02, 0.003);
-  EXPECT_NEAR(found.fit.twin.sessions[1].zero1, -0.03, 0.003);
+  EXPECT_NEAR(InSession(found.fit.twin, logs[0]).sensors.zero1, 0.02, 0.003);
+  EXPECT_NEAR(InSession(found.fit.twin, logs[3]).sensors.zero1, -0.03, 0.003);
   EXPECT_EQ(found.left_out.size(), logs.size());
 }
 
@@ -153,13 +154,13 @@ TEST(Identify, PredictsLeftOutRunsOfTheRealMachine) {
     }
   }
   const Twin first = RealPlant();
-  const std::vector<std::string> values = Structures(true).back().values;
+  const Structure structure = Structures(true).back();
   ThreadPool pool(2);
   std::vector<double> own, published;
   for (const int left_out : {0, 2}) {
     std::vector<MachineLog> others = logs;
     others.erase(others.begin() + left_out);
-    const Twin twin = Fit(others, first, values, {.windows = {1, 2}}, &pool).twin;
+    const Twin twin = Fit(others, first, structure, {.windows = {1, 2}}, &pool).twin;
     const auto add = [&](std::vector<double>& list, const Twin& t) {
       for (const double e : WindowErrors(logs[left_out], t, 1, false)) list.push_back(e);
     };
