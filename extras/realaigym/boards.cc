@@ -116,12 +116,6 @@ ControllerMaker ControllersOf(const Competitor& competitor) {
   };
 }
 
-BoardEntry BoardReport::Entry() const {
-  return {competitor.name(),         nominal.swing_up_seconds, nominal.energy,
-          nominal.torque_cost,       nominal.smoothness,       nominal.velocity_cost,
-          PerformanceScore(nominal), robustness.rows,          robustness.score()};
-}
-
 MachineLog NominalLog(const Competitor& competitor) {
   return SimulateEpisode(competitor.robot, {}, ControllersOf(competitor)());
 }

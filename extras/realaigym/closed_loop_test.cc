@@ -1,14 +1,23 @@
-#include "extras/realaigym/published_tvlqr.h"
+// The TVLQR controllers that ran on RealAIGym's robot, rebuilt from their published settings and
+// the logs of their runs: on machines of the twin they do what they did on the robot.
 
-#include <Eigen/LU>
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <numbers>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include "base/error.h"
 #include "base/text.h"
 #include "extras/machine/identify.h"
+#include "extras/machine/testing.h"
+#include "extras/realaigym/machine_trials.h"
 #include "pendulum/friction.h"
 
 namespace upswing::realaigym {
@@ -89,9 +98,39 @@ bool IsNearUpright(const Eigen::Vector4d& x) {
          std::abs(x(3)) < kCatchVelocity;
 }
 
-}  // namespace
+/// The law u = ū(t) - K(t) (x - x̄(t)) with friction compensation, then a constant regulator about
+/// upright. To first order, any path near the reference gives the same law: ū and x̄ are means over
+/// runs, and K follows from the published costs by Riccati's equation along them.
+class RebuiltTvlqr {
+ public:
+  /// Throws BadInput unless the logs are runs of this robot without pushes that stay upright.
+  RebuiltTvlqr(std::span<const MachineLog> logs, Robot robot);
 
-PublishedTvlqr::PublishedTvlqr(std::span<const MachineLog> logs, Robot robot) : robot_(robot) {
+  /// The rms difference (N·m) between a log's commanded torques at the motor's joint and this law
+  /// before the regulator takes over: how well the law is rebuilt.
+  double Misfit(const MachineLog& log) const;
+
+  /// Makes controllers for trials on a twin. The law must outlive them.
+  TrialController OnMachine() const;
+
+ private:
+  using State = Eigen::Vector4d;
+  using Gain = Eigen::Matrix<double, 2, 4>;
+
+  /// The torques within the law's limits, to which friction compensation is added. `upright`:
+  /// whether the regulator holds.
+  Eigen::Vector2d Torque(double time, const State& x, bool upright) const;
+  bool Catches(double time, const State& x) const;
+  void Linearise();
+
+  Robot robot_;
+  std::vector<State> x_;            // x̄, (rad, rad, rad/s, rad/s)
+  std::vector<Eigen::Vector2d> u_;  // ū, N·m
+  std::vector<Gain> K_;             // at each point of the reference
+  Gain regulator_;                  // gain about upright
+};
+
+RebuiltTvlqr::RebuiltTvlqr(std::span<const MachineLog> logs, Robot robot) : robot_(robot) {
   double end = 1e9;
   std::vector<Path> paths;
   for (const MachineLog& log : logs) {
@@ -122,7 +161,7 @@ PublishedTvlqr::PublishedTvlqr(std::span<const MachineLog> logs, Robot robot) : 
   Linearise();
 }
 
-void PublishedTvlqr::Linearise() {
+void RebuiltTvlqr::Linearise() {
   const Manipulator model = DesignModel();
   const bool pendubot = robot_ == Robot::kPendubot;
   Eigen::Matrix4d Q = Eigen::Matrix4d::Identity(), S;
@@ -163,7 +202,7 @@ void PublishedTvlqr::Linearise() {
   }
 }
 
-Eigen::Vector2d PublishedTvlqr::Torque(double time, const State& x, bool upright) const {
+Eigen::Vector2d RebuiltTvlqr::Torque(double time, const State& x, bool upright) const {
   Eigen::Vector2d limit(kPassiveLimit, kPassiveLimit);
   limit(static_cast<int>(robot_) - 1) = kMotorLimit;
   const auto limited = [&](const Eigen::Vector2d& u) -> Eigen::Vector2d {
@@ -180,11 +219,11 @@ Eigen::Vector2d PublishedTvlqr::Torque(double time, const State& x, bool upright
   return limited(u_[k] + share * (u_[k + 1] - u_[k]) - K_[k] * (x - reference));
 }
 
-bool PublishedTvlqr::Catches(double time, const State& x) const {
+bool RebuiltTvlqr::Catches(double time, const State& x) const {
   return time >= kGridStep * static_cast<double>(x_.size()) && IsNearUpright(x);
 }
 
-double PublishedTvlqr::Misfit(const MachineLog& log) const {
+double RebuiltTvlqr::Misfit(const MachineLog& log) const {
   const Path path = PathOf(log);
   const int j = static_cast<int>(robot_) - 1;
   constexpr double kBeforeSwitch = 0.5;  // s: the runs switch at different times
@@ -200,7 +239,7 @@ double PublishedTvlqr::Misfit(const MachineLog& log) const {
   return std::sqrt(sum / std::max(rows, 1));
 }
 
-TrialController PublishedTvlqr::OnMachine() const {
+TrialController RebuiltTvlqr::OnMachine() const {
   return [this](uint64_t /*seed*/) -> CycleController {
     return [this, upright = false](const CycleInput& in) mutable -> Joints {
       const State x(in.angle[0], in.angle[1], in.velocity[0], in.velocity[1]);
@@ -212,9 +251,10 @@ TrialController PublishedTvlqr::OnMachine() const {
   };
 }
 
-HardwareReport RunTvlqrTrials(const Twin& twin, Robot robot, const PublishedTvlqr& law,
-                              std::span<const MachineLog> runs, const TrialRules& rules,
-                              ThreadPool* pool, const Progress& progress) {
+/// Runs like real ones (not empty) on machines drawn from the twin's posterior: in their session,
+/// with their loop's timing, and with their pushes in turn.
+HardwareReport RunTvlqrTrials(const Twin& twin, Robot robot, const RebuiltTvlqr& law,
+                              std::span<const MachineLog> runs, const TrialRules& rules) {
   Twin machine = InSession(twin, runs.front());
   MeasureLoop(runs, machine);
   machine.sensors.velocity_share = kFilter.velocity_share;
@@ -227,7 +267,71 @@ HardwareReport RunTvlqrTrials(const Twin& twin, Robot robot, const PublishedTvlq
       return [&log](double time) { return log.push[PlaceAt(log, time).first]; };
     };
   }
-  return RunTrials(machine, robot, law.OnMachine(), own, pool, progress);
+  ThreadPool pool(2);
+  return RunTrials(machine, robot, law.OnMachine(), own, &pool);
 }
 
+/// The five given runs of a robot's TVLQR, in a folder of the measured data.
+std::vector<MachineLog> TvlqrRuns(Robot robot, const char* folder) {
+  std::vector<MachineLog> logs;
+  for (int run = 1; run <= 5; ++run) {
+    const std::string name = Concat(NameOf(robot), "-tvlqr-0", run, ".csv.gz");
+    logs.push_back(ReadLog(RealData() / "C.1" / folder / name).front());
+  }
+  return logs;
+}
+
+/// A twin of the robot: the shipped one, or the file in UPSWING_TWIN.
+Twin TwinOfRobot() {
+  const char* file = std::getenv("UPSWING_TWIN");
+  return ReadTwin(file != nullptr ? file : "realaigym-twin", "test");
+}
+
+/// Machines of the twin for each real run: few, or 200 for the tables of docs/results/machine.md.
+int MachinesOfARun() { return std::getenv("UPSWING_RUNS") != nullptr ? 200 : 4; }
+
+/// Runs of 10 s on machines of the twin, like the real runs in a folder.
+HardwareReport OnTwin(Robot robot, const std::vector<MachineLog>& real) {
+  const RebuiltTvlqr law(TvlqrRuns(robot, "swingup"), robot);
+  const TrialRules rules{.count = 5 * MachinesOfARun()};
+  const HardwareReport report = RunTvlqrTrials(TwinOfRobot(), robot, law, real, rules);
+  std::printf("%s%s: %d of %d machines succeed, mean score %.3f\n", NameOf(robot),
+              report.pushed ? ", pushed" : "", report.successes(), rules.count, report.mean());
+  return report;
+}
+
+/// The published controller does the same on the twin as on the machine.
+TEST(ClosedLoop, SwingsUpTheTwinLikeTheMachine) {
+  if (RealData().empty()) GTEST_SKIP() << "no measured data";
+  const std::vector<MachineLog> logs = TvlqrRuns(Robot::kAcrobot, "swingup");
+  const RebuiltTvlqr law(logs, Robot::kAcrobot);
+  for (const MachineLog& log : logs) EXPECT_LT(law.Misfit(log), 0.05) << log.name;
+  const HardwareReport acrobot = OnTwin(Robot::kAcrobot, logs);
+  EXPECT_GE(acrobot.successes(), 4.25 * MachinesOfARun());
+  EXPECT_NEAR(acrobot.mean(), 0.587, 0.08);  // the published mean of ten real runs
+  const HardwareReport pendubot = OnTwin(Robot::kPendubot, TvlqrRuns(Robot::kPendubot, "swingup"));
+  EXPECT_NEAR(pendubot.mean(), 0.175, 0.08);
+}
+
+TEST(ClosedLoop, PushedItEndsLikeEachRealRun) {
+  if (RealData().empty()) GTEST_SKIP() << "no measured data";
+  for (const Robot robot : {Robot::kAcrobot, Robot::kPendubot}) {
+    const std::vector<MachineLog> pushed = TvlqrRuns(robot, "pushed");
+    const auto real = ScoreHardware(pushed, robot).runs;
+    const auto trials = OnTwin(robot, pushed).runs;
+    for (size_t k = 0; k < 5; ++k) {
+      int successes = 0;
+      for (size_t i = k; i < trials.size(); i += 5) {
+        successes += trials[i].outcome.above_line ? 1 : 0;
+      }
+      const bool succeeds = real[k].outcome.above_line;
+      std::printf("  real run %zu %s, %d of %d machines succeed\n", k + 1,
+                  succeeds ? "succeeds" : "fails", successes, MachinesOfARun());
+      const int alike = succeeds ? successes : MachinesOfARun() - successes;
+      EXPECT_GE(alike, 0.75 * MachinesOfARun());
+    }
+  }
+}
+
+}  // namespace
 }  // namespace upswing::realaigym
