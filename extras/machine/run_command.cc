@@ -12,7 +12,7 @@
 #include "cli/commands.h"
 #include "cli/signals.h"
 #include "extras/machine/control_loop.h"
-#include "extras/realaigym/boards.h"
+#include "extras/machine/policy_controller.h"
 #include "os/streams.h"
 
 namespace upswing::machine {
@@ -72,15 +72,15 @@ void PrintSummary(const LoopSummary& s, const LinkCounts& counts, const Supervis
              supervisor.clipped(), 1e3 * s.longest_act);
 }
 
-int Drive(const RunArguments& a, const realaigym::Competitor& competitor,
-          const std::optional<Twin>& twin, const LinkAddress& address) {
+int Drive(const RunArguments& a, const MachinePolicy& policy, const std::optional<Twin>& twin,
+          const LinkAddress& address) {
   const PendulumState start = ParsePendulumStart(a.start);
-  const int joint = static_cast<int>(competitor.robot);
+  const int joint = static_cast<int>(RobotOf(*policy));
   const auto hz = std::llround(a.hz);
   const double period = 1 / a.hz;
   // A first call of another controller touches memory that is not there yet.
-  realaigym::MachineControllerOf(competitor.loaded)->Torque(0, {});
-  LoopController controller(realaigym::MachineControllerOf(competitor.loaded), hz);
+  ControllerOf(policy)->Torque(0, {});
+  LoopController controller(ControllerOf(policy), hz);
   Estimator estimator = twin && !a.differences
                             ? Estimator(*twin, period)
                             : Estimator(twin ? twin->sensors : a.sensors, period);
@@ -102,8 +102,8 @@ int Drive(const RunArguments& a, const realaigym::Competitor& competitor,
   g_link = OpenLink(a, address, twin, start);
   MachineLink& link = *g_link;
   LogWriter log(a.log);
-  fmt::print("{} on {}, {} Hz, {}\n", Printable(competitor.name()), Printable(a.link), a.hz,
-             realaigym::NameOf(competitor.robot));
+  fmt::print("{} on {}, {} Hz, {}\n", Printable(policy->name), Printable(a.link), a.hz,
+             NameOf(RobotOf(*policy)));
   if (!link.simulated()) {
     const std::string missing = EnterRealTime();
     if (!missing.empty()) fmt::print("  not permitted: {}; cycles may be late\n", missing);
@@ -123,7 +123,7 @@ int Drive(const RunArguments& a, const realaigym::Competitor& competitor,
 int RunRun(const RunArguments& a) {
   if (a.policy.name.empty()) throw BadInput("run: expected a policy or a controller, got none");
   if (a.link.empty()) throw BadInput("run: expected --link, got none");
-  realaigym::ParseRobot(a.robot);  // throws
+  ParseRobot(a.robot);  // throws
   const LinkAddress address = ParseLink(a.link, /*listens=*/false);
   CheckBaud(address, std::llround(a.hz));
   if (IsStandardStream(a.log)) throw BadInput("--log: expected a file, got standard output");
@@ -142,7 +142,7 @@ int RunRun(const RunArguments& a) {
   if (a.differences && a.compensation > 0)
     throw BadInput(
         "--compensation: expected no --differences with it, which estimates no friction");
-  return Drive(a, realaigym::GetCompetitor(a.policy, a.robot, twin), twin, address);
+  return Drive(a, GetMachinePolicy(a.policy, a.robot, twin), twin, address);
 }
 
 }  // namespace

@@ -10,7 +10,6 @@
 #include "base/text.h"
 #include "extras/machine/control_loop.h"
 #include "extras/realaigym/hardware.h"
-#include "pendulum/observation.h"
 #include "runs/plant_file.h"
 
 namespace upswing::realaigym {
@@ -18,93 +17,21 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr int64_t kBoardHz = 500, kPolicyHz = 50;
-static_assert(kBoardTimestep * kBoardHz == 1 && kControlPeriod * kPolicyHz == 1);
+constexpr int64_t kBoardHz = 500;
+static_assert(kBoardTimestep * kBoardHz == 1);
 
-/// Controller made by MachineControllerOf.
-class PolicyController : public MachineController {
- public:
-  explicit PolicyController(std::shared_ptr<const LoadedPolicy> loaded)
-      : loaded_(std::move(loaded)),
-        obs_(static_cast<size_t>(loaded_->policy->obs_size())),
-        before_(obs_.size()),
-        memory_(loaded_->policy->Start(1)),
-        builder_(1, loaded_->memory(),
-                 loaded_->identifies() ? std::optional(loaded_->plant) : std::nullopt) {}
+}  // namespace
 
-  int64_t hz() const override { return kPolicyHz; }
-
-  double Torque(int64_t step, const PendulumState& state) override {
-    const Plant& plant = loaded_->plant;
-    if (step == 0) {
-      builder_.Begin(0, plant, state, obs_);
-    } else {
-      obs_.swap(before_);
-      builder_.Next(0, plant, {state, torque_}, before_, torque_, obs_);
-    }
-    loaded_->policy->Act({obs_.data(), 1, loaded_->policy->obs_size()}, {&torque_, 1, 1}, *memory_);
-    return torque_ = std::clamp(torque_, -plant.torque_limit, +plant.torque_limit);
-  }
-
- private:
-  std::shared_ptr<const LoadedPolicy> loaded_;
-  std::vector<float> obs_, before_;
-  double torque_ = 0;  // N·m
-  std::unique_ptr<Policy::Memory> memory_;
-  ObservationBuilder builder_;
-};
-
-/// The plant for which a controller of a twin's machine is designed, for this robot ("": the
-/// twin's own).
-Plant DesignPlant(const Twin& twin, const std::string& robot) {
-  Plant plant = twin.plant;
-  const auto usual = static_cast<Robot>(static_cast<int>(plant.actuated_joint));
-  plant.actuated_joint = static_cast<int>(ParseRobot(robot).value_or(usual));
-  plant.coulomb1 = plant.coulomb2 = 0;
-  return plant;
-}
-
-/// Throws BadInput if a policy is for the other robot.
-void ExpectRobot(const std::string& name, Robot own, Robot asked) {
-  if (own == asked) return;
-  throw BadInput(Concat("--robot: expected ", NameOf(own), ", the robot of ", Printable(name),
-                        " (motor at joint ", static_cast<int>(own), "), got ", NameOf(asked)));
-}
-
-/// The text of a design plant; empty for the board's.
-std::string DesignText(const Plant& plant) {
+std::string OtherPlant(const MachinePolicy& policy) {
+  const Plant& plant = policy->plant;
   Plant board = ReadPlantFile("realaigym").plant;
   board.actuated_joint = plant.actuated_joint;
   return PlantValues(plant) == PlantValues(board) ? "" : PlantText(plant);
 }
 
-}  // namespace
-
-std::optional<Robot> ParseRobot(const std::string& name) {
-  for (const Robot robot : {Robot::kPendubot, Robot::kAcrobot}) {
-    if (name == NameOf(robot)) return robot;
-  }
-  if (name.empty()) return std::nullopt;
-  throw BadInput(Concat("--robot: expected pendubot or acrobot, got \"", Printable(name), "\""));
-}
-
-Competitor GetCompetitor(PolicyArguments a, const std::string& robot,
-                         const std::optional<Twin>& twin) {
-  if (twin) a.plant = DesignPlant(*twin, robot);
-  const auto loaded = std::make_shared<const LoadedPolicy>(GetPolicy(a));
-  ExpectPendulum(*loaded);
-  const auto own = static_cast<Robot>(static_cast<int>(loaded->plant.actuated_joint));
-  ExpectRobot(loaded->name, own, ParseRobot(robot).value_or(own));
-  return {loaded, own, DesignText(loaded->plant)};
-}
-
-std::unique_ptr<MachineController> MachineControllerOf(std::shared_ptr<const LoadedPolicy> loaded) {
-  return std::make_unique<PolicyController>(std::move(loaded));
-}
-
-ControllerMaker ControllersOf(const Competitor& competitor) {
-  return [loaded = competitor.loaded, motor = MotorOf(competitor.robot)]() -> CycleController {
-    const auto loop = std::make_shared<LoopController>(MachineControllerOf(loaded), kBoardHz);
+ControllerMaker ControllersOf(const MachinePolicy& policy) {
+  return [policy, motor = MotorOf(RobotOf(*policy))]() -> CycleController {
+    const auto loop = std::make_shared<LoopController>(ControllerOf(policy), kBoardHz);
     return [loop, motor, begin = -1.0](const CycleInput& in) mutable -> Joints {
       if (begin < 0) begin = in.time;
       constexpr double kRounding = 1e-3;  // share of a step
@@ -116,19 +43,19 @@ ControllerMaker ControllersOf(const Competitor& competitor) {
   };
 }
 
-MachineLog NominalLog(const Competitor& competitor) {
-  return SimulateEpisode(competitor.robot, {}, ControllersOf(competitor)());
+MachineLog NominalLog(const MachinePolicy& policy) {
+  return SimulateEpisode(RobotOf(*policy), {}, ControllersOf(policy)());
 }
 
-BoardReport ScoreOnBoard(const Competitor& competitor, uint64_t seed, ThreadPool& pool,
+BoardReport ScoreOnBoard(const MachinePolicy& policy, uint64_t seed, ThreadPool& pool,
                          const Progress& progress) {
-  BoardReport report{competitor, OutcomeOf(NominalLog(competitor)), {}};
-  const ControllerMaker make = ControllersOf(competitor);
+  BoardReport report{policy, OutcomeOf(NominalLog(policy)), {}};
+  const ControllerMaker make = ControllersOf(policy);
   const std::vector<RobustnessCase> cases = RobustnessCases(seed);
   std::vector<PendulumState> ends(cases.size());
   RunAll(static_cast<int>(cases.size()), &pool, progress, [&](int i) {
     const auto k = static_cast<size_t>(i);
-    ends[k] = EndOf(competitor.robot, cases[k].episode, make());
+    ends[k] = EndOf(RobotOf(*policy), cases[k].episode, make());
   });
   report.robustness = JudgeRobustness(cases, ends);
   return report;
@@ -137,8 +64,8 @@ BoardReport ScoreOnBoard(const Competitor& competitor, uint64_t seed, ThreadPool
 std::string BoardJson(const BoardReport& report) {
   const BoardOutcome& o = report.nominal;
   ordered_json j;
-  j["policy"] = report.competitor.name();
-  j["robot"] = NameOf(report.competitor.robot);
+  j["policy"] = report.policy->name;
+  j["robot"] = NameOf(RobotOf(*report.policy));
   j["performance"] = {{"score", PerformanceScore(o)},           {"swung_up", o.above_line},
                       {"swing_up_seconds", o.swing_up_seconds}, {"energy", o.energy},
                       {"torque_cost", o.torque_cost},           {"smoothness", o.smoothness},
@@ -167,17 +94,17 @@ Interval UptimeReport::interval() const {
   return {mean - half, mean + half};
 }
 
-MachineLog UptimeLog(const Competitor& competitor, uint64_t seed) {
-  return SimulateEpisode(competitor.robot, {}, WithResets(ControllersOf(competitor), {}, seed),
+MachineLog UptimeLog(const MachinePolicy& policy, uint64_t seed) {
+  return SimulateEpisode(RobotOf(*policy), {}, WithResets(ControllersOf(policy), {}, seed),
                          kUptimeSeconds);
 }
 
-UptimeReport ScoreUptime(const Competitor& competitor, uint64_t seed, int count, ThreadPool& pool,
+UptimeReport ScoreUptime(const MachinePolicy& policy, uint64_t seed, int count, ThreadPool& pool,
                          const Progress& progress) {
-  UptimeReport report{competitor, std::vector<UptimeRun>(static_cast<size_t>(count))};
+  UptimeReport report{policy, std::vector<UptimeRun>(static_cast<size_t>(count))};
   RunAll(count, &pool, progress, [&](int i) {
     const auto k = static_cast<size_t>(i);
-    report.runs[k] = UptimeOf(UptimeLog(competitor, seed + k));
+    report.runs[k] = UptimeOf(UptimeLog(policy, seed + k));
   });
   return report;
 }
@@ -185,8 +112,8 @@ UptimeReport ScoreUptime(const Competitor& competitor, uint64_t seed, int count,
 std::string UptimeJson(const UptimeReport& report) {
   const Interval interval = report.interval();
   const auto [mean, deviation] = report.scores();
-  ordered_json j{{"policy", report.competitor.name()},
-                 {"robot", NameOf(report.competitor.robot)},
+  ordered_json j{{"policy", report.policy->name},
+                 {"robot", NameOf(RobotOf(*report.policy))},
                  {"mean_score", mean},
                  {"interval", {interval.low, interval.high}},
                  {"deviation", deviation}};

@@ -47,7 +47,7 @@ TEST(RealAIGym, PoliciesObserveAsInTraining) {
   LoadedPolicy loaded;
   loaded.policy = recorder;
   loaded.task = kDoublePendulum;
-  const MachineLog log = NominalLog({std::make_shared<LoadedPolicy>(loaded)});
+  const MachineLog log = NominalLog(std::make_shared<LoadedPolicy>(loaded));
   ASSERT_EQ(recorder->seen.size(), 500);
 
   Identifier identifier(loaded.plant, 1);

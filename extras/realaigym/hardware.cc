@@ -33,12 +33,12 @@ double Smoothness(const std::vector<Joints>& torque, int joint) {
 
 void ExpectSame(const MachineLog& log, const HardwareReport& report, std::optional<Robot> robot) {
   const bool pushed = !log.push.empty();
-  if ((robot || RobotOf(log) == report.robot) && pushed == report.pushed) return;
+  if ((robot || RobotIn(log) == report.robot) && pushed == report.pushed) return;
   const auto kind = [](Robot of, bool with_pushes) {
     return Concat("the ", NameOf(of), with_pushes ? " with pushes" : " without pushes");
   };
   throw BadInput(Concat("--hardware: expected runs of ", kind(report.robot, report.pushed), " as ",
-                        report.runs.front().name, ", got ", kind(RobotOf(log), pushed), " in ",
+                        report.runs.front().name, ", got ", kind(RobotIn(log), pushed), " in ",
                         log.name));
 }
 
@@ -52,7 +52,7 @@ ScoreScales HardwareScales(Robot robot, bool pushed) {
   return scales;
 }
 
-Robot RobotOf(const MachineLog& log) {
+Robot RobotIn(const MachineLog& log) {
   Joints sum{};
   for (const Joints& u : log.commanded) {
     for (int j = 0; j < 2; ++j) sum[j] += u[j] * u[j];
@@ -106,7 +106,7 @@ HardwareReport ScoreHardware(std::span<const MachineLog> logs, std::optional<Rob
   HardwareReport report;
   for (const MachineLog& log : logs) {
     if (report.runs.empty()) {
-      report.robot = robot.value_or(RobotOf(log));
+      report.robot = robot.value_or(RobotIn(log));
       report.pushed = !log.push.empty();
     } else {
       ExpectSame(log, report, robot);

@@ -17,7 +17,7 @@ namespace upswing::realaigym {
 ScoreScales HardwareScales(Robot robot, bool pushed);
 
 /// The robot of a log: the joint with more commanded torque has the motor.
-Robot RobotOf(const MachineLog& log);
+Robot RobotIn(const MachineLog& log);
 
 /// Shortest run that can succeed, s.
 inline constexpr double kHardwareSeconds = 0.99 * kBoardSeconds;
@@ -44,7 +44,7 @@ struct HardwareReport {
   double mean() const;  // of the scores
 };
 
-/// Scores runs of one robot, all with pushes or all without. Without `robot`, RobotOf finds it.
+/// Scores runs of one robot, all with pushes or all without. Without `robot`, RobotIn finds it.
 /// Throws BadInput.
 HardwareReport ScoreHardware(std::span<const MachineLog> logs, std::optional<Robot> robot);
 

@@ -84,9 +84,9 @@ TEST(Hardware, PublishedEntriesFollowTheFormula) {
 
 TEST(Hardware, TheMotorIsWhereTheTorqueIs) {
   MachineLog log = UpBetween(3, 20);
-  EXPECT_EQ(RobotOf(log), Robot::kPendubot);
+  EXPECT_EQ(RobotIn(log), Robot::kPendubot);
   for (Joints& u : log.commanded) std::swap(u[0], u[1]);
-  EXPECT_EQ(RobotOf(log), Robot::kAcrobot);
+  EXPECT_EQ(RobotIn(log), Robot::kAcrobot);
 }
 
 TEST(Hardware, RefusesOtherLogs) {

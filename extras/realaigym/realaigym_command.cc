@@ -55,8 +55,8 @@ std::string Cell(double x, int decimals, double factor = 1) {
 void PrintReport(const BoardReport& report, double seconds) {
   const BoardOutcome& o = report.nominal;
   const auto& rows = report.robustness.rows;
-  fmt::print("{} on RealAIGym's {}, simulation, score version 2\n",
-             Printable(report.competitor.name()), NameOf(report.competitor.robot));
+  fmt::print("{} on RealAIGym's {}, simulation, score version 2\n", Printable(report.policy->name),
+             NameOf(RobotOf(*report.policy)));
   fmt::print("  performance  S {:.3f}: ", PerformanceScore(o));
   if (o.above_line) {
     fmt::print("swing-up {:.2f} s, energy {:.2f} J, cost {:.2f} N²m²s, smoothness {:.4f} N·m, ",
@@ -79,8 +79,8 @@ void PrintUptimes(const UptimeReport& report, const std::string& place) {
   double swing_ups = 0;
   for (const UptimeRun& run : report.runs) swing_ups += run.swing_ups;
   const Interval interval = report.interval();
-  fmt::print("{} on RealAIGym's {}, {}, score version 3\n", Printable(report.competitor.name()),
-             NameOf(report.competitor.robot), place);
+  fmt::print("{} on RealAIGym's {}, {}, score version 3\n", Printable(report.policy->name),
+             NameOf(RobotOf(*report.policy)), place);
   fmt::print("  {:<22} {:>6} {:>15} {:>15} {:>10}\n", "", "score", "95%", "least to most",
              "swing-ups");
   fmt::print("  {:<22} {:>6.3f} {:>15} {:>15} {:>10.1f}\n", Counted(report.runs.size(), "run"),
@@ -150,8 +150,8 @@ int RunHardware(const HardwareArguments& a) {
   return 0;
 }
 
-/// Scores a competitor by version 2 on machines drawn from a twin's posterior.
-void ScoreOnTwin(const ScoreArguments& a, const Twin& twin, const Competitor& competitor,
+/// Scores a policy by version 2 on machines drawn from a twin's posterior.
+void ScoreOnTwin(const ScoreArguments& a, const Twin& twin, const MachinePolicy& policy,
                  ThreadPool& pool) {
   const TrialRules rules{.count = static_cast<int>(a.runs),
                          .pushes = !a.no_pushes,
@@ -159,13 +159,13 @@ void ScoreOnTwin(const ScoreArguments& a, const Twin& twin, const Competitor& co
   HardwareReport report;
   {
     EpisodeProgress progress(a.as_json, "machines");
-    report = RunTrials(twin, competitor.robot,
-                       OnMachine(ControllersOf(competitor), twin, competitor.robot), rules, &pool,
-                       std::ref(progress));
+    report =
+        RunTrials(twin, RobotOf(*policy), OnMachine(ControllersOf(policy), twin, RobotOf(*policy)),
+                  rules, &pool, std::ref(progress));
   }
   const Interval interval = WilsonInterval(report.successes(), a.runs);
   if (a.as_json) {
-    fmt::print("{}\n", PrintableJson({{"policy", competitor.name()},
+    fmt::print("{}\n", PrintableJson({{"policy", policy->name},
                                       {"twin", twin.name},
                                       {"pushed", report.pushed},
                                       {"runs", a.runs},
@@ -177,25 +177,25 @@ void ScoreOnTwin(const ScoreArguments& a, const Twin& twin, const Competitor& co
   fmt::print(
       "{} on {} of {}{}: {} of {} swing up and stay, {:.1f}% (95%: {:.1f}–{:.1f}%), mean "
       "score {:.3f}\n",
-      Printable(competitor.name()), Counted(a.runs, "machine"), Printable(twin.name),
+      Printable(policy->name), Counted(a.runs, "machine"), Printable(twin.name),
       report.pushed ? ", pushed" : "", report.successes(), a.runs,
       100.0 * report.successes() / static_cast<double>(a.runs), 100 * interval.low,
       100 * interval.high, report.mean());
 }
 
-/// Scores a competitor by version 3, in simulation or on machines drawn from a twin's posterior.
+/// Scores a policy by version 3, in simulation or on machines drawn from a twin's posterior.
 void ScoreUptimes(const ScoreArguments& a, const std::optional<Twin>& twin,
-                  const Competitor& competitor, ThreadPool& pool) {
+                  const MachinePolicy& policy, ThreadPool& pool) {
   const auto seed = static_cast<uint64_t>(a.seed);
-  UptimeReport report{competitor, {}};
+  UptimeReport report{policy, {}};
   {
     EpisodeProgress progress(a.as_json, "runs");
     if (twin) {
       report.runs = RunUptimeTrials(
-          *twin, OnMachine(ControllersOf(competitor), *twin, competitor.robot, kHardwareResets),
+          *twin, OnMachine(ControllersOf(policy), *twin, RobotOf(*policy), kHardwareResets),
           {.count = static_cast<int>(a.runs), .seed = seed}, &pool, std::ref(progress));
     } else {
-      report = ScoreUptime(competitor, seed, static_cast<int>(a.runs), pool, std::ref(progress));
+      report = ScoreUptime(policy, seed, static_cast<int>(a.runs), pool, std::ref(progress));
     }
   }
   if (a.as_json) {
@@ -215,23 +215,22 @@ int RunScore(const ScoreArguments& a) {
   ThreadPool pool(ResolveThreads(a.threads));
   std::optional<Twin> twin;
   if (!a.twin.empty()) twin = ReadTwin(a.twin, "--twin");
-  const Competitor competitor = GetCompetitor(a.policy, a.robot, twin);
+  const MachinePolicy policy = GetMachinePolicy(a.policy, a.robot, twin);
   const auto seed = static_cast<uint64_t>(a.seed);
   if (!a.csv.empty()) {
-    WriteOutput(a.csv,
-                BoardCsv(a.version2() ? NominalLog(competitor) : UptimeLog(competitor, seed)));
+    WriteOutput(a.csv, BoardCsv(a.version2() ? NominalLog(policy) : UptimeLog(policy, seed)));
     if (IsStandardStream(a.csv)) return 0;
   }
   if (!a.version2()) {
-    ScoreUptimes(a, twin, competitor, pool);
+    ScoreUptimes(a, twin, policy, pool);
   } else if (twin) {
-    ScoreOnTwin(a, *twin, competitor, pool);
+    ScoreOnTwin(a, *twin, policy, pool);
   } else {
     const Stopwatch watch;
     BoardReport report;
     {
       EpisodeProgress progress(a.as_json);
-      report = ScoreOnBoard(competitor, seed, pool, std::ref(progress));
+      report = ScoreOnBoard(policy, seed, pool, std::ref(progress));
     }
     if (a.as_json) {
       fmt::print("{}\n", BoardJson(report));
@@ -240,9 +239,8 @@ int RunScore(const ScoreArguments& a) {
     }
   }
   if (a.as_json) return 0;
-  if (!twin && !competitor.plant.empty()) {
-    fmt::print("  designed for {}, not for the board's plant\n", competitor.plant);
-  }
+  const std::string other = twin ? std::string() : OtherPlant(policy);
+  if (!other.empty()) fmt::print("  designed for {}, not for the board's plant\n", other);
   if (twin && twin->covariance.empty()) {
     fmt::print("  all machines are equal, because the twin has no [covariance]\n");
   }

@@ -65,7 +65,7 @@ class RealAIGym(ProgramTest):
         found = self.score(*TVLQR, "--score-version", 2)
         self.assertGreater(found["performance"]["score"], 0.2)
         self.assertAlmostEqual(found["performance"]["score"], score(rows), delta=1e-9)
-        self.assertEqual(len(found["curves"]), 14)
+        self.assertEqual(len(found["curves"]), 15)
         shares = [found["robustness"][name] for name in
                   ("model", "velocity noise", "torque noise", "response", "delay", "pushes")]
         self.assertAlmostEqual(found["robustness"]["score"], sum(shares) / 6, delta=1e-12)

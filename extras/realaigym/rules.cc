@@ -31,8 +31,6 @@ std::array<BoardPush, 3> RandomPushes(Rng& rng) {
 
 }  // namespace
 
-const char* NameOf(Robot robot) { return robot == Robot::kPendubot ? "pendubot" : "acrobot"; }
-
 bool AtGoal(const PendulumState& state) {
   const auto [q1, q2, w1, w2] = state;
   return std::abs(Wrapped(q1 - std::numbers::pi)) < kBoardGoalAngle &&
@@ -118,47 +116,33 @@ double Robustness::score() const {
 Robustness JudgeRobustness(const std::vector<RobustnessCase>& cases,
                            const std::vector<PendulumState>& ends) {
   Robustness result;
-  std::vector<int> rows;    // row of each curve
-  std::vector<int> counts;  // simulations at the curve's last value
-  double pushed = 0;
+  std::vector<RobustnessCurve>& curves = result.curves;
+  int count = 0;  // simulations at the last value
   for (size_t i = 0; i < cases.size(); ++i) {
-    const RobustnessCase& each = cases[i];
-    const double reached = AtGoal(ends[i]) ? 1 : 0;
-    if (each.row == RobustnessRow::kPush) {
-      pushed += reached / kBoardPushCases;
-      continue;
-    }
-    const auto row = static_cast<int>(each.row);
-    const bool model = each.row == RobustnessRow::kModel;
-    const std::string name = model ? kBoardVariations.at(static_cast<size_t>(each.parameter)).name
-                                   : kRobustnessRowNames.at(static_cast<size_t>(row));
-    if (result.curves.empty() || result.curves.back().name != name) {
-      result.curves.push_back({name, {}, {}});
-      rows.push_back(row);
-      counts.push_back(0);
-    }
-    RobustnessCurve& curve = result.curves.back();
-    if (curve.values.empty() || curve.values.back() != each.value) {
-      curve.values.push_back(each.value);
+    const auto& [row, parameter, value, episode] = cases[i];
+    const char* name = row == RobustnessRow::kModel
+                           ? kBoardVariations.at(static_cast<size_t>(parameter)).name
+                           : kRobustnessRowNames.at(static_cast<size_t>(row));
+    if (curves.empty() || curves.back().name != name) curves.push_back({row, name, {}, {}});
+    RobustnessCurve& curve = curves.back();
+    if (curve.values.empty() || curve.values.back() != value) {
+      curve.values.push_back(value);
       curve.share.push_back(0);
-      counts.back() = 0;
+      count = 0;
     }
-    double& share = curve.share.back();
-    share += (reached - share) / ++counts.back();
+    curve.share.back() += ((AtGoal(ends[i]) ? 1 : 0) - curve.share.back()) / ++count;
   }
-  // A noise level passes if more than half of its repeats do.
+  // A noise level passes if more than half of its repeats do. Each push counts.
   std::array<int, kRobustnessRows> levels{};
-  for (size_t k = 0; k < rows.size(); ++k) {
-    const auto row = static_cast<size_t>(rows[k]);
-    for (const double share : result.curves[k].share) {
-      result.rows.at(row) += share > 0.5 ? 1 : 0;
+  for (const RobustnessCurve& curve : curves) {
+    const auto row = static_cast<size_t>(curve.row);
+    for (const double share : curve.share) {
+      const double passed = share > 0.5 ? 1 : 0;
+      result.rows.at(row) += curve.row == RobustnessRow::kPush ? share : passed;
       ++levels.at(row);
     }
   }
-  for (size_t row = 0; row < kRobustnessRows; ++row) {
-    if (levels.at(row) > 0) result.rows.at(row) /= levels.at(row);
-  }
-  result.rows.back() = pushed;
+  for (size_t row = 0; row < kRobustnessRows; ++row) result.rows.at(row) /= levels.at(row);
   return result;
 }
 

@@ -6,18 +6,12 @@
 #include <string>
 #include <vector>
 
+#include "extras/machine/policy_controller.h"
 #include "extras/realaigym/plant.h"
 
 /// The rules of RealAIGym's simulation boards, version 2 (docs/howto/realaigym.md): the
 /// simulations, and the scores of performance and robustness.
 namespace upswing::realaigym {
-
-/// The robot: the joint with the motor.
-enum class Robot { kPendubot = 1, kAcrobot = 2 };
-const char* NameOf(Robot robot);
-
-/// Index of the motor's joint.
-inline size_t MotorOf(Robot robot) { return static_cast<size_t>(robot) - 1; }
 
 /// A short disturbing torque, also beyond the motor's limit.
 struct BoardPush {
@@ -124,6 +118,7 @@ std::vector<RobustnessCase> RobustnessCases(uint64_t seed);
 
 /// The result of a row, or of one model parameter: for each level, the share of successes.
 struct RobustnessCurve {
+  RobustnessRow row;
   std::string name;
   std::vector<double> values;  // of the varied quantity
   std::vector<double> share;   // share of simulations that end at the goal
@@ -131,11 +126,11 @@ struct RobustnessCurve {
 
 struct Robustness {
   std::array<double, kRobustnessRows> rows{};  // share of passed levels, or of pushes
-  std::vector<RobustnessCurve> curves;  // ten of the model, then the other rows without pushes
+  std::vector<RobustnessCurve> curves;         // ten of the model, then the other rows
   double score() const;
 };
 
-/// Computes the robustness scores from the final states of these cases.
+/// Computes the robustness scores from the final states of all cases.
 Robustness JudgeRobustness(const std::vector<RobustnessCase>& cases,
                            const std::vector<PendulumState>& ends);
 

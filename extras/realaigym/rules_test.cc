@@ -87,7 +87,7 @@ TEST(RealAiGymRules, ALevelOfNoisePassesAboveOneHalf) {
   const Robustness judged = JudgeRobustness(cases, ends);
   EXPECT_NEAR(judged.rows[0], 209.0 / 210, 1e-12);
   EXPECT_NEAR(judged.rows[5], 49.0 / 50, 1e-12);
-  ASSERT_EQ(judged.curves.size(), 14);
+  ASSERT_EQ(judged.curves.size(), 15);
   EXPECT_EQ(judged.curves[0].share[0], 0);
   EXPECT_NEAR(judged.curves[10].share[0], 0.6, 1e-12);
 }

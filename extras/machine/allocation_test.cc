@@ -10,7 +10,7 @@
 
 #include "extras/machine/fake_machine.h"
 #include "extras/machine/loop_testing.h"
-#include "extras/realaigym/boards.h"
+#include "extras/machine/policy_controller.h"
 #include "nn/network_policy.h"
 #include "os/file.h"
 #include "os/testing.h"
@@ -30,7 +30,7 @@ thread_local int64_t g_allocations = 0;
 [[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
 [[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
-namespace upswing::realaigym {
+namespace upswing::machine {
 namespace {
 
 /// A policy of the double pendulum with a network of two hidden units.
@@ -73,7 +73,7 @@ TEST(ControlLoop, ACycleAllocatesNoMemory) {
   for (const LoadedPolicy& policy : {lqr, network}) {
     const Server server;
     LoopBench bench;
-    bench.machine_controller = MachineControllerOf(std::make_shared<LoadedPolicy>(policy));
+    bench.machine_controller = ControllerOf(std::make_shared<LoadedPolicy>(policy));
     bench.log_path = FreePath(folder / "log.csv").string();
     // The machine that runs the tests may be busy.
     bench.limits.age = 1;
@@ -92,4 +92,4 @@ TEST(ControlLoop, ACycleAllocatesNoMemory) {
 }
 
 }  // namespace
-}  // namespace upswing::realaigym
+}  // namespace upswing::machine

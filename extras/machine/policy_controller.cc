@@ -1,0 +1,92 @@
+#include "extras/machine/policy_controller.h"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "base/error.h"
+#include "base/text.h"
+#include "pendulum/observation.h"
+
+namespace upswing::machine {
+namespace {
+
+constexpr int64_t kPolicyHz = 50;
+static_assert(kControlPeriod * kPolicyHz == 1);
+
+/// Controller made by ControllerOf.
+class PolicyController : public MachineController {
+ public:
+  explicit PolicyController(MachinePolicy policy)
+      : policy_(std::move(policy)),
+        obs_(static_cast<size_t>(policy_->policy->obs_size())),
+        before_(obs_.size()),
+        memory_(policy_->policy->Start(1)),
+        builder_(1, policy_->memory(),
+                 policy_->identifies() ? std::optional(policy_->plant) : std::nullopt) {}
+
+  int64_t hz() const override { return kPolicyHz; }
+
+  double Torque(int64_t step, const PendulumState& state) override {
+    const Plant& plant = policy_->plant;
+    if (step == 0) {
+      builder_.Begin(0, plant, state, obs_);
+    } else {
+      obs_.swap(before_);
+      builder_.Next(0, plant, {state, torque_}, before_, torque_, obs_);
+    }
+    policy_->policy->Act({obs_.data(), 1, policy_->policy->obs_size()}, {&torque_, 1, 1}, *memory_);
+    return torque_ = std::clamp(torque_, -plant.torque_limit, +plant.torque_limit);
+  }
+
+ private:
+  MachinePolicy policy_;
+  std::vector<float> obs_, before_;
+  double torque_ = 0;  // N·m
+  std::unique_ptr<Policy::Memory> memory_;
+  ObservationBuilder builder_;
+};
+
+/// The plant for which a controller of a twin's machine is designed, for this robot ("": the
+/// twin's own).
+Plant DesignPlant(const Twin& twin, const std::string& robot) {
+  Plant plant = twin.plant;
+  const auto usual = static_cast<Robot>(static_cast<int>(plant.actuated_joint));
+  plant.actuated_joint = static_cast<int>(ParseRobot(robot).value_or(usual));
+  plant.coulomb1 = plant.coulomb2 = 0;
+  return plant;
+}
+
+/// Throws BadInput if a policy is for the other robot.
+void ExpectRobot(const std::string& name, Robot own, Robot asked) {
+  if (own == asked) return;
+  throw BadInput(Concat("--robot: expected ", NameOf(own), ", the robot of ", Printable(name),
+                        " (motor at joint ", static_cast<int>(own), "), got ", NameOf(asked)));
+}
+
+}  // namespace
+
+const char* NameOf(Robot robot) { return robot == Robot::kPendubot ? "pendubot" : "acrobot"; }
+
+std::optional<Robot> ParseRobot(const std::string& name) {
+  for (const Robot robot : {Robot::kPendubot, Robot::kAcrobot}) {
+    if (name == NameOf(robot)) return robot;
+  }
+  if (name.empty()) return std::nullopt;
+  throw BadInput(Concat("--robot: expected pendubot or acrobot, got \"", Printable(name), "\""));
+}
+
+MachinePolicy GetMachinePolicy(PolicyArguments a, const std::string& robot,
+                               const std::optional<Twin>& twin) {
+  if (twin) a.plant = DesignPlant(*twin, robot);
+  auto policy = std::make_shared<const LoadedPolicy>(GetPolicy(a));
+  ExpectPendulum(*policy);
+  ExpectRobot(policy->name, RobotOf(*policy), ParseRobot(robot).value_or(RobotOf(*policy)));
+  return policy;
+}
+
+std::unique_ptr<MachineController> ControllerOf(MachinePolicy policy) {
+  return std::make_unique<PolicyController>(std::move(policy));
+}
+
+}  // namespace upswing::machine
