@@ -210,6 +210,7 @@ class SwingUp(ProgramTest):
         self.refuse(["eval", "tvlqr", "--tvlqr-seconds", "1"], "tvlqr: found no swing-up of 1 s with 4 N")
         self.refuse(["eval", "tvlqr", "--tvlqr-seconds", "1.01"], "--tvlqr-seconds", "multiple of 0.02")
         self.refuse(["eval", "mpc", "--mpc-iterations", "0"], "--mpc-iterations")
+        self.refuse(["eval", "mpc", "--mpc-guesses", "0"], "--mpc-guesses")
         self.refuse(["eval", "mpc", "--mpc-angle-range", "3"], "--mpc-angle-range")
         self.refuse(["eval", "mpc", "--mpc-velocity", "-1"], "--mpc-velocity")
         for controller in ("energy", "mpc", "pfl", "tvlqr"):

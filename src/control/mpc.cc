@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "base/text.h"
@@ -43,6 +44,20 @@ std::unique_ptr<Policy::Memory> MpcPolicy::Start(int num_envs) const {
   return std::make_unique<Plans>(num_envs, plant());
 }
 
+Trajectory MpcPolicy::FirstPlan(TrajectoryOptimizer& optimizer, const StateVector& x,
+                                size_t T) const {
+  const auto guesses = static_cast<int>(config_.guesses);
+  Trajectory best;
+  for (int i = 0; i < guesses; ++i) {
+    const double share = guesses == 1 ? 0 : 2.0 * i / (guesses - 1) - 1;
+    const std::vector<double> torques(T, share * plant().torque_limit);
+    Trajectory plan = optimizer.Follow(cost_, x, torques);
+    if (guesses > 1) optimizer.Improve(cost_, kTolerance, kFirstIterations, plan);
+    if (i == 0 || plan.cost < best.cost) best = std::move(plan);
+  }
+  return best;
+}
+
 double MpcPolicy::Torque(const StateVector& deviation, size_t env, Memory& memory) const {
   auto& plans = static_cast<Plans&>(memory);
   auto& [trajectory, K] = plans.plans[env];
@@ -53,7 +68,7 @@ double MpcPolicy::Torque(const StateVector& deviation, size_t env, Memory& memor
   if (first) {
     // A range counts turns from hanging at 0. Without one, 0 and 2π are alike.
     if (config_.angle_range < MpcConfig().angle_range) x[0] = Wrapped(x[0]);
-    trajectory = optimizer.Follow(cost_, x, std::vector<double>(T, 0.0));
+    trajectory = FirstPlan(optimizer, x, T);
   } else {
     // Shift the plan by one step; the regulator chooses the new last torque.
     const StateVector last = UprightDeviation(trajectory.x.back());

@@ -24,6 +24,8 @@ class MpcPolicy : public PendulumController {
   struct Plans;
 
   double Torque(const StateVector& deviation, size_t env, Memory& memory) const override;
+  /// The first plan (T) of an episode from x: the cheapest one that the guesses lead to.
+  Trajectory FirstPlan(TrajectoryOptimizer& optimizer, const StateVector& x, size_t T) const;
 
   MpcConfig config_;
   Lqr lqr_;

@@ -20,6 +20,8 @@ void MpcConfig::Describe(Options& o) {
   o.Add(&seconds, "mpc_seconds", {0.1, 10}, "s", "planning horizon of mpc").step = kControlPeriod;
   o.Add(&iterations, "mpc_iterations", {1, 1000}, "",
         "optimisation steps of mpc's plan at each decision");
+  o.Add(&guesses, "mpc_guesses", {1, 99}, "",
+        "constant torques from which mpc searches its first plan, evenly spaced; 1: no torque");
   o.Add(&angle_range, "mpc_angle_range", {3.2, 1e6}, "rad",
         "largest angle, with full turns, of an upright that mpc aims at; the default is no limit");
   o.Add(&velocity, "mpc_velocity", {0.1, 1e6}, "rad/s",

@@ -24,6 +24,7 @@ struct LqrConfig {
 struct MpcConfig {
   double seconds = 2.5;      // length of the horizon, s
   int64_t iterations = 2;    // iterations of trajectory optimisation at each decision
+  int64_t guesses = 1;       // constant torques that the first plan is improved from
   double angle_range = 1e6;  // largest angle of an upright goal, with full turns, rad
   double velocity = 1e6;     // of the motor's joint, above which mpc brakes, rad/s
 

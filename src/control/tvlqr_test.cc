@@ -85,6 +85,26 @@ TEST(Mpc, UprightItIsTheRegulator) {
   for (size_t t = 0; t < one.size(); ++t) EXPECT_LT((one[t] - other[t]).norm(), 2e-5);
 }
 
+TEST(Mpc, MoreGuessesSwingUpNoLess) {
+  const Plant plant;
+  const auto upright = [&](int64_t guesses) {
+    MpcConfig config;
+    config.seconds = 0.5;
+    config.guesses = guesses;
+    const MpcPolicy policy(LqrConfig(), config, plant);
+    Rng rng(3, "starts");
+    int successes = 0;
+    for (int trial = 0; trial < 10; ++trial) {
+      const StateVector start{rng.Uniform(-3, 3), rng.Uniform(-3, 3), 0, 0};
+      if (Simulate(policy, start, 2, plant).back().norm() < 0.1) ++successes;
+    }
+    return successes;
+  };
+  const int one = upright(1);
+  EXPECT_GT(one, 0);
+  EXPECT_GE(upright(5), one);
+}
+
 TEST(Mpc, SwingsBackToAGoalWithinTheRange) {
   const Plant plant;
   const auto turned = [&](double angle_range) {
