@@ -26,6 +26,9 @@
 #include "report/figure.h"
 
 namespace upswing::machine {
+
+void AddLearn(CommandLine& line);  // in learn_command.cc
+
 namespace {
 
 struct MachineArguments {
@@ -391,6 +394,7 @@ void AddValidate(CommandLine& line) {
 void AddMachine(CommandLine& line) {
   AddCheck(line.Subcommand("check", "Look for faults in logs"));
   AddIdentify(line.Subcommand("identify", "Fit a twin, a model of the machine, to logs"));
+  AddLearn(line.Subcommand("learn", "Learn to balance a machine about which nothing is known"));
   AddValidate(line.Subcommand("validate", "Compare a twin's predictions with logs"));
   line.Footer(
       "Examples:\n"

@@ -1,0 +1,312 @@
+#include "extras/machine/learn.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <memory>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "base/error.h"
+#include "base/format.h"
+#include "base/text.h"
+#include "extras/machine/excitation.h"
+#include "extras/machine/first_twin.h"
+#include "extras/machine/identify.h"
+#include "extras/machine/learning_run.h"
+#include "extras/machine/policy_controller.h"
+#include "os/file.h"
+
+namespace upswing::machine {
+namespace {
+
+/// An excitation: its length, the lean of the links (rad) and the energy (1: upright) that it aims
+/// at, and the windows (s) in which a model predicts its motion.
+struct Excitement {
+  double seconds, lean, energy, window;
+};
+constexpr Excitement kSmallMotion{4, 0.8, 0.2, 0.3}, kLargeMotion{6, 2, 0.6, 0.5};
+constexpr double kLimitShare = 0.6;  // share of the user's limits that an excitation aims at
+
+constexpr double kLargestZero = 0.2;     // of the encoders, rad
+constexpr double kLongestSwinging = 60;  // until the links rest, s
+constexpr int kDraws = 5;                // machines of the posterior that judge a controller
+
+/// Controllers to choose from, the best first. All decide in less than a millisecond.
+std::vector<PolicyArguments> Candidates() {
+  const auto with = [](const char* name, const std::vector<FlagValue>& flags) {
+    PolicyArguments a;
+    a.name = name;
+    a.flags = flags;
+    return a;
+  };
+  return {with("tvlqr", {}),
+          with("tvlqr", {{"lqr_q1", "100"}, {"lqr_q2", "100"}, {"lqr_torque", "0.3"}}),
+          with("tvlqr", {{"tvlqr_seconds", "6"}, {"tvlqr_reserve", "0.1"}}),
+          with("mpc", {{"mpc_seconds", "0.3"},
+                       {"mpc_angle_range", "9"},
+                       {"lqr_q1", "100"},
+                       {"lqr_q2", "100"},
+                       {"lqr_torque", "0.3"}})};
+}
+
+double ProcessorSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+/// A session of learning.
+class Learner {
+ public:
+  Learner(const LearnConfig& config, MachineLink& link, const std::filesystem::path& out,
+          ThreadPool* pool, const std::function<void(const std::string&)>& say,
+          const std::function<bool()>& stop)
+      : c_(config), link_(link), out_(out), pool_(pool), say_(say), stop_(stop) {
+    twin_.plant.torque_limit = c_.limits.torque;
+    twin_.plant.actuated_joint = c_.actuated_joint;
+    twin_.actuator.passive_limit = c_.passive_torque;
+    twin_.sensors.quantum = 2 * std::numbers::pi / c_.encoder_counts;
+    twin_.sensors.velocity_share = 0.2;
+    twin_.sensors.velocity_dead_zone = 0.1;
+    twin_.loop.period = 1 / c_.hz;
+  }
+
+  LearnResult Work() {
+    try {
+      Excite(kSmallMotion, /*has_twin=*/false);
+      Fit(kSmallMotion.window);
+      // Links that hardly moved show no twin that is good enough to estimate the state.
+      const MachineSensors& found = twin_.sensors;
+      Excite(kLargeMotion, Larger(found.zero1, found.zero2) < kLargestZero);
+      while (true) {
+        Fit(kLargeMotion.window);
+        if (Try()) return result_;
+      }
+    } catch (const Ended& ended) {
+      result_.reason = ended.reason;
+    }
+    return result_;
+  }
+
+ private:
+  /// The session ends without balance.
+  struct Ended {
+    std::string reason;
+  };
+
+  void ExpectBudget() const {
+    if (stop_()) throw Ended{"stopped"};
+    if (result_.motion >= c_.motion) throw Ended{"the time of motion is used up"};
+    if (result_.computing >= c_.computing) throw Ended{"the time of computing is used up"};
+  }
+
+  /// Runs work that computes, and counts its processor time.
+  template <typename Work>
+  void Compute(const Work& work) {
+    const double begin = ProcessorSeconds();
+    try {
+      work();
+    } catch (const Error& error) {
+      throw Ended{error.what()};
+    }
+    result_.computing += ProcessorSeconds() - begin;
+  }
+
+  void Excite(const Excitement& e, bool has_twin) {
+    const Limits& l = c_.limits;
+    const double energy = std::min(e.energy, kLimitShare * l.energy);
+    // Links that swing to this lean have this energy.
+    const double lean = std::min({e.lean, kLimitShare * l.angle, std::acos(1 - 2 * energy)});
+    const Manipulator body = BodyOf(twin_);
+    const double hanging = -body.At({}).energy;
+    const auto level = [=, velocity = kLimitShare * l.velocity](const PendulumState& s) {
+      const double motion = std::max(Larger(Wrapped(s.q1), Wrapped(s.q1 + s.q2)) / lean,
+                                     Larger(s.w1, s.w2) / velocity);
+      return has_twin ? std::max(motion, (1 + body.At(s).energy / hanging) / energy) : motion;
+    };
+    say_(fmt::format("excite: torques grow until the links lean {:.2f} rad, {:g} s", lean,
+                     e.seconds));
+    Run({.limits = l, .seconds = e.seconds},
+        has_twin ? Estimator(twin_, 1 / c_.hz) : Estimator(twin_.sensors, 1 / c_.hz),
+        std::make_unique<Excitation>(l.torque, c_.actuated_joint, level, c_.seed));
+  }
+
+  RunOutcome Run(RunRules rules, const Estimator& estimator,
+                 std::unique_ptr<MachineController> controller) {
+    ExpectBudget();
+    rules.seconds = std::min(rules.seconds, c_.motion - result_.motion);
+    rules.log = (out_ / fmt::format("log-{:02}.csv", logs_.size() + 1)).string();
+    if (!logs_.empty()) rules.limits.patience = std::max(rules.limits.patience, kLongestSwinging);
+    RunOutcome run =
+        RunCycles(c_, rules, twin_.sensors, estimator, std::move(controller), link_, stop_);
+    if (run.motion == 0) {
+      if (stop_()) throw Ended{"stopped"};
+      throw Failure(run.reason);
+    }
+    result_.motion += run.motion;
+    logs_.push_back(ReadLog(rules.log).front());
+    Joints angle{}, torque{};
+    for (int k = 0; k < logs_.back().rows(); ++k) {
+      for (int j = 0; j < 2; ++j) {
+        angle[j] = Larger(angle[j], logs_.back().angle[k][j]);
+        torque[j] = Larger(torque[j], logs_.back().commanded[k][j]);
+      }
+    }
+    say_(
+        fmt::format("  {}: {:.1f} s, angles up to {:.2f} and {:.2f} rad, torques {:.2f} and "
+                    "{:.2f} N·m{}",
+                    rules.log, run.motion, angle[0], angle[1], torque[0], torque[1],
+                    run.reason.empty() ? "" : "; " + run.reason));
+    return run;
+  }
+
+  /// Identifies the twin from all logs, the last of which counts twice.
+  void Fit(double window) {
+    ExpectBudget();
+    say_(fmt::format("identify: {}", Counted(std::ssize(logs_), "log")));
+    Compute([&] {
+      const Twin guess = FirstTwin(logs_, twin_);
+      if (logs_.size() == 1 || ErrorOf(guess) < ErrorOf(twin_)) twin_ = guess;
+      FitConfig config{.windows = {window, window}, .iterations = 30, .tolerance = 1e-4};
+      std::vector<std::string> values = Structures(/*has_motors=*/true).back().values;
+      values.push_back("length1");
+      std::vector<MachineLog> logs = logs_;
+      if (result_.tries > 0) logs.push_back(logs_.back());
+      const double quantum = twin_.sensors.quantum;
+      FitResult fit = machine::Fit(logs, twin_, values, config, pool_);
+      twin_ = fit.twin;
+      MeasureLoop(logs_, twin_);
+      twin_.sensors.quantum = quantum;
+      twin_.name = "learned";
+      KeepValidCovariance();
+      WriteFileAtomically(out_ / "twin.toml", TwinText(twin_));
+      const Manipulator m = BodyOf(twin_);
+      say_(fmt::format(
+          "  error {:.4f} rad; gravity {:.2f} and {:.2f} N·m, dry friction {:.3f} and {:.3f} "
+          "N·m, delay {:.1f} ms, lag {:.1f} ms",
+          fit.error, m.G1, m.G2, m.f1, m.f2, 1e3 * twin_.actuator.delay, 1e3 * twin_.actuator.lag));
+    });
+  }
+
+  double ErrorOf(const Twin& twin) const {
+    std::vector<std::vector<double>> errors;
+    for (const MachineLog& log : logs_) errors.push_back(WindowErrors(log, twin, 0.3, false));
+    return PooledMedian(errors);
+  }
+
+  /// Few windows give a covariance that rounding makes invalid. Then the values count as
+  /// independent.
+  void KeepValidCovariance() {
+    try {
+      Rng rng(c_.seed, "machine: draws");
+      DrawTwin(twin_, rng);
+    } catch (const Error&) {
+      const size_t n = twin_.uncertain.size();
+      for (size_t i = 0; i < n * n; ++i) twin_.covariance[i] *= i % (n + 1) == 0 ? 1 : 0;
+    }
+  }
+
+  /// Designs a controller and tries it. Returns whether the machine balanced.
+  bool Try() {
+    ExpectBudget();
+    const auto policy = Choose();
+    say_(fmt::format("try {}: {}", ++result_.tries, policy->name));
+    const RunOutcome run = Run(TryRules(), Estimator(twin_, 1 / c_.hz), ControllerOf(policy));
+    result_.balanced = run.summary.upright;
+    say_(fmt::format("  balanced {:.1f} s; used {:.1f} s of motion, {:.1f} s of computing",
+                     result_.balanced, result_.motion, result_.computing));
+    return result_.balanced >= c_.hold;
+  }
+
+  RunRules TryRules() const {
+    return {.limits = c_.limits, .seconds = 2 * kLongestFall + c_.hold, .is_try = true};
+  }
+
+  /// The first controller that balances all machines drawn from the posterior, or most of them.
+  std::shared_ptr<const LoadedPolicy> Choose() {
+    std::shared_ptr<const LoadedPolicy> best;
+    Compute([&] {
+      int most = -1;
+      for (PolicyArguments candidate : Candidates()) {
+        candidate.plant = twin_.plant;
+        // The motors compensate dry friction.
+        candidate.plant->coulomb1 = candidate.plant->coulomb2 = 0;
+        std::shared_ptr<const LoadedPolicy> policy;
+        int held = 0;
+        try {
+          policy = std::make_shared<const LoadedPolicy>(GetPolicy(candidate));
+          held = HeldBy(policy);
+        } catch (const Error& error) {
+          say_(fmt::format("  {}", error.what()));
+          continue;
+        }
+        say_(fmt::format("design: {}: {} of {} machines of the twin", policy->name, held, kDraws));
+        if (held <= most) continue;
+        most = held;
+        best = policy;
+        result_.controller = candidate;
+        if (held == kDraws) break;
+      }
+    });
+    if (best == nullptr) throw Ended{"no controller exists for the twin"};
+    return best;
+  }
+
+  /// Number of machines, of kDraws of the posterior, that a controller balances.
+  int HeldBy(const std::shared_ptr<const LoadedPolicy>& policy) const {
+    int held = 0;
+    for (int i = 0; i < kDraws; ++i) {
+      Rng rng(c_.seed, "machine: draws", static_cast<uint64_t>(i));
+      TwinLink link(DrawTwin(InSession(twin_, logs_.back()), rng), {}, c_.seed);
+      const RunOutcome run = RunCycles(c_, TryRules(), twin_.sensors, Estimator(twin_, 1 / c_.hz),
+                                       ControllerOf(policy), link, stop_);
+      held += run.summary.upright >= c_.hold ? 1 : 0;
+    }
+    return held;
+  }
+
+  const LearnConfig& c_;
+  MachineLink& link_;
+  std::filesystem::path out_;
+  ThreadPool* pool_;
+  std::function<void(const std::string&)> say_;
+  std::function<bool()> stop_;
+  Twin twin_;
+  std::vector<MachineLog> logs_;
+  LearnResult result_;
+};
+
+}  // namespace
+
+void LearnConfig::Describe(Options& o) {
+  o.Section("learning");
+  o.Add(&encoder_counts, "encoder_counts", {16, 1e9}, "1/turn", "steps of the encoders; required")
+      .usual = "none";
+  o.Add(&hold, "hold", {1, 3600}, "s", "time of balance that ends the learning");
+  o.Add(&motion, "motion", {10, 3600}, "s", "longest time with torques, all runs together");
+  o.Add(&computing, "computing", {1, 1e6}, "s", "longest processor time of models and controllers");
+  o.Add(&hz, "hz", {100, 1000}, "1/s", "cycles per second").step = 50;
+  o.Add(&passive_torque, "passive_torque", {0, 1000}, "N·m",
+        "largest torque of the joint without the controller's motor; it only compensates friction");
+  limits.Describe(o);
+}
+
+void LearnConfig::Check() const {
+  const auto expect = [](const char* flag, double least, double got, const char* unit) {
+    if (got >= least) return;
+    throw BadInput(
+        Concat(flag, ": expected ", least, unit, " or more, which a swing-up needs, got ", got));
+  };
+  expect("--max-angle", 3.5, limits.angle, " rad");
+  expect("--max-energy", 1.1, limits.energy, "");
+  expect("--encoder-counts", 16, encoder_counts, "");
+}
+
+LearnResult Learn(const LearnConfig& config, MachineLink& link, const std::filesystem::path& out,
+                  ThreadPool* pool, const std::function<void(const std::string&)>& say,
+                  const std::function<bool()>& stop) {
+  config.Check();
+  return Learner(config, link, out, pool, say, stop).Work();
+}
+
+}  // namespace upswing::machine

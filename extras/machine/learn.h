@@ -1,0 +1,54 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+
+#include "base/thread_pool.h"
+#include "extras/machine/link.h"
+#include "extras/machine/supervisor.h"
+#include "runs/find_policy.h"
+
+/// From a machine about which nothing is known to one that balances.
+namespace upswing::machine {
+
+/// What the user knows of the machine, and limits.
+struct LearnConfig {
+  Limits limits;                // torque: that of the motor
+  double encoder_counts = 0;    // of a turn
+  double hz = 500;              // cycles per second
+  double hold = 10;             // time of balance that ends the learning, s
+  double motion = 60;           // most time in which torques move the links, s
+  double computing = 120;       // most processor time of models and controllers, s
+  double passive_torque = 0.5;  // largest torque of the joint without the controller's motor, N·m
+  int actuated_joint = 1;       // 1 or 2
+  uint64_t seed = 1;            // of the excitations and of simulated tries
+
+  /// Declares each setting in `options`: name, range, unit, help.
+  void Describe(Options& options);
+  /// Throws BadInput for limits within which no swing-up is possible.
+  void Check() const;
+};
+
+/// What a session of learning came to.
+struct LearnResult {
+  PolicyArguments controller;        // the last one that was tried; empty: none
+  int tries = 0;                     // on the machine
+  double balanced = 0;               // time of balance at the end of the last try, s
+  double motion = 0, computing = 0;  // used, s
+  std::string reason;                // why it ended; empty: the machine balanced
+};
+
+/// Share of the estimated dry friction that the motors compensate in a try.
+inline constexpr double kLearnedCompensation = 0.95;
+
+/// Excites the machine, identifies a twin, designs a controller on it and tries it. After a failed
+/// try it identifies again, with twice the weight on that log, until the machine balances or a
+/// budget is spent. Writes log-NN.csv and twin.toml into the folder `out`. `say` gets a line for
+/// each step; `stop` asks for an end. Throws Failure if the machine does not answer, or does not
+/// hang at rest.
+LearnResult Learn(const LearnConfig& config, MachineLink& link, const std::filesystem::path& out,
+                  ThreadPool* pool, const std::function<void(const std::string&)>& say,
+                  const std::function<bool()>& stop);
+
+}  // namespace upswing::machine

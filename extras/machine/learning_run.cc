@@ -1,0 +1,57 @@
+#include "extras/machine/learning_run.h"
+
+#include <future>
+#include <utility>
+
+namespace upswing::machine {
+namespace {
+
+constexpr double kMostTurn = 7.5;  // of a joint in a try, rad
+
+}  // namespace
+
+RunOutcome RunCycles(const LearnConfig& c, const RunRules& rules, const MachineSensors& sensors,
+                     Estimator estimator, std::unique_ptr<MachineController> own, MachineLink& link,
+                     const std::function<bool()>& stop) {
+  const int64_t hz = std::llround(c.hz);
+  LoopController controller(std::move(own), hz);
+  Joints motor{c.passive_torque, c.passive_torque};
+  motor[c.actuated_joint - 1] = c.limits.torque;
+  Supervisor supervisor({.limits = rules.limits,
+                         .motor_limit = motor,
+                         .angle_range = sensors.angle_range,
+                         .quantum = sensors.quantum,
+                         .period = 1 / c.hz});
+  LoopConfig config{.hz = hz,
+                    .seconds = rules.seconds,
+                    .actuated_joint = c.actuated_joint,
+                    .compensation = rules.is_try ? kLearnedCompensation : 0};
+  const LoopSummary* summary = nullptr;
+  PendulumState first;
+  double upright_at = 0;  // s
+  config.stop = [&] {
+    const PendulumState& s = estimator.now();
+    if (summary->driven == 0) first = s;
+    if (summary->upright > 0) upright_at = summary->driven;
+    const bool lost = summary->driven - upright_at > kLongestFall ||
+                      Larger(s.q1 - first.q1, s.q2 - first.q2) > kMostTurn;
+    return stop() || (rules.is_try && (lost || summary->upright >= c.hold));
+  };
+  LogWriter log(rules.log);
+  ControlLoop loop(config, link, estimator, supervisor, controller, log);
+  summary = &loop.summary();
+  int64_t moving = 0;
+  const auto run = [&] {
+    if (!link.simulated()) EnterRealTime();
+    while (loop.Cycle()) {
+      const LoopState state = supervisor.state();
+      moving += state == LoopState::kRunning || state == LoopState::kBraking ? 1 : 0;
+    }
+    loop.SwitchOff();
+  };
+  std::async(std::launch::async, run).get();
+  log.Finish();
+  return {loop.summary(), static_cast<double>(moving) / c.hz, supervisor.reason()};
+}
+
+}  // namespace upswing::machine

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "extras/machine/control_loop.h"
+#include "extras/machine/learn.h"
+
+namespace upswing::machine {
+
+/// The larger absolute value.
+inline double Larger(double a, double b) { return std::max(std::abs(a), std::abs(b)); }
+
+/// Longest time of a try without balance, s.
+inline constexpr double kLongestFall = 6;
+
+/// Limits and length of a run, and its purpose.
+struct RunRules {
+  Limits limits;
+  double seconds = 0;    // longest time in which the controller drives
+  bool is_try = false;   // whether balance or a hopeless state ends it; else an excitation
+  std::string log = {};  // file; empty: none
+};
+
+/// What a run came to.
+struct RunOutcome {
+  LoopSummary summary;
+  double motion = 0;   // time with torques, s
+  std::string reason;  // of the supervisor; empty: no fault
+};
+
+/// Runs the control loop until it ends. A run in real time has its own thread, because fits with
+/// real-time priority would starve the computer. `sensors`: range and step of the encoders.
+RunOutcome RunCycles(const LearnConfig& c, const RunRules& rules, const MachineSensors& sensors,
+                     Estimator estimator, std::unique_ptr<MachineController> own, MachineLink& link,
+                     const std::function<bool()>& stop);
+
+}  // namespace upswing::machine
