@@ -8,7 +8,7 @@ namespace {
 
 constexpr double kGrowth = 1.035, kDecay = 0.7;  // of the amplitude in a step; beyond the level
 constexpr double kEnough = 0.7;                  // level up to which the amplitude grows
-constexpr int kShortest = 3, kLongest = 15;      // a share is held for so many steps
+constexpr int kShortest = 3, kLongest = 15;      // time for which a share is held, steps
 constexpr double kAlong = 0.6;                   // probability of a push along with the motion
 constexpr double kSlow = 0.5;                    // rad/s
 

@@ -18,7 +18,7 @@ constexpr int kUnknowns = 12;           // J1 J2 b a G1 G2 d1 d2 f1 f2 k1 k2
 
 using Row = Eigen::Matrix<double, 1, kUnknowns>;
 
-/// What changes over an integral, and what is integrated, for the equations of both joints.
+/// Momenta and torques of both joints in a moment, by unknown.
 struct Terms {
   Row change1 = Row::Zero(), change2 = Row::Zero(), rate1 = Row::Zero(), rate2 = Row::Zero();
 };

@@ -6,13 +6,12 @@
 
 namespace upswing::machine {
 
-/// A twin from logs alone, as the first guess of a Fit: no mass, length or friction is known
-/// before. The equations of motion are linear in their constants. Integrated over a tenth of a
-/// second they need no acceleration, and least squares solve them. Delay and lag are those that fit
-/// best.
+/// A first guess of a twin for Fit, without any known mass, length or friction. The equations of
+/// motion are linear in their constants. Integrated over 0.2 s they need no acceleration, and least
+/// squares solve them. Delay and lag have the values with the least error.
 ///
-/// Motion shows ratios of the constants only, so the links are taken as uniform rods. `known` has
-/// the torque limit, gravity and sensors. Throws BadInput if the logs have too little motion.
+/// A motion determines only ratios of masses, so the links are uniform rods. `known` has the torque
+/// limit, gravity, sensors and period. Throws BadInput if the logs are too short.
 Twin FirstTwin(std::span<const MachineLog> logs, const Twin& known);
 
 }  // namespace upswing::machine

@@ -31,6 +31,7 @@ struct Excitement {
 constexpr Excitement kSmallMotion{4, 0.8, 0.2, 0.3}, kLargeMotion{6, 2, 0.6, 0.5};
 constexpr double kLimitShare = 0.6;  // share of the user's limits that an excitation aims at
 
+constexpr double kLargestError = 0.1;    // of a fit, rad
 constexpr double kLargestZero = 0.2;     // of the encoders, rad
 constexpr double kLongestSwinging = 60;  // until the links rest, s
 constexpr int kDraws = 5;                // machines of the posterior that judge a controller
@@ -173,7 +174,13 @@ class Learner {
       std::vector<MachineLog> logs = logs_;
       if (result_.tries > 0) logs.push_back(logs_.back());
       const double quantum = twin_.sensors.quantum;
-      FitResult fit = machine::Fit(logs, twin_, values, config, pool_);
+      const FitResult fit = machine::Fit(logs, twin_, values, config, pool_);
+      if (!(fit.error < kLargestError)) {
+        throw Failure(
+            fmt::format("no twin follows the motion (error {:.2f} rad): are the signs of "
+                        "angles and torques right?",
+                        fit.error));
+      }
       twin_ = fit.twin;
       MeasureLoop(logs_, twin_);
       twin_.sensors.quantum = quantum;
@@ -292,14 +299,13 @@ void LearnConfig::Describe(Options& o) {
 }
 
 void LearnConfig::Check() const {
-  const auto expect = [](const char* flag, double least, double got, const char* unit) {
+  if (encoder_counts == 0) throw BadInput("machine learn: expected --encoder-counts, got none");
+  const auto expect = [](const char* flag, double least, double got) {
     if (got >= least) return;
-    throw BadInput(
-        Concat(flag, ": expected ", least, unit, " or more, which a swing-up needs, got ", got));
+    throw BadInput(Concat(flag, ": expected ", least, " or more for a swing-up, got ", got));
   };
-  expect("--max-angle", 3.5, limits.angle, " rad");
-  expect("--max-energy", 1.1, limits.energy, "");
-  expect("--encoder-counts", 16, encoder_counts, "");
+  expect("--max-angle", 3.5, limits.angle);
+  expect("--max-energy", 1.1, limits.energy);
 }
 
 LearnResult Learn(const LearnConfig& config, MachineLink& link, const std::filesystem::path& out,

@@ -26,7 +26,7 @@ struct LearnConfig {
 
   /// Declares each setting in `options`: name, range, unit, help.
   void Describe(Options& options);
-  /// Throws BadInput for limits within which no swing-up is possible.
+  /// Throws BadInput without the encoders' steps, and for limits that forbid a swing-up.
   void Check() const;
 };
 

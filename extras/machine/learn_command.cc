@@ -94,11 +94,11 @@ void AddLearn(CommandLine& line) {
   AddSeed(line, a.seed, "the excitations and of simulated tries");
   AddThreads(line, a.threads);
   line.Footer(
-      "The links must hang at rest. Torques grow until they move; the log gives a twin; a\n"
-      "controller is designed on the twin and tried; after a failed try the twin is\n"
-      "identified again. You need to know --max-torque, --encoder-counts and the signs of\n"
-      "angles and torques (docs/howto/real-machine.md). Beyond a limit and at Ctrl-C the loop\n"
-      "brakes; a second Ctrl-C switches the motors off at once.\n"
+      "The links must hang at rest. Torques grow until they move. The program identifies a twin\n"
+      "from this motion, designs a controller on it and tries it. After a failed try it\n"
+      "identifies the twin again. You need to know --max-torque, --encoder-counts and the signs\n"
+      "of angles and torques (docs/howto/real-machine.md). Beyond a limit and at Ctrl-C the loop\n"
+      "brakes. A second Ctrl-C switches the motors off at once.\n"
       "Exit code: 0 if the machine balanced for --hold; else 1, with the reason in a line.\n\n"
       "Examples:\n"
       "  ./upswing machine learn --link realaigym-twin --encoder-counts 16384 --out rehearsal\n"

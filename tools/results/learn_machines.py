@@ -70,8 +70,9 @@ def judge(seed, folder, program, robot, extra):
     logs = sorted(out.glob("log-*.csv"))
     zeros = machine["sensors"]["zero1"], machine["sensors"]["zero2"]
     seconds = balanced_seconds(logs[-1], zeros) if logs else 0
-    last = (done.stdout.strip().splitlines() or said_file.read_text().strip().splitlines() or [""])[-1]
-    return done.returncode == 0 and seconds >= 9.9, seconds, last
+    said = said_file.read_text(encoding="utf-8").strip().splitlines()
+    result = (done.stdout.splitlines() or said[-1:] or [""])[0]
+    return done.returncode == 0 and seconds >= 9.9, seconds, result
 
 
 def main():
@@ -86,9 +87,9 @@ def main():
     folder.mkdir(parents=True, exist_ok=True)
     count = 0
     for seed in range(known.first, known.last + 1):
-        good, seconds, line = judge(seed, folder, known.program.split(), known.robot, extra)
+        good, seconds, result = judge(seed, folder, known.program.split(), known.robot, extra)
         count += good
-        print(f"{seed} {'balanced' if good else 'FAILED'} {seconds:.2f} s: {line}", flush=True)
+        print(f"{seed} {'balanced' if good else 'FAILED'} {seconds:.2f} s: {result}", flush=True)
     print(f"{count} of {known.last - known.first + 1} balance", file=sys.stdout)
 
 
