@@ -31,27 +31,46 @@ struct Excitement {
 constexpr Excitement kSmallMotion{4, 0.8, 0.2, 0.3}, kLargeMotion{6, 2, 0.6, 0.5};
 constexpr double kLimitShare = 0.6;  // share of the user's limits that an excitation aims at
 
-constexpr double kLargestError = 0.1;    // of a fit, rad
-constexpr double kLargestZero = 0.2;     // of the encoders, rad
-constexpr double kLongestSwinging = 60;  // until the links rest, s
-constexpr int kDraws = 5;                // machines of the posterior that judge a controller
+constexpr double kLargestError = 0.1;          // of a fit, rad
+constexpr double kLargestZero = 0.2;           // of the encoders, rad
+constexpr double kLongestSwinging = 60;        // until the links rest, s
+constexpr double kLearnedCompensation = 0.95;  // share of the dry friction, usually
+constexpr int kDraws = 5;                      // machines of the posterior that judge a controller
 
-/// Controllers to choose from, the best first. All decide in less than a millisecond.
-std::vector<PolicyArguments> Candidates() {
+/// A controller to choose, and the share of dry friction that motors compensate under it.
+struct Candidate {
+  PolicyArguments arguments;
+  double compensation;
+};
+
+/// The candidates for a twin, the best first. The last two need milliseconds for a decision. They
+/// plan with dry friction, because noise makes its compensation shake a light link. Damping of the
+/// joint without a motor stands for its friction in the linear model of the regulator.
+std::vector<Candidate> CandidatesFor(const Plant& plant) {
   const auto with = [](const char* name, const std::vector<FlagValue>& flags) {
-    PolicyArguments a;
-    a.name = name;
-    a.flags = flags;
-    return a;
+    Candidate c{{}, kLearnedCompensation};
+    c.arguments.name = name;
+    c.arguments.flags = flags;
+    return c;
   };
+  const std::vector<FlagValue> stiff{{"lqr_q1", "100"}, {"lqr_q2", "100"}, {"lqr_torque", "0.3"}};
+  std::vector<FlagValue> ahead = stiff;
+  ahead.insert(ahead.end(), {{"mpc_seconds", "0.3"}, {"mpc_angle_range", "9"}});
+  Candidate rubbing = with("mpc", {{"mpc_seconds", "1"}});
+  rubbing.compensation = 0;
+  rubbing.arguments.made_for = {Concat("coulomb1=", plant.coulomb1),
+                                Concat("coulomb2=", plant.coulomb2)};
+  Candidate damped = rubbing;
+  constexpr double kDamping = 2;  // for dry friction, s/rad
+  damped.arguments.made_for.push_back(
+      plant.actuated_joint == 1 ? Concat("damping2=", plant.damping2 + kDamping * plant.coulomb2)
+                                : Concat("damping1=", plant.damping1 + kDamping * plant.coulomb1));
   return {with("tvlqr", {}),
-          with("tvlqr", {{"lqr_q1", "100"}, {"lqr_q2", "100"}, {"lqr_torque", "0.3"}}),
+          with("tvlqr", stiff),
           with("tvlqr", {{"tvlqr_seconds", "6"}, {"tvlqr_reserve", "0.1"}}),
-          with("mpc", {{"mpc_seconds", "0.3"},
-                       {"mpc_angle_range", "9"},
-                       {"lqr_q1", "100"},
-                       {"lqr_q2", "100"},
-                       {"lqr_torque", "0.3"}})};
+          with("mpc", ahead),
+          rubbing,
+          damped};
 }
 
 double ProcessorSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
@@ -74,11 +93,13 @@ class Learner {
 
   LearnResult Work() {
     try {
+      const Twin known = twin_;
       Excite(kSmallMotion, /*has_twin=*/false);
       Fit(kSmallMotion.window);
-      // Links that hardly moved show no twin that is good enough to estimate the state.
-      const MachineSensors& found = twin_.sensors;
-      Excite(kLargeMotion, Larger(found.zero1, found.zero2) < kLargestZero);
+      // A link that hardly moved shows no twin that is good enough to estimate the state.
+      const bool has_twin = Larger(twin_.sensors.zero1, twin_.sensors.zero2) < kLargestZero;
+      if (!has_twin) twin_ = known;
+      Excite(kLargeMotion, has_twin);
       while (true) {
         Fit(kLargeMotion.window);
         if (Try()) return result_;
@@ -181,7 +202,8 @@ class Learner {
                         "angles and torques right?",
                         fit.error));
       }
-      twin_ = fit.twin;
+      // Today's zeros and friction are known now.
+      twin_ = InSession(fit.twin, logs_.back());
       MeasureLoop(logs_, twin_);
       twin_.sensors.quantum = quantum;
       twin_.name = "learned";
@@ -215,44 +237,47 @@ class Learner {
 
   /// Designs a controller and tries it. Returns whether the machine balanced.
   bool Try() {
-    ExpectBudget();
     const auto policy = Choose();
     say_(fmt::format("try {}: {}", ++result_.tries, policy->name));
-    const RunOutcome run = Run(TryRules(), Estimator(twin_, 1 / c_.hz), ControllerOf(policy));
+    const RunOutcome run =
+        Run(TryRules(result_.compensation), Estimator(twin_, 1 / c_.hz), ControllerOf(policy));
     result_.balanced = run.summary.upright;
     say_(fmt::format("  balanced {:.1f} s; used {:.1f} s of motion, {:.1f} s of computing",
                      result_.balanced, result_.motion, result_.computing));
     return result_.balanced >= c_.hold;
   }
 
-  RunRules TryRules() const {
-    return {.limits = c_.limits, .seconds = 2 * kLongestFall + c_.hold, .is_try = true};
+  RunRules TryRules(double compensation) const {
+    return {.limits = c_.limits,
+            .seconds = 2 * kLongestFall + c_.hold,
+            .is_try = true,
+            .compensation = compensation};
   }
 
   /// The first controller that balances all machines drawn from the posterior, or most of them.
   std::shared_ptr<const LoadedPolicy> Choose() {
+    ExpectBudget();
     std::shared_ptr<const LoadedPolicy> best;
     Compute([&] {
       int most = -1;
-      for (PolicyArguments candidate : Candidates()) {
-        candidate.plant = twin_.plant;
-        // The motors compensate dry friction.
-        candidate.plant->coulomb1 = candidate.plant->coulomb2 = 0;
-        std::shared_ptr<const LoadedPolicy> policy;
-        int held = 0;
+      for (Candidate& candidate : CandidatesFor(twin_.plant)) {
+        candidate.arguments.plant = twin_.plant;
+        // The motors compensate dry friction, unless made_for names it.
+        candidate.arguments.plant->coulomb1 = candidate.arguments.plant->coulomb2 = 0;
         try {
-          policy = std::make_shared<const LoadedPolicy>(GetPolicy(candidate));
-          held = HeldBy(policy);
+          const auto policy = std::make_shared<const LoadedPolicy>(GetPolicy(candidate.arguments));
+          const int held = HeldBy(policy, candidate.compensation);
+          say_(fmt::format("design: {}: {} of {} machines of the twin", candidate.arguments.name,
+                           held, kDraws));
+          if (held <= most) continue;
+          most = held;
+          best = policy;
+          result_.controller = candidate.arguments;
+          result_.compensation = candidate.compensation;
         } catch (const Error& error) {
-          say_(fmt::format("  {}", error.what()));
-          continue;
+          say_(fmt::format("design: {}", error.what()));
         }
-        say_(fmt::format("design: {}: {} of {} machines of the twin", policy->name, held, kDraws));
-        if (held <= most) continue;
-        most = held;
-        best = policy;
-        result_.controller = candidate;
-        if (held == kDraws) break;
+        if (most == kDraws) break;
       }
     });
     if (best == nullptr) throw Ended{"no controller exists for the twin"};
@@ -260,13 +285,14 @@ class Learner {
   }
 
   /// Number of machines, of kDraws of the posterior, that a controller balances.
-  int HeldBy(const std::shared_ptr<const LoadedPolicy>& policy) const {
+  int HeldBy(const std::shared_ptr<const LoadedPolicy>& policy, double compensation) const {
     int held = 0;
-    for (int i = 0; i < kDraws; ++i) {
+    for (int i = 0; i < kDraws && !stop_(); ++i) {
       Rng rng(c_.seed, "machine: draws", static_cast<uint64_t>(i));
-      TwinLink link(DrawTwin(InSession(twin_, logs_.back()), rng), {}, c_.seed);
-      const RunOutcome run = RunCycles(c_, TryRules(), twin_.sensors, Estimator(twin_, 1 / c_.hz),
-                                       ControllerOf(policy), link, stop_);
+      TwinLink link(DrawTwin(twin_, rng), {}, c_.seed);
+      const RunOutcome run =
+          RunCycles(c_, TryRules(compensation), twin_.sensors, Estimator(twin_, 1 / c_.hz),
+                    ControllerOf(policy), link, stop_);
       held += run.summary.upright >= c_.hold ? 1 : 0;
     }
     return held;

@@ -33,14 +33,12 @@ struct LearnConfig {
 /// What a session of learning came to.
 struct LearnResult {
   PolicyArguments controller;        // the last one that was tried; empty: none
+  double compensation = 0;           // share of the dry friction that motors compensate under it
   int tries = 0;                     // on the machine
   double balanced = 0;               // time of balance at the end of the last try, s
   double motion = 0, computing = 0;  // used, s
   std::string reason;                // why it ended; empty: the machine balanced
 };
-
-/// Share of the estimated dry friction that the motors compensate in a try.
-inline constexpr double kLearnedCompensation = 0.95;
 
 /// Excites the machine, identifies a twin, designs a controller on it and tries it. After a failed
 /// try it identifies again, with twice the weight on that log, until the machine balances or a

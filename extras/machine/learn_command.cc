@@ -27,17 +27,19 @@ struct LearnArguments {
 std::unique_ptr<MachineLink> g_learned;  // global for signal handlers, which may come until the end
 
 /// The command that runs the controller again.
-std::string CommandOf(const LearnArguments& a, const PolicyArguments& controller) {
+std::string CommandOf(const LearnArguments& a, const LearnResult& r) {
+  const PolicyArguments& controller = r.controller;
   std::string text = fmt::format("{} run {}", LaunchCommand(), controller.name);
   for (const FlagValue& flag : controller.flags) {
     text += fmt::format(" {} {}", FlagOf(flag.name), flag.text);
   }
+  for (const std::string& change : controller.made_for) text += " --made-for " + change;
   const bool in_process = ParseLink(a.link, /*listens=*/false).kind == LinkAddress::Kind::kTwin;
   const std::string twin = (std::filesystem::path(a.out) / "twin.toml").string();
   text += in_process ? fmt::format(" --link {}", twin)
                      : fmt::format(" --link {} --twin {}", a.link, twin);
   return text + fmt::format(" --compensation {} --passive-torque {} --max-torque {} --hz {}",
-                            kLearnedCompensation, a.config.passive_torque, a.config.limits.torque,
+                            r.compensation, a.config.passive_torque, a.config.limits.torque,
                             a.config.hz);
 }
 
@@ -69,12 +71,12 @@ int RunLearn(const LearnArguments& a) {
                                        r.computing, Counted(r.tries, "attempt"));
   report += r.reason.empty() ? "balanced: " : fmt::format("not balanced, {}: ", r.reason);
   report += used + "\n";
-  if (!r.controller.name.empty()) report += CommandOf(a, r.controller) + "\n";
+  if (!r.controller.name.empty()) report += CommandOf(a, r) + "\n";
   WriteNamedFile(std::filesystem::path(a.out) / "report.txt", report);
   if (StopSignal() != 0) return 128 + StopSignal();
   if (!r.reason.empty()) throw Failure(fmt::format("not balanced: {} ({})", r.reason, used));
-  fmt::print("balanced for {:.1f} s: {}\n{}\nwritten {}\n", r.balanced, used,
-             CommandOf(a, r.controller), Printable(a.out));
+  fmt::print("balanced for {:.1f} s: {}\n{}\nwritten {}\n", r.balanced, used, CommandOf(a, r),
+             Printable(a.out));
   return 0;
 }
 

@@ -25,7 +25,7 @@ RunOutcome RunCycles(const LearnConfig& c, const RunRules& rules, const MachineS
   LoopConfig config{.hz = hz,
                     .seconds = rules.seconds,
                     .actuated_joint = c.actuated_joint,
-                    .compensation = rules.is_try ? kLearnedCompensation : 0};
+                    .compensation = rules.compensation};
   const LoopSummary* summary = nullptr;
   PendulumState first;
   double upright_at = 0;  // s

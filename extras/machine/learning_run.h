@@ -19,9 +19,10 @@ inline constexpr double kLongestFall = 6;
 /// Limits and length of a run, and its purpose.
 struct RunRules {
   Limits limits;
-  double seconds = 0;    // longest time in which the controller drives
-  bool is_try = false;   // whether balance or a hopeless state ends it; else an excitation
-  std::string log = {};  // file; empty: none
+  double seconds = 0;       // longest time in which the controller drives
+  bool is_try = false;      // whether balance or a hopeless state ends it; else an excitation
+  double compensation = 0;  // share of the dry friction that motors compensate
+  std::string log = {};     // file; empty: none
 };
 
 /// What a run came to.
