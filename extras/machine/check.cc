@@ -42,8 +42,9 @@ void CheckClockUnit(double usual, Findings& findings) {
   constexpr double kSlow = 0.5, kVerySlow = 50;  // s
   if (usual < kSlow) return;
   findings.push_back({Aspect::kClock, 0, Severity::kFault,
-                      fmt::format("cycles of {:.4g} s: suspect a clock in {}", usual,
-                                  usual < kVerySlow ? "ms" : "µs")});
+                      fmt::format("cycles of {:.4g} s: suspect a clock in {} (key unit){}", usual,
+                                  usual < kVerySlow ? "ms" : "µs",
+                                  usual == 1 ? ", or numbers of rows (key factor)" : "")});
 }
 
 /// Cycles that are longer count as gaps, s.
@@ -62,13 +63,19 @@ void CheckLostCycles(const std::vector<Cycle>& cycles, double usual, Findings& f
     lost += std::round(cycle.seconds / usual) - 1;
   }
   if (standing > 0) {
-    findings.push_back({Aspect::kClock,
-                        0,
-                        Severity::kWarning,
-                        fmt::format("the clock stands still in {} row{}", standing,
-                                    standing > 1 ? "s, first" : ""),
-                        RangeOf(*first_standing),
-                        {{"standing", standing}}});
+    constexpr double kMuch = 0.1;  // share of cycles
+    const bool is_fault = standing > kMuch * static_cast<double>(cycles.size());
+    findings.push_back(
+        {Aspect::kClock,
+         0,
+         is_fault ? Severity::kFault : Severity::kWarning,
+         fmt::format("the clock stands still in {} row{}{}", standing, standing > 1 ? "s" : "",
+                     is_fault       ? ": suspect rows that are there twice, or times with "
+                                      "too few digits"
+                     : standing > 1 ? ", first"
+                                    : ""),
+         RangeOf(*first_standing),
+         {{"standing", standing}}});
   }
   if (longest == nullptr) return;
   constexpr double kMuch = 0.01;  // share of cycles
@@ -146,7 +153,8 @@ void CheckClock(Pieces pieces, Findings& findings) {
   std::ranges::sort(seconds);
   const double usual = UsualCycle(pieces), p99 = Quantile(seconds, 0.99);
   if (usual <= 0) {
-    findings.push_back({Aspect::kClock, 0, Severity::kFault, "the clock hardly ever advances"});
+    findings.push_back({Aspect::kClock, 0, Severity::kFault,
+                        "the clock hardly ever advances: suspect times with too few digits"});
     return;
   }
   findings.push_back({Aspect::kClock,

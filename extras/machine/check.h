@@ -83,8 +83,8 @@ void CheckVelocities(Pieces pieces, Findings& findings);
 void CheckTorques(Pieces pieces, Findings& findings);
 /// Joints that do not move, motion that grows without torque, rest where nothing holds it.
 void CheckMotion(Pieces pieces, Findings& findings);
-/// Signs of the angle of joint 2 and of the motor's torque, by the equations of motion.
-void CheckSigns(Pieces pieces, Findings& findings);
+/// Signs, zeros, units and joints of angles and torques, by the equations of motion.
+void CheckEquations(Pieces pieces, Findings& findings);
 
 /// Whether the motor of a joint (0 or 1) reports torques without a command: more than idle motors
 /// do, including motors whose rotors the other joint accelerates.

@@ -223,12 +223,13 @@ void CheckSpeeds(Pieces pieces, int joint, Findings& findings) {
   constexpr double kFast = 60;  // rad/s
   const double speed = Quantile(speeds, 0.99);
   if (speed <= kFast) return;
-  findings.push_back({Aspect::kAngle,
-                      joint + 1,
-                      Severity::kFault,
-                      fmt::format("moves at {:.4g} rad/s: suspect degrees", speed),
-                      {},
-                      {{"speed", speed}}});
+  findings.push_back(
+      {Aspect::kAngle,
+       joint + 1,
+       Severity::kFault,
+       fmt::format("moves at {:.4g} rad/s: suspect degrees or counts (key unit)", speed),
+       {},
+       {{"speed", speed}}});
 }
 
 }  // namespace

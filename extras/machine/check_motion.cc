@@ -146,7 +146,7 @@ void CheckMotion(Pieces pieces, Findings& findings) {
     CheckRest(piece, findings);
     if (findings.size() > before) break;
   }
-  CheckSigns(pieces, findings);
+  CheckEquations(pieces, findings);
 }
 
 }  // namespace upswing::machine

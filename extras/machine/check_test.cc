@@ -363,9 +363,57 @@ TEST(MachineCheck, SignsByTheEquationsOfMotion) {
   EXPECT_TRUE(change(-1, -1, -1).empty());  // the mirror image
   ASSERT_EQ(change(1, -1, 1).size(), 1U);
   EXPECT_EQ(AboutText(change(1, -1, 1)[0]), "angle 2");
-  EXPECT_EQ(AboutText(change(-1, 1, 1)[0]), "angle 2");
+  EXPECT_EQ(AboutText(change(-1, 1, 1)[0]), "angle 1");
   ASSERT_EQ(change(1, 1, -1).size(), 1U);
   EXPECT_EQ(AboutText(change(1, 1, -1)[0]), "torque 1");
+}
+
+/// The faults of a log by their aspects and joints.
+std::string FaultsOf(const MachineLog& log) {
+  std::string faults;
+  for (const Finding& f : Check(log)) {
+    if (f.severity == Severity::kFault) faults += AboutText(f) + ": " + f.text + "\n";
+  }
+  return faults;
+}
+
+TEST(MachineCheck, TheEquationsOfMotionNameEachChangeOfTheColumns) {
+  constexpr double kPi = std::numbers::pi;
+  const MachineLog good = Simulated(
+      {}, [](double t) { return 4 * std::sin(3 * t) + 3 * std::sin(7 * t); }, 10);
+  EXPECT_EQ(FaultsOf(good), "");
+  const auto expect = [&](const std::function<void(Joints & q, Joints & u)>& change,
+                          const std::vector<std::string>& texts) {
+    MachineLog log = good;
+    for (int k = 0; k < log.rows(); ++k) change(log.angle[k], log.commanded[k]);
+    const std::string faults = FaultsOf(log);
+    for (const std::string& text : texts) EXPECT_NE(faults.find(text), std::string::npos) << faults;
+    EXPECT_EQ(std::ranges::count(faults, '\n'), std::ssize(texts)) << faults;
+  };
+  expect([](Joints& q, Joints&) { q[0] += kPi; }, {"angle 1: suspect another zero"});
+  expect([](Joints& q, Joints&) { q[0] += 0.8; }, {"angle 1: suspect another zero, 0.7"});
+  expect([](Joints& q, Joints&) { q[1] -= 1; },
+         {"angle 2: suspect another zero, -0.9"});
+  expect([](Joints& q, Joints&) { q[1] += q[0]; },
+         {"angle 2: suspect an angle against the vertical"});
+  expect(
+      [](Joints& q, Joints&) {
+        q[1] += q[0] + kPi;
+        q[0] += kPi;
+      },
+      {"against the vertical", "angle 1: suspect another zero"});
+  expect(
+      [](Joints& q, Joints&) {
+        q = {q[0] / (2 * kPi), q[1] / (2 * kPi)};
+      },
+      {"angle 1: suspect turns", "angle 2: suspect turns"});
+  expect(
+      [](Joints& q, Joints& u) {
+        std::swap(q[0], q[1]);
+        std::swap(u[0], u[1]);
+      },
+      {"swapped columns of both joints"});
+  expect([](Joints& q, Joints&) { std::swap(q[0], q[1]); }, {"swapped angles"});
 }
 
 TEST(MachineCheck, WrappedAnglesWrongSamplesAndSlips) {

@@ -34,16 +34,18 @@ constexpr WrongUnit kWrongUnits[] = {
     {kDegree, "angles in degrees"},
     {60 / (2 * std::numbers::pi), "velocities in rpm"},
     {kDegree * 60 / (2 * std::numbers::pi), "angles in degrees and velocities in rpm"},
+    {1 / (2 * std::numbers::pi), "velocities in turn/s"},
+    {2 * std::numbers::pi, "angles in turns"},
     {1e3, "a clock in ms"},
     {1e6, "a clock in µs"}};
 
 /// The meaning of a gain of the velocities.
 std::string MeaningOf(double gain) {
-  for (const WrongUnit& unit : kWrongUnits) {
-    if (std::abs(std::abs(gain) / unit.gain - 1) < 0.07) {
-      return Concat("suspect ", unit.suspect);
-    }
-  }
+  const auto distance = [&](const WrongUnit& unit) {
+    return std::abs(std::abs(gain) / unit.gain - 1);
+  };
+  const WrongUnit& nearest = *std::ranges::min_element(kWrongUnits, {}, distance);
+  if (distance(nearest) < 0.04) return Concat("suspect ", nearest.suspect, " (key unit)");
   return gain < 0 ? "opposite sign" : "suspect the unit or a gear";
 }
 
@@ -122,7 +124,9 @@ void CheckVelocity(Pieces pieces, int joint, Findings& findings) {
   constexpr double kAgree = 0.8, kClear = 0.9, kBetter = 0.02;  // correlations
   const Pairs other = VelocityPairs(pieces, joint, 1 - joint);
   const double of_other = std::abs(other.correlation());
-  if (of_other > std::max(kClear, std::abs(r) + kBetter) &&
+  const bool equals_other = of_other > 0.98 && std::abs(other.gain() - 1) < 0.1 &&
+                            std::abs(gain - 1) > 0.3;  // also where the joints move in proportion
+  if ((equals_other || of_other > std::max(kClear, std::abs(r) + kBetter)) &&
       AngleRange(pieces, 1 - joint) > kMoves) {
     return add(Severity::kFault,
                fmt::format("follows the angle of joint {}: suspect swapped columns", 2 - joint),

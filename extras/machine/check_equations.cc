@@ -1,0 +1,362 @@
+// Checks of signs, zeros, units and joints by the equations of motion (pendulum/equations.h). Their
+// parameters are unknown: least squares find them. If the motion is that of a pendulum only after a
+// change of the columns, the check names the change.
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "extras/machine/check.h"
+#include "extras/machine/pairs.h"
+
+namespace upswing::machine {
+namespace {
+
+/// Angles (rad), velocities (rad/s) and torques (N·m) at a row, which stands for `seconds`.
+struct Sample {
+  double seconds;
+  Joints q, w, tau;
+};
+using Window = std::vector<Sample>;
+
+/// The rows `first` to `last` of a log; empty if a cycle is lost in them. Velocities are
+/// differences of the angles `span` rows before and after.
+Window WindowAt(const MachineLog& log, int first, int last, int span, double cycle) {
+  Window window;
+  for (int k = first; k <= last; ++k) {
+    const double before = k > first ? log.time[k] - log.time[k - 1] : 0;
+    const double after = k < last ? log.time[k + 1] - log.time[k] : 0;
+    const double apart = log.time[k + span] - log.time[k - span];
+    if (std::max(before, after) > 5 * cycle || !(apart > 0)) return {};
+    Sample s{(before + after) / 2, log.angle[k], {}, {}};
+    for (const int j : {0, 1}) {
+      s.w[j] = (log.angle[k + span][j] - log.angle[k - span][j]) / apart;
+      if (!log.measured.empty()) {
+        s.tau[j] = log.measured[k][j];
+      } else {
+        s.tau[j] = (log.commanded.empty() ? 0 : log.commanded[k][j]) +
+                   (log.push.empty() ? 0 : log.push[k][j]);
+      }
+    }
+    window.push_back(s);
+  }
+  return window;
+}
+
+std::vector<Window> WindowsOf(Pieces pieces) {
+  constexpr double kSpan = 0.01, kLength = 0.08;  // s
+  constexpr int kMost = 800;                      // windows; more would only take longer
+  const double cycle = UsualCycle(pieces);
+  const int span = std::max(1, static_cast<int>(std::lround(kSpan / cycle)));
+  const int length = std::max(3, static_cast<int>(std::lround(kLength / cycle)));
+  double rows = 0;
+  for (const MachineLog& log : pieces) rows += log.rows();
+  const int hop = std::max(length, static_cast<int>(rows / kMost));
+  std::vector<Window> windows;
+  for (const MachineLog& log : pieces) {
+    for (int k = span; k + length + span < log.rows(); k += hop) {
+      Window window = WindowAt(log, k, k + length, span, cycle);
+      if (!window.empty()) windows.push_back(std::move(window));
+    }
+  }
+  return windows;
+}
+
+/// A way to read the columns of the angles.
+struct Reading {
+  Joints sign{1, 1}, unit{1, 1};  // rad
+  bool absolute = false, swapped = false;
+
+  Joints Of(const Joints& x) const {
+    Joints y{sign[0] * unit[0] * x[swapped ? 1 : 0], sign[1] * unit[1] * x[swapped ? 0 : 1]};
+    if (absolute) y[1] -= y[0];
+    return y;
+  }
+};
+
+/// Terms of an equation of motion, integrated over a window: changes of momenta, and torques.
+enum Term {
+  kInertia,
+  kOther,
+  kCoupling,
+  kTurnedCoupling,
+  kLink2,
+  kTurnedLink2,
+  kLink1,
+  kTurnedLink1,
+  kDamping,
+  kFriction,
+  kTorque1,
+  kTorque2,
+  kTerms
+};
+using Terms = Eigen::Matrix<double, kTerms, 1>;
+using Gram = Eigen::Matrix<double, kTerms, kTerms>;
+
+/// The terms of the equation of joint `row` over a window.
+///   Row 1: d/dt [(J1 + J2) w1 + J2 w2 + b cos q2 (2 w1 + w2)] + G1 sin q1 + G2 sin(q1 + q2) + … =
+///   τ Row 2: d/dt [J2 (w1 + w2) + a w2 + b cos q2 w1] + b sin q2 w1 (w1 + w2) + G2 sin(q1 + q2) +
+///   … = τ
+/// The turned terms are those with the angles a quarter turn ahead.
+Terms TermsOf(const Window& window, const Reading& reading, int row) {
+  Terms terms = Terms::Zero();
+  for (const Sample& sample : window) {
+    const Joints q = reading.Of(sample.q), w = reading.Of(sample.w);
+    const double s2 = std::sin(q[1]), c2 = std::cos(q[1]), dt = sample.seconds;
+    const double end = &sample == &window.back() ? 1 : &sample == &window.front() ? -1 : 0;
+    const double coupled = row == 0 ? 2 * w[0] + w[1] : w[0];
+    const double force = row == 0 ? 0 : w[0] * (w[0] + w[1]) * dt;
+    terms[kInertia] += end * (row == 0 ? w[0] : w[0] + w[1]);
+    terms[kOther] += end * w[1];
+    terms[kCoupling] += end * c2 * coupled + s2 * force;
+    terms[kTurnedCoupling] += -end * s2 * coupled + c2 * force;
+    terms[kLink2] += std::sin(q[0] + q[1]) * dt;
+    terms[kTurnedLink2] += std::cos(q[0] + q[1]) * dt;
+    terms[kLink1] += row == 0 ? std::sin(q[0]) * dt : 0;
+    terms[kTurnedLink1] += row == 0 ? std::cos(q[0]) * dt : 0;
+    terms[kDamping] += w[row] * dt;
+    terms[kFriction] += std::tanh(10 * w[row]) * dt;
+    terms[kTorque1] += sample.tau[0] * dt;
+    terms[kTorque2] += sample.tau[1] * dt;
+  }
+  return terms;
+}
+
+/// Products of all terms of the equation of joint `row`, summed over the windows.
+Gram GramOf(const std::vector<Window>& windows, const Reading& reading, int row) {
+  Gram gram = Gram::Zero();
+  for (const Window& window : windows) {
+    const Terms terms = TermsOf(window, reading, row);
+    gram += terms * terms.transpose();
+  }
+  return gram;
+}
+
+/// The share of `target`, a term with a sign, that the other terms leave unexplained when `zero` is
+/// added to the angles. Least squares find the coefficients of these terms, which are not negative.
+/// If the inertia is the target, the coefficients of both torques may have any sign.
+double Unexplained(const Gram& gram, int row, const Joints& zero, Term target, double sign) {
+  constexpr int kCoefficients = 8, kSigned = 6;
+  using Square = Eigen::Matrix<double, kCoefficients + 1, kCoefficients + 1>;
+  const double z2 = zero[1], z12 = zero[0] + zero[1];
+  Eigen::Matrix<double, kTerms, kCoefficients + 1> pick;
+  pick.setZero();
+  pick(kOther, 0) = 1;
+  pick(kCoupling, 1) = std::cos(z2), pick(kTurnedCoupling, 1) = std::sin(z2);
+  pick(kLink2, 2) = std::cos(z12), pick(kTurnedLink2, 2) = std::sin(z12);
+  pick(kLink1, 3) = std::cos(zero[0]), pick(kTurnedLink1, 3) = std::sin(zero[0]);
+  pick(kDamping, 4) = pick(kFriction, 5) = 1;
+  if (target == kInertia) {
+    pick(kTorque1, 6) = pick(kTorque2, 7) = 1;
+  } else {
+    pick(kInertia, 6) = 1;
+  }
+  pick(target, kCoefficients) = sign;
+  const Square A = pick.transpose() * gram * pick;
+  const double all = A(kCoefficients, kCoefficients);
+  if (!(all > 0)) return 1;
+  Eigen::Matrix<double, kCoefficients + 1, 1> x;
+  x.setZero();
+  x[kCoefficients] = target == kInertia ? 1 : -1;
+  for (int sweep = 0; sweep < 100; ++sweep) {  // coordinate descent
+    for (int i = 0; i < kCoefficients; ++i) {
+      if (!(A(i, i) > 0)) continue;
+      x[i] -= A.row(i).dot(x) / A(i, i);
+      if (i < kSigned || target != kInertia) x[i] = std::max(0.0, x[i]);
+      // The mass matrix is positive: 2 b < J1 + J2.
+      if (i == 1 && row == 0 && target == kInertia) x[i] = std::min(0.5, x[i]);
+    }
+  }
+  return x.dot(A * x) / all;
+}
+
+constexpr double kChange = 1.8;  // by which a change must reduce the misfit
+constexpr double kZero = 0.3;    // rad; a nearer zero is an offset that identification finds
+
+/// The logarithm of an unexplained share; below the noise all are equal.
+double Misfit(double unexplained) { return std::log(std::max(unexplained, 5e-4)); }
+
+/// An explanation of the motion: how to read the angles, and the motors' joints and signs.
+struct Explanation {
+  Reading reading;
+  Joints zero{};
+  Joints unexplained{1, 1};  // share, of each joint's inertia
+  bool torques_swapped = false;
+  Joints torque_sign{1, 1};
+  double torque_misfit = 0;
+
+  double misfit() const { return Misfit(unexplained[0]) + Misfit(unexplained[1]); }
+
+  /// Number of changes to the columns.
+  int changes() const {
+    const Reading& r = reading;
+    return (r.sign[0] < 0) + (r.sign[1] < 0) + r.absolute + (r.swapped || torques_swapped) +
+           (r.swapped != torques_swapped) + (r.unit != Joints{1, 1}) + (torque_sign[0] < 0) +
+           (torque_sign[1] < 0) + (std::abs(zero[0]) > kZero) + (std::abs(zero[1]) > kZero);
+  }
+  double cost() const { return misfit() + torque_misfit + kChange * changes(); }
+};
+
+/// The equations of both joints for one reading of the angles.
+struct Equations {
+  std::array<Gram, 2> gram;
+
+  void SetZero(Explanation& e, const Joints& zero) const {
+    e.zero = zero;
+    for (const int row : {0, 1})
+      e.unexplained[row] = Unexplained(gram[row], row, zero, kInertia, 1);
+  }
+
+  /// Improves the zeros within `most` by steps of `step` (rad) and smaller ones.
+  Explanation Improve(Explanation best, double step, double most) const {
+    for (; step > 0.01; step /= 2) {
+      for (const Joints& way : {Joints{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
+        Explanation next = best;
+        const Joints& at = best.zero;
+        SetZero(next, {std::clamp(at[0] + step * way[0], -most, most),
+                       std::clamp(at[1] + step * way[1], -most, most)});
+        if (next.misfit() < best.misfit()) best = next;
+      }
+    }
+    return best;
+  }
+
+  /// Sets the joints and signs of the torques.
+  void SetTorques(Explanation& e, const std::array<bool, 2>& has_torque) const {
+    Explanation best = e;
+    for (const bool swapped : {false, true}) {
+      Explanation next = e;
+      next.torques_swapped = swapped;
+      for (const int row : {0, 1}) {
+        const int column = swapped ? 1 - row : row;
+        if (!has_torque[column]) continue;
+        const Term term = column == 0 ? kTorque1 : kTorque2;
+        const double as_is = Misfit(Unexplained(gram[row], row, e.zero, term, 1));
+        const double turned = Misfit(Unexplained(gram[row], row, e.zero, term, -1));
+        next.torque_sign[column] = turned < as_is - kChange ? -1 : 1;
+        next.torque_misfit += next.torque_sign[column] < 0 ? turned : as_is;
+      }
+      if (!swapped || next.cost() < best.cost()) best = next;
+    }
+    e = best;
+  }
+
+  /// The best explanations with the columns' own zeros and with others.
+  std::array<Explanation, 2> Explain(Explanation start,
+                                     const std::array<bool, 2>& has_torque) const {
+    SetZero(start, {});
+    Explanation any = start;
+    for (int i = -3; i <= 4; ++i) {
+      for (int j = -3; j <= 4; ++j) {
+        Explanation next = start;
+        SetZero(next, {i * std::numbers::pi / 4, j * std::numbers::pi / 4});
+        if (next.misfit() < any.misfit()) any = next;
+      }
+    }
+    std::array<Explanation, 2> both{Improve(start, kZero / 2, kZero), Improve(any, 0.4, 4)};
+    for (Explanation& e : both) SetTorques(e, has_torque);
+    return both;
+  }
+};
+
+/// All ways to read angles with these ranges; the first one changes nothing.
+std::vector<Reading> Readings(const Joints& range) {
+  constexpr double kLeast = 0.3, kMost = 100;  // rad
+  constexpr double kTurn = 2 * std::numbers::pi, kDegree = kTurn / 360;
+  std::vector<Reading> readings;
+  for (const Joints& unit :
+       {Joints{1, 1}, {kTurn, kTurn}, {kDegree, kDegree}, {kDegree, 1}, {1, kDegree}}) {
+    if (std::ranges::any_of(std::array{0, 1}, [&](int j) {
+          const double moves = unit[j] * range[j];
+          return unit[j] != 1 && (moves < kLeast || moves > kMost);
+        })) {
+      continue;
+    }
+    for (const Joints& sign : {Joints{1, 1}, {1, -1}, {-1, 1}, {-1, -1}}) {
+      for (const bool absolute : {false, true}) {
+        for (const bool swapped : {false, true}) {
+          readings.push_back({sign, unit, absolute, swapped});
+        }
+      }
+    }
+  }
+  return readings;
+}
+
+/// Whether the joints move nearly in proportion, which several explanations allow.
+bool InProportion(const std::vector<Window>& windows) {
+  constexpr double kProportion = 0.95;
+  Pairs pairs;
+  for (const Window& window : windows) {
+    pairs.Add(window.back().w[0] - window.front().w[0], window.back().w[1] - window.front().w[1]);
+  }
+  return std::abs(pairs.correlation()) > kProportion;
+}
+
+void Report(const Explanation& e, bool in_proportion, Findings& findings) {
+  const auto add = [&](Aspect aspect, int joint, const std::string& text) {
+    findings.push_back(
+        {aspect, joint, Severity::kFault,
+         fmt::format("suspect {}: with it the motion is that of a pendulum{}", text,
+                     in_proportion ? "; or another sign, joint or zero of angles or torques: the "
+                                     "joints move in proportion"
+                                   : "")});
+  };
+  const Reading& r = e.reading;
+  if (r.swapped && e.torques_swapped) add(Aspect::kMotion, 0, "swapped columns of both joints");
+  if (r.swapped && !e.torques_swapped) add(Aspect::kAngle, 0, "swapped angles");
+  if (!r.swapped && e.torques_swapped) add(Aspect::kTorque, 0, "swapped torques");
+  if (r.absolute) add(Aspect::kAngle, 2, "an angle against the vertical (key absolute)");
+  for (const int j : {0, 1}) {
+    if (r.unit[j] != 1) {
+      add(Aspect::kAngle, j + 1, r.unit[j] > 1 ? "turns (key unit)" : "degrees (key unit)");
+    }
+    if (r.sign[j] < 0) add(Aspect::kAngle, j + 1, "the opposite sign (factor = -1)");
+    if (e.torque_sign[j] < 0) add(Aspect::kTorque, j + 1, "the opposite sign (factor = -1)");
+    // The reading of a link that hangs, by the column's own sign.
+    const double hangs = -r.sign[j] * (j == 1 && r.absolute ? e.zero[0] + e.zero[1] : e.zero[j]);
+    if (std::abs(e.zero[j]) <= kZero) continue;
+    add(Aspect::kAngle, j + 1,
+        fmt::format("another zero, {:.2f} rad when its link {} (key hanging)",
+                    std::remainder(hangs, 2 * std::numbers::pi),
+                    j == 0 || r.absolute ? "hangs" : "is in line with link 1"));
+  }
+}
+
+}  // namespace
+
+void CheckEquations(Pieces pieces, Findings& findings) {
+  constexpr double kMoving = 0.5;  // rad
+  constexpr size_t kEnough = 25;   // windows
+  constexpr int kMostChanges = 3;
+  constexpr double kGood = 0.1;  // unexplained
+  const Joints range{AngleRange(pieces, 0), AngleRange(pieces, 1)};
+  if (range[0] < kMoving || range[1] < kMoving) return;
+  if (!(UsualCycle(pieces) > 0)) return;
+  const std::vector<Window> windows = WindowsOf(pieces);
+  if (windows.size() < kEnough) return;
+  std::array<bool, 2> has_torque{};
+  for (const MachineLog& log : pieces) {
+    for (const int j : {0, 1}) {
+      has_torque[j] = has_torque[j] || HasTorque(log.commanded, j) || HasTorque(log.push, j);
+    }
+  }
+  const bool in_proportion = InProportion(windows);
+  if (in_proportion && !has_torque[0] && !has_torque[1]) return;
+  std::vector<Explanation> all;
+  for (const Reading& reading : Readings(range)) {
+    const Equations equations{{GramOf(windows, reading, 0), GramOf(windows, reading, 1)}};
+    for (const Explanation& e : equations.Explain({reading}, has_torque)) all.push_back(e);
+  }
+  const Explanation best = *std::ranges::min_element(all, {}, &Explanation::cost);
+  if (best.changes() > kMostChanges) return;
+  if (std::max(best.unexplained[0], best.unexplained[1]) > kGood) return;
+  // Torques that have nothing to do with the motion are no evidence.
+  if (best.torque_misfit > -1.0 * (has_torque[0] + has_torque[1])) return;
+  Report(best, in_proportion, findings);
+}
+
+}  // namespace upswing::machine
