@@ -11,7 +11,7 @@
 #include "cli/say.h"
 #include "cli/signals.h"
 #include "extras/machine/learn.h"
-#include "extras/realaigym/boards.h"
+#include "extras/machine/policy_controller.h"
 #include "os/file.h"
 #include "os/host.h"
 
@@ -48,7 +48,7 @@ int RunLearn(const LearnArguments& a) {
   if (a.out.empty()) throw BadInput("machine learn: expected --out FOLDER, got none");
   LearnConfig config = a.config;
   config.seed = static_cast<uint64_t>(a.seed);
-  config.actuated_joint = static_cast<int>(*realaigym::ParseRobot(a.robot));
+  config.actuated_joint = static_cast<int>(*ParseRobot(a.robot));
   config.Check();
   const LinkAddress address = ParseLink(a.link, /*listens=*/false);
   if (address.kind == LinkAddress::Kind::kTwin) {
