@@ -195,7 +195,7 @@ class Learner {
       std::vector<MachineLog> logs = logs_;
       if (result_.tries > 0) logs.push_back(logs_.back());
       const double quantum = twin_.sensors.quantum;
-      const FitResult fit = machine::Fit(logs, twin_, values, config, pool_);
+      const FitResult fit = machine::Fit(logs, twin_, {"", values}, config, pool_);
       if (!(fit.error < kLargestError)) {
         throw Failure(
             fmt::format("no twin follows the motion (error {:.2f} rad): are the signs of "
