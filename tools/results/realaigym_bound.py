@@ -1,20 +1,23 @@
 #!/usr/bin/env python3
-"""Searches the best performance score of RealAIGym by direct optimisation.
+"""Finds what optimal swing-ups would score on RealAIGym, version 3, after the resets of given runs.
 
-The unknowns are the motion and torques of a swing-up that ends upright at rest within --seconds. The
-cost is the sum of the score's penalties. The constraints are the equations of motion in Runge-Kutta
-steps of 4 ms. Each start from random torques finds a local optimum. Needs `pip install casadi`.
+A run's log (`upswing realaigym score … --csv run.csv`) has the state in which each reset ends. From there,
+direct optimisation minimises the time after which the tip stays above the line until rest at upright.
+The start of each solution is a straight line to one of six goals (turns of both joints), or the run's
+own motion. The optima are local, so the best possible score is at least the printed one. The time lost
+within resets is that of the run. Needs `pip install casadi`.
 
-    python3 tools/results/realaigym_bound.py pendubot --starts 40
+    python3 tools/results/realaigym_bound.py pendubot run.csv
 """
 
 import argparse
+import itertools
 
 import casadi as ca
 import numpy as np
 
-H = 0.004  # step, s; the boards' step is 0.002 s
-RULE_STEPS = 4999  # of the boards' simulation, for the variance of the torque's change
+N1, N2 = 30, 14  # steps until the tip is above the line, and from there to rest
+STEP = 0.002  # of a log, s
 LINE = 0.45  # m
 
 M1, M2, L1, L2 = 0.5234602302310271, 0.6255677234174437, 0.2, 0.3
@@ -36,107 +39,108 @@ def derivative(x, u, joint):
 
 
 def runge_kutta(joint):
-    x, u = ca.SX.sym("x", 4), ca.SX.sym("u")
-    k1 = derivative(x, u, joint)
-    k2 = derivative(x + H / 2 * k1, u, joint)
-    k3 = derivative(x + H / 2 * k2, u, joint)
-    k4 = derivative(x + H * k3, u, joint)
-    return ca.Function("step", [x, u], [x + H / 6 * (k1 + 2 * k2 + 2 * k3 + k4)])
+    """Two steps of Runge-Kutta over h seconds."""
+    x, u, h = ca.SX.sym("x", 4), ca.SX.sym("u"), ca.SX.sym("h")
+    y = x
+    for _ in range(2):
+        k1 = derivative(y, u, joint)
+        k2 = derivative(y + h / 4 * k1, u, joint)
+        k3 = derivative(y + h / 4 * k2, u, joint)
+        k4 = derivative(y + h / 2 * k3, u, joint)
+        y = y + h / 12 * (k1 + 2 * k2 + 2 * k3 + k4)
+    return ca.Function("step", [x, u, h], [y])
+
+
+def tip(q):
+    return -L1 * np.cos(q[:, 0]) - L2 * np.cos(q[:, 0] + q[:, 1])
 
 
 class Problem:
-    def __init__(self, joint, seconds):
-        self.steps = n = round(seconds / H)
-        step = runge_kutta(joint)
-        self.follow = step.mapaccum(n)
+    """The fastest way above the line. Unknowns: states, torques, and the times before and after."""
+
+    def __init__(self, joint):
+        n = N1 + N2
         x, u = ca.MX.sym("x", 4, n + 1), ca.MX.sym("u", 1, n)
-        costs = ca.MX.sym("costs", 4)  # energy, torque cost, smoothness, velocity cost
-        goal = ca.MX.sym("goal", 2)
-        angle = x[joint - 1, :]
-        energy = ca.sum2(ca.sqrt(((angle[1:] - angle[:-1]) * u) ** 2 + 1e-11))
-        change = ca.horzcat(u[1:] - u[:-1], -u[n - 1])
-        # A change in 4 ms counts as two changes of half its size in 2 ms.
-        variance = ca.sum2(change**2) / 2 / RULE_STEPS - (u[0] / RULE_STEPS) ** 2
-        sums = [energy, H * ca.sum2(u**2), variance * 1e4, H * ca.sum2(x[2, :] ** 2 + x[3, :] ** 2)]
-        own = [costs[0], costs[1], costs[2] ** 2 * 1e4, costs[3]]
-        tip = -L1 * ca.cos(x[0, :]) - L2 * ca.cos(x[0, :] + x[1, :])
-        constraints = ca.horzcat(
-            ca.reshape(x[:, 1:] - step.map(n)(x[:, :n], u), 1, 4 * n), x[:, 0].T,
-            (x[:2, n] - goal).T, x[2:, n].T, *[a - b for a, b in zip(sums, own)], tip)
-        unknowns = ca.vertcat(ca.vec(x), ca.vec(u), costs)
-        scale = np.array([60, 20, 0.1, 400])
-        penalties = ca.tanh(ca.pi * costs / scale)
-        self.penalties = ca.Function("penalties", [unknowns], [penalties])
-        self.count = constraints.shape[1]
-        self.low = np.r_[np.full(4 * (n + 1), -60), np.full(n, -6), np.full(4, 1e-5)]
-        self.high = np.r_[np.full(4 * (n + 1), 60), np.full(n, 6), np.full(4, 1e4)]
+        times, given = ca.MX.sym("times", 2), ca.MX.sym("given", 6)  # start state, goal's angles
+        h = ca.horzcat(ca.repmat(times[0] / N1, 1, N1), ca.repmat(times[1] / N2, 1, N2))
+        after = x[:, N1:]
+        height = -L1 * ca.cos(after[0, :]) - L2 * ca.cos(after[0, :] + after[1, :])
+        constraints = ca.vertcat(
+            ca.vec(x[:, 1:] - runge_kutta(joint).map(n)(x[:, :n], u, h)), x[:, 0] - given[:4],
+            x[:2, n] - given[4:], x[2:, n], height.T)
+        zeros = np.zeros(4 * n + 8)
+        self.limits = {
+            "lbg": np.r_[zeros, np.full(N2 + 1, LINE)], "ubg": np.r_[zeros, np.full(N2 + 1, 1)],
+            "lbx": np.r_[np.full(4 * (n + 1), -80), np.full(n, -6), 0.004, 0.05],
+            "ubx": np.r_[np.full(4 * (n + 1), 80), np.full(n, 6), 3, 0.8]}
         self.solver = ca.nlpsol(
-            "solver", "ipopt",
-            {"x": unknowns, "f": ca.sum1(penalties), "g": constraints.T, "p": goal},
-            {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": 0, "ipopt.max_iter": 400,
-             "ipopt.tol": 1e-4, "ipopt.max_cpu_time": 25.0, "ipopt.mu_strategy": "adaptive"})
+            "solver", "ipopt", {"x": ca.vertcat(ca.vec(x), ca.vec(u), times), "f": times[0],
+                                "g": constraints, "p": given},
+            {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": 0, "ipopt.max_iter": 250,
+             "ipopt.tol": 1e-4, "ipopt.max_cpu_time": 4.0, "ipopt.mu_strategy": "adaptive"})
 
-    def first_guess(self, rng, line):
-        """A first guess: a sine of torque until step `line`, and the motion under it, bent to a
-        goal."""
-        t = np.arange(self.steps) * H
-        u = rng.uniform(0.5, 4) * np.sin(2 * np.pi * (rng.uniform(0.4, 1.6) * t + rng.uniform()))
-        u *= np.arange(self.steps) < line
-        x = np.c_[np.zeros(4), np.array(self.follow(np.zeros(4), u[None, :]))]
-        goal = np.array([np.pi * rng.choice([-1, 1]), 2 * np.pi * rng.choice([-1, 0, 0, 1])])
-        share = np.clip(np.arange(self.steps + 1) / line, 0, 1) ** 2
-        x[:2] = (1 - share) * x[:2] + share * goal[:, None]
-        x[2:] *= 1 - share
-        return np.r_[x.T.ravel(), u, 8, 4, 0.02, 80], goal
+    def seconds(self, start, goal, states, torques, times):
+        """The least time found until the tip stays above the line; infinite if nothing is found."""
+        found = self.solver(x0=np.r_[states.ravel(), torques, times], p=np.r_[start, goal],
+                            **self.limits)
+        return float(found["x"][-2]) if self.solver.stats()["success"] else np.inf
 
-    def improve(self, rng):
-        """The best result over a few times from which the tip is above the line; None if nothing is
-        found."""
-        line = round(rng.uniform(0.5, min(2.6, self.steps * H - 0.4)) / H)
-        z, goal = self.first_guess(rng, line)
-        best = None
-        for attempt in range(6):
-            low, high = np.zeros(self.count), np.zeros(self.count)
-            low[-(self.steps + 1):], high[-(self.steps + 1):] = -1, 1
-            low[-(self.steps + 1) + line:] = LINE + 1e-4
-            z = np.array(self.solver(x0=z, p=goal, lbg=low, ubg=high, lbx=self.low,
-                                     ubx=self.high)["x"]).ravel()
-            if not self.solver.stats()["success"]:
-                break
-            q = z[:4 * (self.steps + 1)].reshape(-1, 4)[:, :2]
-            above = -L1 * np.cos(q[:, 0]) - L2 * np.cos(q.sum(axis=1)) > LINE
-            line = int(np.flatnonzero(~above)[-1]) + 1
-            penalties = np.r_[np.tanh(np.pi * line * H / 20), np.array(self.penalties(z)).ravel()]
-            score = 1 - penalties.sum() / 5
-            if best is not None and score < best[0] + 1e-4:
-                break
-            best = score, line * H, penalties
-            if attempt:
-                line += int(rng.integers(-20, 21))
-        return best
+    def best(self, start):
+        """The least time over the nearest goals."""
+        turn = 2 * np.pi
+        first, second = np.floor(start[0] / turn - 0.5), np.round(start[1] / turn)
+        share = np.r_[np.linspace(0, 1, N1 + 1), np.ones(N2)][:, None]
+        times = []
+        for i, j in itertools.product((0, 1), (-1, 0, 1)):
+            goal = turn * np.array([first + i + 0.5, second + j])
+            states = np.hstack([(1 - share) * start[:2] + share * goal, (1 - share) * start[2:]])
+            times.append(self.seconds(start, goal, states, np.zeros(N1 + N2), (0.4, 0.3)))
+        return min(times)
+
+    def improved(self, start, rows, joint, last):
+        """The least time from a run's own motion, which is above the line `last` seconds after the
+        start."""
+        place = np.r_[np.linspace(0, last, N1 + 1), last + np.linspace(0, 0.3, N2 + 1)[1:]] / STEP
+        place = np.minimum(np.round(place).astype(int), len(rows) - 1)
+        states = rows[place, 1:5]
+        end = states[-1] / (2 * np.pi)
+        goal = 2 * np.pi * np.array([np.round(end[0] - 0.5) + 0.5, np.round(end[1])])
+        return self.seconds(start, goal, states, rows[place[:-1], 4 + joint], (last, 0.3))
+
+
+def bound(problem, joint, path):
+    """The score of a run, and the score with the best swing-ups found."""
+    rows = np.genfromtxt(path, delimiter=",", skip_header=1)
+    up = tip(rows[:, 1:3]) > LINE
+    # Both motors act in resets.
+    reset = np.r_[False, rows[:, 7 - joint] != 0, False]
+    begins, ends = np.flatnonzero(reset[1:] & ~reset[:-1]), np.flatnonzero(~reset[1:] & reset[:-1])
+    lost = own = sum((~up[i:j]).sum() for i, j in zip(begins, ends)) * STEP
+    for i, j in zip([0, *ends], [*begins, len(rows)]):
+        down = (~up[i:j]).sum() * STEP
+        last = (np.flatnonzero(~up[i:j])[-1] + 1) * STEP if down else 0
+        best = 0
+        if down:
+            start = rows[i, 1:5]
+            best = min(down, problem.best(start))
+            if last < (j - i) * STEP - 0.3:
+                best = min(best, problem.improved(start, rows[i:j], joint, last))
+        lost, own = lost + best, own + down
+    return 1 - own / 60, 1 - lost / 60
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("robot", choices=["pendubot", "acrobot"], help="robot of the benchmark")
-    parser.add_argument("--starts", type=int, default=40,
-                        help="number of random starts (default 40)")
-    parser.add_argument("--seed", type=int, default=1, help="seed of the starts (default 1)")
-    parser.add_argument("--seconds", type=float, default=2.4,
-                        help="time of the swing-up [s] (default 2.4)")
+    parser.add_argument("runs", nargs="+", metavar="RUN.csv", help="logs of runs, score version 3")
     a = parser.parse_args()
-    problem = Problem(1 if a.robot == "pendubot" else 2, a.seconds)
-    rng = np.random.default_rng(a.seed)
-    print("start  S      time s   penalties: time, energy, torque cost, smoothness, velocity cost")
-    best = 0
-    for start in range(a.starts):
-        found = problem.improve(rng)
-        if found is None:
-            continue
-        best = max(best, found[0])
-        print(f"{start:5}  {found[0]:.4f} {found[1]:6.2f}     "
-              + "  ".join(f"{p:.3f}" for p in found[2]), flush=True)
-    print(f"best   {best:.4f}")
+    joint = 1 if a.robot == "pendubot" else 2
+    problem = Problem(joint)
+    scores = []
+    for path in a.runs:
+        scores.append(bound(problem, joint, path))
+        print(f"{path}: {scores[-1][0]:.3f}, with the best swing-ups {scores[-1][1]:.3f}", flush=True)
+    print(f"mean of {len(scores)}: {np.mean(scores, 0)[0]:.3f}, {np.mean(scores, 0)[1]:.3f}")
 
 
 if __name__ == "__main__":
