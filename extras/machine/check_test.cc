@@ -392,8 +392,7 @@ TEST(MachineCheck, TheEquationsOfMotionNameEachChangeOfTheColumns) {
   };
   expect([](Joints& q, Joints&) { q[0] += kPi; }, {"angle 1: suspect another zero"});
   expect([](Joints& q, Joints&) { q[0] += 0.8; }, {"angle 1: suspect another zero, 0.7"});
-  expect([](Joints& q, Joints&) { q[1] -= 1; },
-         {"angle 2: suspect another zero, -0.9"});
+  expect([](Joints& q, Joints&) { q[1] -= 1; }, {"angle 2: suspect another zero, -0.9"});
   expect([](Joints& q, Joints&) { q[1] += q[0]; },
          {"angle 2: suspect an angle against the vertical"});
   expect(

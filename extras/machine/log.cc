@@ -91,6 +91,18 @@ std::string TextIn(const toml::node& node, const std::string& place) {
   throw BadInput(Concat(place, "expected the name of a column in quotes, got ", Shown(node)));
 }
 
+/// The scale that the end of a column's name states, such as `q1 [deg]`, `q1 (deg)` or `time_ms`; 1
+/// if it states none.
+double ScaleInName(std::string name, std::string_view quantity) {
+  if (name.ends_with(']') || name.ends_with(')')) name.pop_back();
+  const size_t before = name.find_last_of("[(_ ");
+  if (before == std::string::npos) return 1;
+  for (const LogUnit& known : kUnits) {
+    if (quantity == known.quantity && name.substr(before + 1) == known.name) return known.scale;
+  }
+  return 1;
+}
+
 /// Reads `"name"` or `{column = "name", unit = "deg", factor = -1}`. An angle may have the keys
 /// `wrap` and `hanging`, too.
 LogColumn ColumnIn(const toml::node& node, std::string_view quantity, const std::string& place) {
@@ -98,16 +110,21 @@ LogColumn ColumnIn(const toml::node& node, std::string_view quantity, const std:
   const toml::table* table = node.as_table();
   if (table == nullptr) {
     column.name = TextIn(node, place);
+    column.scale = ScaleInName(column.name, quantity);
     return column;
   }
+  bool states_scale = false;
   for (const auto& [key, value] : *table) {
     const std::string inner = Concat(place, key.str(), ": ");
     if (key == "column") {
       column.name = TextIn(value, inner);
     } else if (key == "unit") {
       column.scale *= ScaleOf(TextOf(value).value_or(""), quantity, place);
+      states_scale = true;
     } else if (key == "factor") {
-      column.scale *= NumberIn(value, {1e-9, 1e9}, inner);
+      const double factor = NumberIn(value, {1e-9, 1e9}, inner);
+      column.scale *= factor;
+      states_scale = states_scale || std::abs(factor) != 1;
     } else if (key == "wrap" && quantity == "angle") {
       column.wrap = std::abs(NumberIn(value, {1e-9, 1e12}, inner));
     } else if (key == "hanging" && quantity == "angle") {
@@ -119,6 +136,7 @@ LogColumn ColumnIn(const toml::node& node, std::string_view quantity, const std:
     }
   }
   if (column.name.empty()) throw BadInput(Concat(place, "expected a column, got none"));
+  if (!states_scale) column.scale *= ScaleInName(column.name, quantity);
   return column;
 }
 
@@ -200,14 +218,16 @@ LogColumns RealAiGymColumns(const std::vector<std::string>& names, const std::st
 }
 
 /// Numbers of a column in SI units. Throws BadInput for a huge one.
-std::vector<double> Scaled(CsvColumn table, const LogColumn& column, const std::string& where) {
+std::vector<double> Scaled(CsvColumn table, const LogColumn& column, const std::string& where,
+                           bool is_time = false) {
   std::vector<double> values = std::move(table.values);
   for (size_t row = 0; row < values.size(); ++row) {
     double& x = values[row];
     x = (x - column.hanging) * column.scale;
     if (std::abs(x) <= kMostMagnitude) continue;
     throw BadInput(Concat(where, ": row ", row + 1, ": ", column.name,
-                          ": expected a number of magnitude 0 to ", kMostMagnitude, ", got ", x));
+                          ": expected a number of magnitude 0 to ", kMostMagnitude, ", got ", x,
+                          is_time ? "; name the unit of the clock (ms, us, ns)" : ""));
   }
   return values;
 }
@@ -238,7 +258,7 @@ WholeLog ReadRows(std::string_view csv, const LogColumns& columns, const std::st
     table.emplace(std::move(name), std::move(column));
   }
   WholeLog whole;
-  whole.log.time = Scaled(table[columns.time.name], columns.time, where);
+  whole.log.time = Scaled(table[columns.time.name], columns.time, where, true);
   if (!columns.piece.empty()) whole.piece = table[columns.piece].values;
   for (const JointQuantity& q : kJointQuantities) {
     std::vector<Joints>& values = whole.log.*q.values;
@@ -310,7 +330,8 @@ void CheckRows(const MachineLog& log, const std::string& where) {
     if (log.time[k] >= log.time[k - 1]) continue;
     throw BadInput(Concat(where, ": row ", log.first_row + k, ": time: expected at least ",
                           FormatNumber(log.time[k - 1]), " s as in the row before, got ",
-                          FormatNumber(log.time[k]), " s"));
+                          FormatNumber(log.time[k]),
+                          " s; split logs that follow each other, or name a column by piece"));
   }
 }
 

@@ -83,6 +83,11 @@ bool FindNames(std::string_view& rest, Line& line) {
   if (rest.starts_with("\xff\xfe") || rest.starts_with("\xfe\xff")) {
     throw BadInput(Concat(line.where, ": expected text in UTF-8, got UTF-16: save it as UTF-8"));
   }
+  if (rest.starts_with("PK") || rest.substr(0, 4096).find('\0') != rest.npos) {
+    throw BadInput(Concat(line.where, ": expected a CSV text, got ",
+                          rest.starts_with("PK") ? "a zip archive or spreadsheet" : "binary data",
+                          ": export it as CSV"));
+  }
   if (rest.starts_with(kMark)) rest.remove_prefix(kMark.size());
   if (!FindLine(rest, line)) return false;
   if (line.text.starts_with("sep=") && line.text.size() <= 5) {
@@ -102,6 +107,29 @@ std::optional<double> NumberIn(std::string_view cell, const Line& line) {
   const bool has_comma = line.separator != ',' && cell.find(',') != cell.npos;
   const auto number = ParseNumber(has_comma ? Replaced(std::string(cell), ",", ".") : cell);
   return number && std::isfinite(*number) ? number : std::nullopt;
+}
+
+/// What a reader may do about a cell of the column `name` that is no number.
+std::string HintFor(std::string_view cell, std::string_view name) {
+  if (cell == name) return ": the names again; split the file here";
+  const auto number = ParseNumber(cell);
+  if (cell.empty() || (number && !std::isfinite(*number))) {
+    return ": a missing value; remove or fill its row";
+  }
+  const bool has_digit = std::ranges::any_of(cell, [](char c) { return c >= '0' && c <= '9'; });
+  if (!has_digit) return ": if the line has units or a summary, put # before it";
+  std::string digits(cell);
+  for (const char* separator : {",", ".", " ", "'", "_"}) digits = Replaced(digits, separator, "");
+  return ParseNumber(digits) ? ": remove separators of thousands" : "";
+}
+
+/// What may be wrong with a line of names that lacks a column.
+std::string NamesHint(const std::vector<std::string_view>& cells, std::string_view line) {
+  if (std::ranges::any_of(cells, [](auto cell) { return ParseNumber(cell).has_value(); })) {
+    return ": the first line needs the names";
+  }
+  const bool other = cells.size() == 1 && line.find_first_of(" |") != line.npos;
+  return other ? ": separate cells by commas, semicolons or tabs" : "";
 }
 
 /// A text as a cell: Printable, which keeps the row on one line, and in quotes if necessary.
@@ -135,7 +163,8 @@ std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::str
   for (const std::string& name : names) {
     const auto found = std::ranges::find(cells, name, TextOf);
     if (found == cells.end()) {
-      throw line.Bad(Concat("expected a column \"", name, "\", got \"", line.text, "\""));
+      throw line.Bad(Concat("expected a column \"", name, "\", got \"", line.text.substr(0, 200),
+                            "\"", NamesHint(cells, line.text)));
     }
     const auto times = std::ranges::count(cells, name, TextOf);
     if (times > 1) {
@@ -154,8 +183,8 @@ std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::str
       const std::string_view cell = WithoutQuotes(cells[places[i]]);
       const auto number = NumberIn(cell, line);
       if (!number) {
-        throw line.Bad(
-            Concat(names[i], ": expected a finite number, got \"", Printable(cell), "\""));
+        throw line.Bad(Concat(names[i], ": expected a finite number, got \"", Printable(cell), "\"",
+                              HintFor(cell, names[i])));
       }
       columns[i].values.push_back(*number);
     }

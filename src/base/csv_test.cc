@@ -70,17 +70,24 @@ TEST(Csv, MessagesNameLineAndColumn) {
   EXPECT_EQ(Complaint("a,b\n1,2\n3"),
             "t.csv:3: expected 2 columns, got 1: the last line is cut off; remove it");
   EXPECT_EQ(Complaint("a,b\n1,2,5\n"), "t.csv:2: expected 2 columns, got 3");
-  EXPECT_EQ(Complaint("a;b\n1;2,5,1\n"), "t.csv:2: b: expected a finite number, got \"2,5,1\"");
+  EXPECT_EQ(Complaint("a;b\n1;2,5,1\n"),
+            "t.csv:2: b: expected a finite number, got \"2,5,1\": remove separators of thousands");
   EXPECT_EQ(Complaint("\xff\xfe"
                       "a"),
             "t.csv: expected text in UTF-8, got UTF-16: save it as UTF-8");
-  EXPECT_EQ(Complaint("a,b\n# c\n1,x\n"), "t.csv:3: b: expected a finite number, got \"x\"");
+  EXPECT_EQ(Complaint("a,b\n# c\n1,x\n"),
+            "t.csv:3: b: expected a finite number, got \"x\": if the line has units or a summary, "
+            "put # before it");
   EXPECT_EQ(Complaint(std::string("a,b\n1,2\0003\n", 10)),
-            "t.csv:2: b: expected a finite number, got \"2\\x003\"");
-  EXPECT_EQ(Complaint("a,b\n1,inf\n"), "t.csv:2: b: expected a finite number, got \"inf\"");
+            "t.csv: expected a CSV text, got binary data: export it as CSV");
+  EXPECT_EQ(
+      Complaint("a,b\n1,inf\n"),
+      "t.csv:2: b: expected a finite number, got \"inf\": a missing value; remove or fill its row");
   EXPECT_EQ(Complaint("a,b\nx,1\n"), "none");
   EXPECT_EQ(Complaint("a,b\n\"x,1\n"), "t.csv:2: expected a closing quote, got \"\"x,1\"");
-  EXPECT_EQ(Complaint("a,b\n1,\"\"\n"), "t.csv:2: b: expected a finite number, got \"\"");
+  EXPECT_EQ(
+      Complaint("a,b\n1,\"\"\n"),
+      "t.csv:2: b: expected a finite number, got \"\": a missing value; remove or fill its row");
 }
 
 TEST(Csv, RefusesMoreColumnsThanAnyTableHas) {

@@ -166,9 +166,9 @@ std::vector<std::string_view> Split(std::string_view text, char separator) {
 }
 
 std::string_view TakeLine(std::string_view& rest) {
-  const size_t end = std::min(rest.find('\n'), rest.size());
+  const size_t end = std::min(rest.find_first_of("\r\n"), rest.size());
   const std::string_view line = Trim(rest.substr(0, end));
-  rest.remove_prefix(std::min(end + 1, rest.size()));
+  rest.remove_prefix(std::min(end + (rest.substr(end, 2) == "\r\n" ? 2 : 1), rest.size()));
   return line;
 }
 
