@@ -1,11 +1,11 @@
 #include "extras/machine/channel.h"
 
 #include <arpa/inet.h>
+#include <asm/termbits.h>  // termios2, which glibc's <termios.h> excludes
 #include <fcntl.h>
 #include <netdb.h>
 #include <poll.h>
 #include <sys/ioctl.h>
-#include <termios.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -24,15 +24,7 @@
 namespace upswing::machine {
 namespace {
 
-constexpr std::array<std::pair<int, speed_t>, 9> kRates{{{115200, B115200},
-                                                         {230400, B230400},
-                                                         {460800, B460800},
-                                                         {500000, B500000},
-                                                         {921600, B921600},
-                                                         {1000000, B1000000},
-                                                         {2000000, B2000000},
-                                                         {3000000, B3000000},
-                                                         {4000000, B4000000}}};
+constexpr int kLeastBaud = 1200;
 
 Error LinkError(const std::string& place, const std::string& what, int error_number) {
   return BadInput(
@@ -56,28 +48,26 @@ LinkAddress ParseSerial(std::string place, const std::string& link) {
     address.number = rate ? static_cast<int>(std::clamp<int64_t>(*rate, 0, 1 << 30)) : 0;
     address.place.resize(colon);
   }
-  const auto known = [&](const auto& entry) { return entry.first == address.number; };
-  if (address.place.empty() || std::ranges::none_of(kRates, known)) {
-    std::vector<std::string> names;
-    names.reserve(kRates.size());
-    for (const auto& [rate, code] : kRates) names.push_back(std::to_string(rate));
+  if (address.place.empty() || address.number < kLeastBaud) {
     throw BadInput(Concat("--link ", Printable(link), ": expected serial:DEVICE[:BAUD] with BAUD ",
-                          Join(names, ", ")));
+                          kLeastBaud, " or more, such as ", kUsualBaud));
   }
   return address;
 }
 
-void MakeRaw(int fd, speed_t rate, const std::string& place) {
-  termios settings{};
-  if (tcgetattr(fd, &settings) != 0) throw LinkError(place, "not a terminal", errno);
-  cfmakeraw(&settings);
-  settings.c_cflag |= CLOCAL | CREAD;
+/// Sets a terminal to raw bytes (8 data bits, no parity, no flow control) at any rate (bit/s).
+void MakeRaw(int fd, int rate, const std::string& place) {
+  termios2 settings{};
+  if (ioctl(fd, TCGETS2, &settings) != 0) throw LinkError(place, "not a terminal", errno);
+  settings.c_iflag = settings.c_oflag = settings.c_lflag = 0;
+  settings.c_cflag = CS8 | CLOCAL | CREAD | BOTHER;
+  settings.c_ispeed = settings.c_ospeed = static_cast<speed_t>(rate);
   settings.c_cc[VMIN] = 0;
   settings.c_cc[VTIME] = 0;
-  if (cfsetspeed(&settings, rate) != 0 || tcsetattr(fd, TCSANOW, &settings) != 0) {
-    throw LinkError(place, "cannot set the terminal's speed", errno);
+  if (ioctl(fd, TCSETS2, &settings) != 0) {
+    throw LinkError(place, Concat("cannot set ", rate, " bit/s"), errno);
   }
-  tcflush(fd, TCIOFLUSH);
+  ioctl(fd, TCFLSH, TCIOFLUSH);
 }
 
 std::string UdpName(const sockaddr_storage& address, socklen_t size) {
@@ -91,7 +81,6 @@ std::string UdpName(const sockaddr_storage& address, socklen_t size) {
 Descriptor OpenUdp(const LinkAddress& address, bool binds) {
   const std::string place = Concat(address.place, ":", address.number);
   addrinfo hints{}, *found = nullptr;
-  hints.ai_family = AF_INET;
   hints.ai_socktype = SOCK_DGRAM;
   const int failed =
       getaddrinfo(address.place.c_str(), std::to_string(address.number).c_str(), &hints, &found);
@@ -100,7 +89,7 @@ Descriptor OpenUdp(const LinkAddress& address, bool binds) {
         Concat("--link udp:", Printable(place), ": unknown host: ", gai_strerror(failed)));
   }
   const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> owner(found, freeaddrinfo);
-  Descriptor fd(socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+  Descriptor fd(socket(found->ai_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
   if (fd.get() < 0) throw LinkError("udp:" + place, "cannot make a socket", errno);
   const int result = binds ? bind(fd.get(), found->ai_addr, found->ai_addrlen)
                            : connect(fd.get(), found->ai_addr, found->ai_addrlen);
@@ -122,7 +111,14 @@ LinkAddress ParseLink(const std::string& text, bool listens) {
     if (colon == std::string::npos || colon == 0) {
       throw BadInput(Concat("--link ", Printable(text), ": expected udp:HOST:PORT"));
     }
-    return {Kind::kUdp, place.substr(0, colon),
+    std::string host = place.substr(0, colon);
+    const bool in_brackets = host.starts_with('[') && host.ends_with(']');
+    if (in_brackets) host = host.substr(1, host.size() - 2);
+    if (!in_brackets && host.find(':') != std::string::npos) {
+      throw BadInput(Concat("--link ", Printable(text),
+                            ": expected an IPv6 address in brackets, udp:[ADDRESS]:PORT"));
+    }
+    return {Kind::kUdp, host,
             ParsePort(std::string_view(place).substr(colon + 1), text, listens ? 0 : 1)};
   }
   if (listens) {
@@ -131,6 +127,11 @@ LinkAddress ParseLink(const std::string& text, bool listens) {
         Concat("--link: expected udp:PORT, udp:HOST:PORT or pty, got \"", Printable(text), "\""));
   }
   if (text.starts_with("serial:")) return ParseSerial(text.substr(7), text);
+  if (text.starts_with("tcp:")) {
+    throw BadInput(Concat("--link ", Printable(text), ": expected udp:HOST:PORT; TCP would repeat ",
+                          "old commands"));
+  }
+  if (text.starts_with("/dev/")) return ParseSerial(text, text);
   return {Kind::kTwin, text, 0};
 }
 
@@ -141,9 +142,14 @@ Channel Channel::Connect(const LinkAddress& address) {
     return channel;
   }
   Descriptor fd(open(address.place.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
-  if (fd.get() < 0) throw LinkError("serial:" + address.place, "cannot open", errno);
-  const auto* rate = std::ranges::find(kRates, address.number, [](auto& r) { return r.first; });
-  MakeRaw(fd.get(), rate->second, "serial:" + address.place);
+  if (fd.get() < 0) {
+    const char* what = errno == EACCES  ? "cannot open; `sudo usermod -aG dialout $USER` and a new "
+                                          "login permit it"
+                       : errno == EBUSY ? "another program uses it"
+                                        : "cannot open";
+    throw LinkError("serial:" + address.place, what, errno);
+  }
+  MakeRaw(fd.get(), address.number, "serial:" + address.place);
   ioctl(fd.get(), TIOCEXCL);  // no second program may write to the motors
   Channel channel(std::move(fd), false);
   channel.name_ = "serial:" + address.place;
@@ -171,7 +177,7 @@ Channel Channel::Listen(const LinkAddress& address) {
   Channel channel(std::move(fd), false);
   channel.name_ = name.data();
   channel.other_end_ = Descriptor(open(name.data(), O_RDWR | O_NOCTTY | O_CLOEXEC));
-  MakeRaw(channel.other_end_.get(), B4000000, channel.name_);
+  MakeRaw(channel.other_end_.get(), 4000000, channel.name_);
   return channel;
 }
 
@@ -197,7 +203,15 @@ size_t Channel::Receive(std::span<std::byte> buffer) {
   } else {
     got = read(fd_.get(), buffer.data(), buffer.size());
   }
-  // Errors such as a refused packet are ignored, because the age of the last reading shows them.
+  // A device that was pulled out hangs up. Errors such as a refused packet are ignored, because the
+  // age of the last reading shows them.
+  if (!datagrams_ && got <= 0 && other_end_.get() < 0) {
+    pollfd hangs{fd_.get(), POLLIN, 0};
+    const bool failed = got < 0 && errno != EAGAIN && errno != EINTR;
+    if (failed || (poll(&hangs, 1, 0) > 0 && (hangs.revents & (POLLHUP | POLLERR | POLLNVAL)))) {
+      throw Failure(Concat("--link ", Printable(name_), ": disconnected"));
+    }
+  }
   return got > 0 ? static_cast<size_t>(got) : 0;
 }
 

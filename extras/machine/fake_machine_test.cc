@@ -108,10 +108,13 @@ TEST(LinkAddress, IsParsed) {
   EXPECT_EQ(ParseLink("udp:4000", true).place, "127.0.0.1");
   EXPECT_EQ(ParseLink("serial:/dev/ttyACM0", false).number, kUsualBaud);
   EXPECT_EQ(ParseLink("serial:/dev/ttyACM0:1000000", false).place, "/dev/ttyACM0");
+  EXPECT_EQ(ParseLink("serial:/dev/ttyACM0:250000", false).number, 250000);
+  EXPECT_EQ(ParseLink("/dev/ttyACM0", false).kind, Kind::kSerial);
+  EXPECT_EQ(ParseLink("udp:[::1]:4000", false).place, "::1");
   EXPECT_EQ(ParseLink("twin.toml", false).kind, Kind::kTwin);
   EXPECT_EQ(ParseLink("pty", true).kind, Kind::kPty);
   for (const char* wrong : {"udp:4000", "udp::4000", "udp:h:0", "udp:h:65536", "udp:h:x",
-                            "serial:", "serial:/dev/tty:9601"}) {
+                            "serial:", "serial:/dev/tty:96", "tcp:h:1", "udp:::1:4000"}) {
     EXPECT_THROW(ParseLink(wrong, false), Error) << wrong;
   }
   for (const char* wrong : {"", "udp:", "udp:-1", "serial:/dev/tty", "twin.toml"}) {
