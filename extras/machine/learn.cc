@@ -16,6 +16,7 @@
 #include "extras/machine/excitation.h"
 #include "extras/machine/first_twin.h"
 #include "extras/machine/identify.h"
+#include "extras/machine/learning_candidates.h"
 #include "extras/machine/learning_run.h"
 #include "extras/machine/policy_controller.h"
 #include "os/file.h"
@@ -31,47 +32,10 @@ struct Excitement {
 constexpr Excitement kSmallMotion{4, 0.8, 0.2, 0.3}, kLargeMotion{6, 2, 0.6, 0.5};
 constexpr double kLimitShare = 0.6;  // share of the user's limits that an excitation aims at
 
-constexpr double kLargestError = 0.1;          // of a fit, rad
-constexpr double kLargestZero = 0.2;           // of the encoders, rad
-constexpr double kLongestSwinging = 60;        // until the links rest, s
-constexpr double kLearnedCompensation = 0.95;  // share of the dry friction, usually
-constexpr int kDraws = 5;                      // machines of the posterior that judge a controller
-
-/// A controller to choose, and the share of dry friction that motors compensate under it.
-struct Candidate {
-  PolicyArguments arguments;
-  double compensation;
-};
-
-/// The candidates for a twin, the best first. The last two need milliseconds for a decision. They
-/// plan with dry friction, because noise makes its compensation shake a light link. Damping of the
-/// joint without a motor stands for its friction in the linear model of the regulator.
-std::vector<Candidate> CandidatesFor(const Plant& plant) {
-  const auto with = [](const char* name, const std::vector<FlagValue>& flags) {
-    Candidate c{{}, kLearnedCompensation};
-    c.arguments.name = name;
-    c.arguments.flags = flags;
-    return c;
-  };
-  const std::vector<FlagValue> stiff{{"lqr_q1", "100"}, {"lqr_q2", "100"}, {"lqr_torque", "0.3"}};
-  std::vector<FlagValue> ahead = stiff;
-  ahead.insert(ahead.end(), {{"mpc_seconds", "0.3"}, {"mpc_angle_range", "9"}});
-  Candidate rubbing = with("mpc", {{"mpc_seconds", "1"}});
-  rubbing.compensation = 0;
-  rubbing.arguments.made_for = {Concat("coulomb1=", plant.coulomb1),
-                                Concat("coulomb2=", plant.coulomb2)};
-  Candidate damped = rubbing;
-  constexpr double kDamping = 2;  // for dry friction, s/rad
-  damped.arguments.made_for.push_back(
-      plant.actuated_joint == 1 ? Concat("damping2=", plant.damping2 + kDamping * plant.coulomb2)
-                                : Concat("damping1=", plant.damping1 + kDamping * plant.coulomb1));
-  return {with("tvlqr", {}),
-          with("tvlqr", stiff),
-          with("tvlqr", {{"tvlqr_seconds", "6"}, {"tvlqr_reserve", "0.1"}}),
-          with("mpc", ahead),
-          rubbing,
-          damped};
-}
+constexpr double kLargestError = 0.1;    // of a fit, rad
+constexpr double kLargestZero = 0.2;     // of the encoders, rad
+constexpr double kLongestSwinging = 60;  // until the links rest, s
+constexpr int kDraws = 5;                // machines of the posterior that judge a controller
 
 double ProcessorSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
@@ -179,6 +143,10 @@ class Learner {
                     "{:.2f} N·m{}",
                     rules.log, run.motion, angle[0], angle[1], torque[0], torque[1],
                     run.reason.empty() ? "" : "; " + run.reason));
+    const Joints& last = logs_.back().angle.back();
+    if (Larger(last[0], last[1]) > c_.limits.angle) {
+      throw Ended{"the links hang beyond --max-angle: turn them back, or raise it"};
+    }
     return run;
   }
 

@@ -14,7 +14,8 @@ namespace upswing::machine {
 
 /// What the user knows of the machine, and limits.
 struct LearnConfig {
-  Limits limits;                // torque: that of the motor
+  // torque: that of the motor. angle: links that fall make some turns until they hang.
+  Limits limits{.angle = 25};
   double encoder_counts = 0;    // of a turn
   double hz = 500;              // cycles per second
   double hold = 10;             // time of balance that ends the learning, s

@@ -38,9 +38,12 @@ std::string CommandOf(const LearnArguments& a, const LearnResult& r) {
   const std::string twin = (std::filesystem::path(a.out) / "twin.toml").string();
   text += in_process ? fmt::format(" --link {}", twin)
                      : fmt::format(" --link {} --twin {}", a.link, twin);
-  return text + fmt::format(" --compensation {} --passive-torque {} --max-torque {} --hz {}",
-                            r.compensation, a.config.passive_torque, a.config.limits.torque,
-                            a.config.hz);
+  return text + fmt::format(
+                    " --compensation {} --passive-torque {} --max-torque {} "
+                    "--max-angle {} --max-velocity {} --max-energy {} --hz {}",
+                    r.compensation, a.config.passive_torque, a.config.limits.torque,
+                    a.config.limits.angle, a.config.limits.velocity, a.config.limits.energy,
+                    a.config.hz);
 }
 
 int RunLearn(const LearnArguments& a) {

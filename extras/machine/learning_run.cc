@@ -43,9 +43,14 @@ RunOutcome RunCycles(const LearnConfig& c, const RunRules& rules, const MachineS
   int64_t moving = 0;
   const auto run = [&] {
     if (!link.simulated()) EnterRealTime();
-    while (loop.Cycle()) {
-      const LoopState state = supervisor.state();
-      moving += state == LoopState::kRunning || state == LoopState::kBraking ? 1 : 0;
+    try {
+      while (loop.Cycle()) {
+        const LoopState state = supervisor.state();
+        moving += state == LoopState::kRunning || state == LoopState::kBraking ? 1 : 0;
+      }
+    } catch (...) {
+      loop.SwitchOff();
+      throw;
     }
     loop.SwitchOff();
   };

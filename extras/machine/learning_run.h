@@ -25,10 +25,9 @@ struct RunRules {
   std::string log = {};     // file; empty: none
 };
 
-/// What a run came to.
 struct RunOutcome {
   LoopSummary summary;
-  double motion = 0;   // time with torques, s
+  double motion = 0;   // time in which the controller drove or the loop braked, s
   std::string reason;  // of the supervisor; empty: no fault
 };
 
