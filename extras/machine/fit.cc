@@ -31,6 +31,9 @@ constexpr double kStartWeight = 0.05;
 constexpr double kSmallestScale = 1e-5, kLargestScale = 0.1;  // rad
 constexpr double kSmallestTorqueScale = 1e-3;                 // N·m
 constexpr double kFirstLag = 0.005;                           // s
+// Variance of a new session, as a multiple of the twin's: real machines change more from session to
+// session than the few that a twin knows.
+constexpr double kNewSession = 10;
 
 /// Number of constants: those of the motion without the start, zeros, current_delay and
 /// current_inertia.
@@ -269,40 +272,43 @@ class Problem {
   void SetPrior(const Twin& first) {
     prior_ = MatrixXd::Zero(size(), size());
     if (adapts_) {
-      MatrixXd covariance = MatrixXd::Zero(size(), size());
-      std::vector<int> known(size(), -1);  // rows of the first guess's covariance
-      const int n = static_cast<int>(first.uncertain.size());
-      for (int i = 0; i < size(); ++i) {
-        const auto found = std::ranges::find(first.uncertain, values_[i].name);
-        const int row = static_cast<int>(found - first.uncertain.begin());
-        if (row < n && first.covariance[row * n + row] > 0) known[i] = row;
-      }
-      for (int i = 0; i < size(); ++i) {
-        for (int j = 0; j < size(); ++j) {
-          if (known[i] < 0 || known[j] < 0) continue;
-          covariance(i, j) = first.covariance[known[i] * n + known[j]];
-        }
-        const double wide = DeviationsOf(values_[i].name).guess;
-        if (known[i] < 0) {
-          covariance(i, i) = std::pow(wide > 0 ? wide : std::abs(guess_(i)) / 2, 2);
-        }
-        covariance(i, i) *= 1 + 1e-6;
-      }
+      const MatrixXd covariance = NewSessionOf(first);
+      // Scaled to ones on the diagonal, because the units differ by orders of magnitude.
       const VectorXd scale = covariance.diagonal().cwiseSqrt().cwiseInverse();
-      prior_ = scale.asDiagonal() *
-               MatrixXd(scale.asDiagonal() * covariance * scale.asDiagonal()).inverse() *
-               scale.asDiagonal();
+      const MatrixXd correlation = scale.asDiagonal() * covariance * scale.asDiagonal();
+      prior_ = scale.asDiagonal() * correlation.inverse() * scale.asDiagonal();
       return;
     }
     for (int i = 0; i < size(); ++i) {
       const Value& v = values_[i];
       const bool is_time = v.name == "delay" || v.name == "lag" || v.name == "current_delay";
-      if (v.session >= 0) {
-        prior_(i, i) = std::pow(SessionDeviation(v.name), -2);
-      } else if (is_time) {
-        prior_(i, i) = std::pow(DeviationsOf(v.name).guess, -2);
-      }
+      if (v.session < 0 && !is_time) continue;
+      prior_(i, i) =
+          std::pow(v.session < 0 ? DeviationsOf(v.name).guess : SessionDeviation(v.name), -2);
     }
+  }
+
+  /// The covariance of θ in a new session: a multiple of the twin's, and a wide one of values that
+  /// it lacks.
+  MatrixXd NewSessionOf(const Twin& twin) const {
+    const int n = static_cast<int>(twin.uncertain.size());
+    std::vector<int> row_of;  // in the twin's covariance; -1: none
+    for (const Value& v : values_) {
+      const auto row =
+          static_cast<int>(std::ranges::find(twin.uncertain, v.name) - twin.uncertain.begin());
+      row_of.push_back(row < n && twin.covariance[row * n + row] > 0 ? row : -1);
+    }
+    MatrixXd covariance = MatrixXd::Zero(size(), size());
+    for (int i = 0; i < size(); ++i) {
+      for (int j = 0; j < size(); ++j) {
+        if (row_of[i] < 0 || row_of[j] < 0) continue;
+        covariance(i, j) = kNewSession * twin.covariance[row_of[i] * n + row_of[j]];
+      }
+      const double wide = DeviationsOf(values_[i].name).guess;
+      if (row_of[i] < 0) covariance(i, i) = std::pow(wide > 0 ? wide : guess_(i) / 2, 2);
+      covariance(i, i) *= 1 + 1e-6;
+    }
+    return covariance;
   }
 
   double SessionDeviation(const std::string& name) const {

@@ -161,6 +161,36 @@ TEST(Fit, FindsTheMachineBehindItsLogs) {
   EXPECT_GE(share, 0.9);
 }
 
+/// The machine of today has other zeros, friction and lag. A log of 5 s shows them.
+TEST(Fit, AdaptsATwinToANewSession) {
+  ThreadPool pool(2);
+  Rng rng(3, "machine");
+  const Twin machine = SomeMachine(rng);
+  Twin today = machine;
+  today.sensors.zero1 += 0.04;
+  today.sensors.zero2 -= 0.03;
+  today.plant.coulomb1 += 0.03;
+  today.actuator.lag += 0.001;
+  const auto logs = LogsOf(today, 1, 5, 40), later = LogsOf(today, 1, 5, 60);
+  Twin prior = machine;
+  prior.uncertain = {"zero1", "coulomb1"};
+  prior.covariance = {1e-3, 0, 0, 1e-3};
+  const Structure structure{"", kValues};
+  const auto error = [&](const Twin& twin) {
+    return Median(WindowErrors(later.front(), twin, 1, false));
+  };
+  for (const Twin& first : {prior, FirstGuess()}) {
+    FitConfig config = kWindowsInARow;
+    config.adapts = true;
+    const Twin found = Fit(logs, first, structure, config, &pool).twin;
+    EXPECT_LT(error(found), 0.2 * error(first));
+    EXPECT_NEAR(found.sensors.zero1, today.sensors.zero1, 0.005);
+    EXPECT_NEAR(found.plant.coulomb1, today.plant.coulomb1, 0.01);
+    EXPECT_EQ(found.covariance.size(), kValues.size() * kValues.size());
+    EXPECT_TRUE(found.sessions.empty());
+  }
+}
+
 /// Fits the zeros of sessions whose second zero is the opposite of the first (rad).
 std::vector<double> CovarianceOfZeros(const std::vector<double>& zeros) {
   std::vector<MachineLog> logs;

@@ -255,22 +255,46 @@ nlohmann::ordered_json IdentificationJson(const Identification& found, const std
           {"chosen", found.chosen}};
 }
 
-void CheckIdentifyArguments(const MachineArguments& a) {
-  if (a.plant.empty()) {
-    throw BadInput("machine identify: expected --plant FILE with masses and lengths, got none");
-  }
-  if (a.out.empty()) throw BadInput("machine identify: expected --out FILE, got none");
-  if (a.folds == 1) throw BadInput("--folds: expected 0, or 2 or more, got 1");
-  CheckWritable("--out", a.out);
+/// Warns of a twin that predicts worse than the values that the fit began with, or is no machine.
+void WarnOfTwin(const Twin& twin, std::span<const ErrorRow> rows) {
+  const Plant& plant = twin.plant;
+  const auto warn = [](const char* name, double center, double length) {
+    if (center <= length) return;
+    SayError(
+        fmt::format("warning: {} is {:.3f} m, beyond its link of {:.3f} m; machine check finds "
+                    "wrong signs and units",
+                    name, center, length));
+  };
+  warn("center1", plant.center1, plant.length1);
+  warn("center2", plant.center2, plant.length2);
+  // The row of all runs and the longest predictions comes last.
+  const ErrorRow* last = nullptr;
+  for (const ErrorRow& row : rows) last = row.reported ? last : &row;
+  if (last == nullptr || last->errors[0].value <= last->errors[1].value) return;
+  SayError(
+      fmt::format("warning: predictions over {} s are worse than those of the start, {:.3f} "
+                  "against {:.3f} rad",
+                  FormatNumber(last->seconds), last->errors[0].value, last->errors[1].value));
 }
 
+/// Fits a twin to logs: from --plant, or with a prior twin as its adaptation.
 int RunIdentify(const MachineArguments& a) {
-  CheckIdentifyArguments(a);
-  const Twin first = ReadTwin(a.plant, "--plant");
+  const bool adapts = a.plant.empty() && !a.twin.empty();
+  const char* command = adapts ? "adapt" : "identify";
+  if (!adapts && a.plant.empty()) {
+    throw BadInput("machine identify: expected --plant FILE with masses and lengths, got none");
+  }
+  if (a.out.empty()) {
+    throw BadInput(fmt::format("machine {}: expected --out FILE, got none", command));
+  }
+  if (a.folds == 1) throw BadInput("--folds: expected 0, or 2 or more, got 1");
+  CheckWritable("--out", a.out);
+  const Twin first = adapts ? ReadTwin(a.twin, "machine adapt") : ReadTwin(a.plant, "--plant");
   const std::vector<Twin> others = ReadOthers(a);
   const std::vector<MachineLog> logs = ReadCheckedLogs(a.logs, a.columns, SayError);
   IdentifyConfig config;
-  config.folds = static_cast<int>(a.folds);
+  config.folds = adapts ? 0 : static_cast<int>(a.folds);
+  config.fit.adapts = adapts;
   config.fit.windows.seconds = a.seconds;
   config.fit.windows.hop = a.seconds / 2;
   ThreadPool pool(ResolveThreads(a.threads));
@@ -286,9 +310,10 @@ int RunIdentify(const MachineArguments& a) {
   std::vector<Predictor> predictors{found.left_out.empty()
                                         ? PredictorOf("same runs", twin, logs)
                                         : Predictor{"left-out runs", found.left_out}};
-  if (a.against.empty()) predictors.push_back(PredictorOf(first.name, first, logs));
+  predictors.push_back(PredictorOf(first.name, first, logs));
   AddOthers(others, a, logs, predictors);
   const auto rows = CompareErrors(logs, predictors, kHorizons, &pool);
+  WarnOfTwin(twin, rows);
   if (!a.figure.empty()) DrawErrors(logs, predictors, a.figure, &pool);
   if (a.as_json) {
     nlohmann::ordered_json json = IdentificationJson(found, a.out);
@@ -375,6 +400,22 @@ void AddIdentify(CommandLine& line) {
       "    --folds 0\n");
 }
 
+void AddAdapt(CommandLine& line) {
+  MachineArguments& a = line.Runs(RunIdentify);
+  line.Text("twin", a.twin, "TWIN", "twin of the machine on other days, or a plant file");
+  line.Require("twin");
+  AddLogs(line, a, "figure of the prediction errors to draw, .svg or .png");
+  line.Text("--out", a.out, "FILE", "TOML file of today's twin to write");
+  AddPredictions(line, a);
+  line.Footer(
+      "Fits the twin of today to 10 to 30 s of today's logs. The covariance of TWIN says how\n"
+      "much each value may change. A plant file has none: all values may change widely.\n\n"
+      "Examples:\n"
+      "  ./upswing machine adapt twin.toml first.csv --out today.toml\n"
+      "  ./upswing machine adapt realaigym-c1 run1.csv run2.csv --out today.toml\n"
+      "  ./upswing machine validate today.toml later.csv --against twin.toml\n");
+}
+
 void AddValidate(CommandLine& line) {
   MachineArguments& a = line.Runs(RunValidate);
   line.Text("twin", a.twin, "TWIN", "twin or plant file");
@@ -395,11 +436,13 @@ void AddMachine(CommandLine& line) {
   AddCheck(line.Subcommand("check", "Look for faults in logs"));
   AddIdentify(line.Subcommand("identify", "Fit a twin, a model of the machine, to logs"));
   AddLearn(line.Subcommand("learn", "Learn to balance a machine about which nothing is known"));
+  AddAdapt(line.Subcommand("adapt", "Fit a twin to today's first logs"));
   AddValidate(line.Subcommand("validate", "Compare a twin's predictions with logs"));
   line.Footer(
       "Examples:\n"
       "  ./upswing machine check logs/*.csv.gz\n"
       "  ./upswing machine identify logs/*.csv --plant realaigym-c1 --out twin.toml\n"
+      "  ./upswing machine adapt twin.toml today.csv --out today.toml\n"
       "  ./upswing machine validate twin.toml new/*.csv --against realaigym-c1\n"
       "  ./upswing machine identify --help     show all options of identify\n");
 }

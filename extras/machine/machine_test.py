@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Tests of `upswing machine`: check, identify and validate."""
+"""Tests of `upswing machine`: check, identify, adapt and validate."""
 
 import gzip
 import json
@@ -165,7 +165,7 @@ class Machine(ProgramTest):
         refuse(["machine", "check", "none.csv"], "none.csv", "No such file")
         refuse(["machine", "check", "."], "folder")
         refuse(["machine", "check"], "machine check: expected LOG", "got none")
-        refuse(["machine", "polish", good], "one of check, identify, validate", '"polish"')
+        refuse(["machine", "polish", good], "one of check, identify, adapt, validate", '"polish"')
         refuse(["machine"], "machine: expected a command", "got none")
         refuse(["machine", "check", good, good, "--figure", "log.svg"], "--figure", "got 2")
         refuse(["machine", "check", good, "--figure", "log.txt"], "log.txt")
@@ -188,6 +188,8 @@ class Machine(ProgramTest):
                   "--against", "plant.toml"], "--against", "more than once"),
                 (identify, "expected --out FILE"),
                 (["machine", "identify", good, *out], "expected --plant FILE"),
+                (["machine", "adapt", "plant.toml", good], "machine adapt: expected --out FILE"),
+                (["machine", "adapt", "plant.toml", good, *out, "--folds", "2"], "flag --folds"),
                 ([*identify, "--out", "no/twin.toml"], "--out no/twin.toml"),
                 ([*identify, *out, "--folds", "1"], "--folds: expected 0, or 2 or more, got 1"),
                 ([*identify, *out], "--folds: expected two logs or more", "got 1")):
@@ -207,6 +209,16 @@ class Machine(ProgramTest):
             self.assertEqual((done.returncode, done.stdout), (2, ""))
             self.assertIn("upswing: identify: expected logs", done.stderr.splitlines()[-1])
         self.assertFalse((self.folder / "twin.toml").exists())
+
+    def test_a_twin_that_is_no_machine_warns(self):
+        self.write("plant.toml", "[plant]\nmass1 = 0.5\ncenter1 = 3\nlength1 = 1\n")
+        self.write("log.csv", log())
+        done = self.run_here("machine", "adapt", "plant.toml", "log.csv", "--out", "today.toml")
+        self.assertEqual(done.returncode, 0)
+        self.assertIn("\nwritten today.toml\n", done.stdout)
+        self.assertRegex(done.stderr, "upswing: warning: center1 is .* beyond its link of 1.000 m; ")
+        again = self.run_here("machine", "adapt", "today.toml", "log.csv", "--out", "again.toml")
+        self.assertEqual(again.returncode, 0, again.stderr)
 
     def test_a_log_with_faults_warns(self):
         self.write("plant.toml", "[plant]\nmass1 = 0.5\n")

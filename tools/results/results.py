@@ -32,6 +32,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import tomllib
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
@@ -393,6 +394,64 @@ def format_number(value, digits):
         return "0"
     decimals = max(0, digits - 1 - int(f"{abs(value):e}".split("e")[1]))
     return f"{value:,.{decimals}f}" if decimals else f"{round(value):,}"
+
+
+REAL = Path(os.environ.get("UPSWING_REAL", ROOT.parent / "shared/real")) / "C.1"
+LAWS = {"tvlqr": "TVLQR", "mcpilco": "MC-PILCO"}
+REAL_SESSIONS = {f"{robot}, {LAWS[law]}{', pushed' if folder == 'pushed' else ''}":
+                 f"{folder}/{robot}-{law}"
+                 for folder, robot, law in (
+                     ("swingup", "acrobot", "tvlqr"), ("swingup", "pendubot", "tvlqr"),
+                     ("swingup", "acrobot", "mcpilco"), ("swingup", "pendubot", "mcpilco"),
+                     ("pushed", "acrobot", "tvlqr"), ("pushed", "pendubot", "tvlqr"))}
+
+
+def runs_of(session, numbers):
+    return [REAL / f"{session}-{k:02}.csv.gz" for k in numbers]
+
+
+def with_session_values(plant, twin, out):
+    """Writes a plant with the zeros, dry friction, delay and lag of a twin."""
+    merged, taken = (tomllib.loads(path.read_text(encoding="utf-8")) for path in (plant, twin))
+    for table, names in (("plant", ("coulomb1", "coulomb2")), ("actuator", ("delay", "lag")),
+                         ("sensors", ("zero1", "zero2"))):
+        merged[table] |= {name: taken[table][name] for name in names}
+    text = f'name = "{out.stem}"\n'
+    for table in ("plant", "actuator", "sensors"):
+        text += f"[{table}]\n" + "".join(f"{name} = {x!r}\n" for name, x in merged[table].items())
+    out.write_text(text, encoding="utf-8")
+
+
+@recipe("machine-sessions")
+def machine_sessions(lab):
+    """Errors of models on runs 02 to 05 of a real session. No model saw these runs."""
+    rows = []
+    for name, session in list(REAL_SESSIONS.items())[-1 if lab.few else 0:]:
+        others = [run for other in REAL_SESSIONS.values() if other != session
+                  for run in runs_of(other, range(1, 6))]
+        others += sorted((REAL / "sysid").glob("*.csv.gz"))
+        twins = {kind: lab.folder / f"{kind}-{session.replace('/', '-')}.toml"
+                 for kind in ("others", "today", "c1-today", "c1-session")}
+        record = not rows  # the commands of the first session are enough
+        if not twins["others"].exists():
+            lab.run("machine", "identify", *others, "--plant", "realaigym-c1", "--folds", 0, "--out",
+                    twins["others"], record=record)
+        for prior, kind in ((twins["others"], "today"), ("realaigym-c1", "c1-today")):
+            lab.run("machine", "adapt", prior, *runs_of(session, [1]), "--out", twins[kind],
+                    record=record)
+        with_session_values(ROOT / "configs/plants/realaigym-c1.toml", twins["today"],
+                            twins["c1-session"])
+        against = [word for kind in ("today", "c1-today", "c1-session")
+                   for word in ("--against", twins[kind])]
+        report = lab.json("machine", "validate", twins["others"], *runs_of(session, range(2, 6)),
+                          *against, "--against", "realaigym-c1", record=record)
+        row = next(row for row in report["errors"]
+                   if (row["seconds"], row["torques"]) == (1, "commanded"))
+        rows.append([name, str(row["windows"]),
+                     *(f"{error['value']:.3f}" for error in row["median_error_rad"].values())])
+    return ["session", "windows", "twin of the other sessions [rad]", "adapted to run 01",
+            "C.1 model 1.0, adapted to run 01", "C.1 model 1.0 with session values",
+            "C.1 model 1.0"], rows
 
 
 def this_machine():
