@@ -83,8 +83,8 @@ struct Shot {
   int session;        // index
 };
 
-/// The residuals of one kind in a window: the mean of their squares over the rows, and its
-/// derivatives by start state and constants.
+/// The mean of a window's squared residuals over its rows, angles or torques, and its derivatives
+/// by start state and constants.
 struct Squares {
   double mean = 0;                                                     // rad² or (N·m)²
   Eigen::Matrix<double, 4 + kConstants, 4 + kConstants> H = H.Zero();  // half of the second one
@@ -96,13 +96,13 @@ struct Share {
   Squares angle, torque;
 };
 
-/// A window's part of the normal equations, without its start state: g += g + change, and so on.
+/// A window's part of the normal equations of the constants, without its start state.
 struct Reduced {
   ConstantsMatrix H;
   Constants g;
 };
 
-/// A window's part of the normal equations, weighted.
+/// A window's part of the normal equations: start state x and constants c.
 struct Block {
   Matrix4d Hxx;
   Vector4d gx;
@@ -266,9 +266,8 @@ class Problem {
     theta_ = guess_ = Eigen::Map<VectorXd>(theta.data(), size());
   }
 
-  /// Sets the prior. An identification has one of the sessions' deviations, and of the times:
-  /// motors take milliseconds, and without reported torques much larger delays can imitate
-  /// friction.
+  /// Sets the prior. In an identification, sessions' deviations and times have one: motors take
+  /// milliseconds, and without reported torques much larger delays can imitate friction.
   void SetPrior(const Twin& first) {
     prior_ = MatrixXd::Zero(size(), size());
     if (adapts_) {
@@ -288,8 +287,8 @@ class Problem {
     }
   }
 
-  /// The covariance of θ in a new session: a multiple of the twin's, and a wide one of values that
-  /// it lacks.
+  /// The covariance of θ in a new session: a multiple of the twin's covariance, wide for values
+  /// without one.
   MatrixXd NewSessionOf(const Twin& twin) const {
     const int n = static_cast<int>(twin.uncertain.size());
     std::vector<int> row_of;  // in the twin's covariance; -1: none
