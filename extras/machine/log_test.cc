@@ -146,11 +146,15 @@ TEST(MachineLog, AColumnIsThereOnceAndStandsForOneQuantity) {
 TEST(MachineLog, BadFilesGetOneLineWithThePlace) {
   const std::string head = "time,pos1,pos2\n0,1,2\n";
   EXPECT_EQ(ComplaintAbout(head + "1,nan,2\n"),
-            "log.csv:3: pos1: expected a finite number, got \"nan\"");
-  EXPECT_EQ(ComplaintAbout(head + "1,2,\n"), "log.csv:3: pos2: expected a finite number, got \"\"");
+            "log.csv:3: pos1: expected a finite number, got \"nan\": a missing value; remove or "
+            "fill its row");
+  EXPECT_EQ(ComplaintAbout(head + "1,2,\n"),
+            "log.csv:3: pos2: expected a finite number, got \"\": a missing value; remove or fill "
+            "its row");
   EXPECT_EQ(ComplaintAbout(head + "1,2\n"), "log.csv:3: expected 3 columns, got 2");
   EXPECT_EQ(ComplaintAbout(head + "1,2,3\n0.5,2,3\n"),
-            "log.csv: row 3: time: expected at least 1 s as in the row before, got 0.5 s");
+            "log.csv: row 3: time: expected at least 1 s as in the row before, got 0.5 s; split "
+            "logs that follow each other, or name a column by piece");
   EXPECT_EQ(ComplaintAbout("time,pos1\n0,1\n1,1\n"),
             "log.csv:1: expected a column \"pos2\", got \"time,pos1\"");
   EXPECT_EQ(
