@@ -119,7 +119,7 @@ class Machine(ProgramTest):
 
         text = log(own, ["part", "t", "a", "b"])
         self.assertEqual(self.faults(text, "--columns", "columns.toml"), {})
-        shown = self.succeed("machine", "check", "log.csv", "--columns", "columns.toml")
+        shown = self.run_here("machine", "check", "log.csv", "--columns", "columns.toml").stdout
         self.assertIn("log.csv: 2000 rows, 4.00 s in 2 pieces\n", shown)
         # The same file with other columns, and the columns of RealAIGym.
         self.refuse(["machine", "check", "log.csv"], "log.csv", "--columns", "pos_meas1")
@@ -292,7 +292,7 @@ class Machine(ProgramTest):
             self.assertIn("joint 1: expected commanded torques", done.stderr)
             self.assertIn("got none", done.stderr)
         none = self.write("none.csv", log(names=[*NAMES[:5], "x", "y", "z", "u", *NAMES[9:]]))
-        rows = json.loads(self.succeed("machine", "validate", "plant.toml", none, "--json"))
+        rows = json.loads(self.run_here("machine", "validate", "plant.toml", none, "--json").stdout)
         self.assertEqual({row["torques"] for row in rows["errors"]}, {"no"})
         rows = json.loads(self.succeed("machine", "validate", "plant.toml", measured, "--json"))
         self.assertEqual({row["torques"] for row in rows["errors"]}, {"reported"})
