@@ -291,16 +291,20 @@ class Machine(ProgramTest):
             self.assertEqual(done.returncode, 2)
             self.assertIn("joint 1: expected commanded torques", done.stderr)
             self.assertIn("got none", done.stderr)
+        def errors(file):
+            done = self.run_here("machine", "validate", "plant.toml", file, "--json")
+            return json.loads(done.stdout)["errors"]
+
         none = self.write("none.csv", log(names=[*NAMES[:5], "x", "y", "z", "u", *NAMES[9:]]))
-        rows = json.loads(self.run_here("machine", "validate", "plant.toml", none, "--json").stdout)
-        self.assertEqual({row["torques"] for row in rows["errors"]}, {"no"})
-        rows = json.loads(self.succeed("machine", "validate", "plant.toml", measured, "--json"))
-        self.assertEqual({row["torques"] for row in rows["errors"]}, {"reported"})
+        rows = errors(none)
+        self.assertEqual({row["torques"] for row in rows}, {"no"})
+        rows = errors(measured)
+        self.assertEqual({row["torques"] for row in rows}, {"reported"})
         self.refuse(["realaigym", "hardware", measured], "expected commanded torques")
         # Without the torques that move the machine, there is no prediction.
         only_one = self.write("one.csv", log(scaled(tau_meas2=0)))
-        rows = json.loads(self.succeed("machine", "validate", "plant.toml", only_one, "--json"))
-        self.assertEqual({row["torques"] for row in rows["errors"]}, {"commanded"})
+        rows = errors(only_one)
+        self.assertEqual({row["torques"] for row in rows}, {"commanded"})
         self.assertEqual(self.faults(log(scaled(tau_con1=0))),
                          {"torque 1": "measured torque of 0.9 N·m (rms) without a command"})
 
