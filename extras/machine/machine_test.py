@@ -300,7 +300,9 @@ class Machine(ProgramTest):
         self.assertEqual({row["torques"] for row in rows}, {"no"})
         rows = errors(measured)
         self.assertEqual({row["torques"] for row in rows}, {"reported"})
-        self.refuse(["realaigym", "hardware", measured], "expected commanded torques")
+        done = self.run_here("realaigym", "hardware", measured)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("expected commanded torques", done.stderr)
         # Without the torques that move the machine, there is no prediction.
         only_one = self.write("one.csv", log(scaled(tau_meas2=0)))
         rows = errors(only_one)
