@@ -45,7 +45,6 @@ class Dqn : public OffPolicyAgent {
   std::span<const float> online() const { return online_.theta(); }
   std::span<const float> target() const { return theta_target_; }
   double epsilon() const;  // ε, probability of a random action
-
   std::optional<UpdateExample> LastUpdate() const override;
   Metrics TakeMetrics() override;
   std::unique_ptr<NetworkPolicy> ExportPolicy(PolicyInfo info) const override;

@@ -519,7 +519,7 @@ test('a race waits for a bet, trains both sides and can be shared', async ({ sta
   await two.click();
   await expect(two).toHaveAttribute('aria-pressed', 'true');
   await expect(page.locator('#race-result')).toHaveText('0 of 6 trainings have ended.');
-  expect(page.workers().length).toBe(6);
+  await expect.poll(() => page.workers().length).toBe(6);
   await expect(page.getByRole('radio', { name: 'DQN, seed 9' })).toBeVisible();
   await expect(page).toHaveURL(/#learn=fast&seed=7&balance_weight=4&rival=dqn$/);
   await expect(page.locator('.of-race')).toBeVisible();
