@@ -120,9 +120,12 @@ std::string HeadComment(const CParts& parts, const CHeader& header) {
       name, "_init.\n *\n",
       Paragraph(Concat("Flash: ", header.constant_bytes,
                        " bytes of constants, 1 to 3 KB of code, and up to 1 KB of samples where "
-                       "the self test is used. RAM: ",
-                       header.state_bytes, " bytes of state, and arrays of ", header.stack_bytes,
-                       " bytes on the stack in a call. Work of a call: ", parts.work)),
+                       "the self test is used; on AVR constants and samples lie in RAM, too. RAM: ",
+                       header.state_bytes, " bytes of state. Stack of a call: arrays of ",
+                       header.stack_bytes,
+                       " bytes, and up to 170 bytes of frames besides those of "
+                       "the math library. Work of a call: ",
+                       parts.work)),
       "\n *\n * All arithmetic is in float. Nothing is allocated, and nothing is static but "
       "constants. */\n");
   return foreign ? Replaced(comment, "torque", "action") : comment;

@@ -75,8 +75,9 @@ int ExportC(const ExportArguments& a) {
   fmt::print("{} ({} KB), names begin with {}_\n", Printable(a.c), header.text.size() / 1024,
              header.prefix);
   fmt::print("  flash       {} bytes of constants\n", FormatCount(header.constant_bytes));
-  fmt::print("  RAM         {} bytes of state, {} bytes of stack in a call\n",
-             FormatCount(header.state_bytes), FormatCount(header.stack_bytes));
+  fmt::print(
+      "  RAM         {} bytes of state; stack of a call: {} bytes of arrays, and up to 170 more\n",
+      FormatCount(header.state_bytes), FormatCount(header.stack_bytes));
   const std::string period = FormatNumber(*loaded.policy->info().control_period);
   if (header.multiply_adds > 0) {
     fmt::print("  work        {} multiply-adds per call, every {} s\n",
