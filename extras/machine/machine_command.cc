@@ -191,6 +191,15 @@ int RunValidate(const MachineArguments& a) {
     throw BadInput(
         "machine validate: expected logs with a motion of 0.2 s away from upright, got none");
   }
+  for (const MachineLog& log : logs) {
+    const auto errors = [&](bool reported) {
+      return WindowErrors(log, twin, kHorizons.front(), reported);
+    };
+    if (errors(false).empty() && errors(true).empty()) {
+      SayError(Concat("warning: ", Printable(log.name), ": no motion of ", kHorizons.front(),
+                      " s away from upright: left out"));
+    }
+  }
   if (!a.figure.empty()) DrawErrors(logs, predictors, a.figure, &pool);
   if (!a.csv.empty()) WriteNamedFile(a.csv, MotionCsv(logs, predictors));
   if (a.as_json) {

@@ -184,16 +184,17 @@ std::vector<ErrorRow> CompareErrors(std::span<const MachineLog> logs,
   for (const bool reported : {false, true}) {
     for (const double length : seconds) {
       const std::vector<RunErrors> errors = ErrorsOf(logs, predictors, length, reported, pool);
+      // Runs without windows have no error.
+      const auto windows_of = [&](double run) {
+        return static_cast<int>(errors.front()[static_cast<size_t>(run)].size());
+      };
       const auto add = [&](const std::string& session, const Strata& strata) {
+        if (strata.empty()) return;
         ErrorRow row{session, length, reported, 0, 0, {}, {}};
         for (const auto& runs : strata) {
-          for (const double run : runs) {
-            const int n = static_cast<int>(errors.front()[static_cast<size_t>(run)].size());
-            row.runs += n > 0 ? 1 : 0;
-            row.windows += n;
-          }
+          row.runs += static_cast<int>(runs.size());
+          for (const double run : runs) row.windows += windows_of(run);
         }
-        if (row.windows == 0) return;
         for (const RunErrors& own : errors) {
           row.errors.push_back(
               OverRuns(strata, [&](const auto& chosen) { return MedianOf(own, chosen); }));
@@ -204,11 +205,13 @@ std::vector<ErrorRow> CompareErrors(std::span<const MachineLog> logs,
         rows.push_back(row);
       };
       Strata all;
-      for (const auto& [session, runs] : sessions) {
+      for (auto [session, runs] : sessions) {
+        std::erase_if(runs, [&](double run) { return windows_of(run) == 0; });
+        if (runs.empty()) continue;
         add(session, {runs});
         all.push_back(runs);
       }
-      if (sessions.size() > 1) add("", all);
+      if (all.size() > 1) add("", all);
     }
   }
   return rows;
