@@ -15,6 +15,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
+#include <filesystem>
 #include <memory>
 #include <utility>
 
@@ -132,6 +133,12 @@ LinkAddress ParseLink(const std::string& text, bool listens) {
                           "old commands"));
   }
   if (text.starts_with("/dev/")) return ParseSerial(text, text);
+  // A plant file has no colon, unless a folder has one.
+  const size_t colon = text.rfind(':');
+  if (colon != std::string::npos && !std::filesystem::exists(text)) {
+    throw BadInput(Concat("--link: expected udp:HOST:PORT, serial:DEVICE or a plant file, got \"",
+                          Printable(text), "\""));
+  }
   return {Kind::kTwin, text, 0};
 }
 

@@ -587,9 +587,10 @@ FitResult Fit(std::span<const MachineLog> logs, const Twin& first, const Structu
               const FitConfig& config, ThreadPool* pool, const Progress& progress) {
   Problem problem(logs, first, structure, config, pool);
   if (problem.windows() == 0) {
-    throw BadInput(Concat("identify: expected logs with a motion of ", config.windows.seconds,
+    throw BadInput(Concat("expected logs with a motion of ", config.windows.seconds,
                           " s away from upright, got none in ",
-                          Counted(static_cast<int64_t>(logs.size()), "log")));
+                          Counted(static_cast<int64_t>(logs.size()), "log"),
+                          "; machine check finds units and rests"));
   }
   for (int i = 0; i < config.iterations; ++i) {
     const bool goes_on = problem.Step(config.tolerance);
@@ -601,7 +602,7 @@ FitResult Fit(std::span<const MachineLog> logs, const Twin& first, const Structu
   const bool is_finite =
       std::ranges::all_of(result.twin.covariance, [](double x) { return std::isfinite(x); });
   if (!(result.error < kHopeless) || !is_finite) {
-    throw BadInput(Concat("identify: expected logs that a model can follow, got a median error of ",
+    throw BadInput(Concat("expected logs that a model can follow, got a median error of ",
                           result.error, " rad; machine check finds faults of logs"));
   }
   return result;

@@ -208,7 +208,7 @@ class Machine(ProgramTest):
             done = self.run_here(*identify[:2], self.write(name, log(row)), *identify[3:], *out,
                                  "--folds", "0")
             self.assertEqual((done.returncode, done.stdout), (2, ""))
-            self.assertIn("upswing: identify: expected logs", done.stderr.splitlines()[-1])
+            self.assertIn("upswing: expected logs", done.stderr.splitlines()[-1])
         self.assertFalse((self.folder / "twin.toml").exists())
 
     def test_a_twin_that_is_no_machine_warns(self):
@@ -309,6 +309,20 @@ class Machine(ProgramTest):
         self.assertEqual({row["torques"] for row in rows}, {"commanded"})
         self.assertEqual(self.faults(log(scaled(tau_con1=0))),
                          {"torque 1": "measured torque of 0.9 N·m (rms) without a command"})
+
+    def test_no_output_replaces_an_input_or_another_output(self):
+        text = log()
+        self.write("a.csv", text)
+        (self.folder / "link.csv").symlink_to("a.csv")
+        adapt = ["machine", "adapt", "realaigym-twin", "a.csv"]
+        for more in (["--out", "a.csv"], ["--out", "./a.csv"], ["--out=link.csv"],
+                     ["--out", "twin.toml", "--figure", "a.csv"]):
+            self.refuse([*adapt, *more], "expected another file than the argument a.csv")
+        self.refuse([*adapt, "--out", "new.svg", "--figure=new.svg"],
+                    "expected another file than --figure new.svg")
+        self.refuse(["export", "a.csv", "--onnx", "a.csv"], "expected another file")
+        self.assertEqual((self.folder / "a.csv").read_text(encoding="utf-8"), text)
+        self.assertFalse((self.folder / "new.svg").exists())
 
     def test_models_with_equal_names(self):
         self.write("log.csv", log())

@@ -37,9 +37,9 @@ void ExpectSame(const MachineLog& log, const HardwareReport& report, std::option
   const auto kind = [](Robot of, bool with_pushes) {
     return Concat("the ", NameOf(of), with_pushes ? " with pushes" : " without pushes");
   };
-  throw BadInput(Concat("--hardware: expected runs of ", kind(report.robot, report.pushed), " as ",
-                        report.runs.front().name, ", got ", kind(RobotIn(log), pushed), " in ",
-                        log.name));
+  throw BadInput(Concat("realaigym hardware: expected runs of ", kind(report.robot, report.pushed),
+                        " as ", report.runs.front().name, ", got ", kind(RobotIn(log), pushed),
+                        " in ", log.name));
 }
 
 }  // namespace

@@ -411,6 +411,51 @@ std::string_view CalledCommand(int argc, const char* const* argv) {
   return called == words.end() ? std::string_view() : *called;
 }
 
+namespace {
+
+/// Throws BadInput if a file to write is another file of the command line, to read or to write.
+void ExpectOtherOutputs(std::span<const char* const> words) {
+  namespace fs = std::filesystem;
+  constexpr std::array kOutputs{"--out", "--csv",    "--figure",       "--onnx",
+                                "--c",   "--record", "--episodes-csv", "--log"};
+  struct Named {
+    std::string flag, path;
+    bool is_output;
+  };
+  std::vector<Named> files;
+  for (size_t i = 1; i < words.size(); ++i) {
+    const std::string_view word = words[i];
+    const size_t equals = word.starts_with("--") ? word.find('=') : word.npos;
+    const bool joined = equals != word.npos;
+    const std::string flag(joined ? word.substr(0, equals)
+                           : std::string_view(words[i - 1]).starts_with("--") ? words[i - 1]
+                                                                              : "");
+    if (!joined && word.starts_with("--")) continue;
+    files.push_back({flag, std::string(joined ? word.substr(equals + 1) : word),
+                     std::ranges::find(kOutputs, flag) != kOutputs.end()});
+  }
+  const auto same = [](const Named& output, const Named& other) {
+    std::error_code error;
+    if (fs::is_regular_file(output.path, error)) {
+      return fs::equivalent(output.path, other.path, error);
+    }
+    // Other words are names, such as that of an agent.
+    return other.is_output && !fs::exists(output.path, error) &&
+           fs::weakly_canonical(output.path, error) == fs::weakly_canonical(other.path, error);
+  };
+  for (size_t i = 0; i < files.size(); ++i) {
+    if (!files[i].is_output || files[i].path.empty() || files[i].path == "-") continue;
+    for (size_t k = 0; k < files.size(); ++k) {
+      if (k == i || !same(files[i], files[k])) continue;
+      throw BadInput(Concat(files[i].flag, ": expected another file than ",
+                            files[k].flag.empty() ? "the argument" : files[k].flag, " ",
+                            Printable(files[k].path), ", which would be lost"));
+    }
+  }
+}
+
+}  // namespace
+
 int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> table,
                std::span<const Command> own, const std::string& footer) {
   CLI::App program(
@@ -442,6 +487,7 @@ int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> 
     ShortenHelp(program);
   }
   try {
+    ExpectOtherOutputs(std::span(argv, static_cast<size_t>(argc)));
     program.parse(argc, argv);
   } catch (const CLI::Success& request) {  // --help and --version
     if (const std::string unknown = ExplainUnknown(program); !unknown.empty()) {
