@@ -7,6 +7,7 @@
 #include <ctime>
 #include <memory>
 #include <numbers>
+#include <ranges>
 #include <utility>
 #include <vector>
 
@@ -59,6 +60,7 @@ class Learner {
     try {
       const Twin known = twin_;
       Excite(kSmallMotion, /*has_twin=*/false);
+      ExpectMotion();
       Fit(kSmallMotion.window);
       // A link that hardly moved shows no twin that is good enough to estimate the state.
       const bool has_twin = Larger(twin_.sensors.zero1, twin_.sensors.zero2) < kLargestZero;
@@ -84,6 +86,21 @@ class Learner {
     if (stop_()) throw Ended{"stopped"};
     if (result_.motion >= c_.motion) throw Ended{"the time of motion is used up"};
     if (result_.computing >= c_.computing) throw Ended{"the time of computing is used up"};
+  }
+
+  /// Ends the session unless the first excitation moved a link.
+  void ExpectMotion() const {
+    constexpr double kLeast = 0.05;  // rad
+    double range = 0;
+    for (const int j : {0, 1}) {
+      const auto angle = [j](const Joints& q) { return q[j]; };
+      const auto [low, high] =
+          std::ranges::minmax(logs_.back().angle | std::views::transform(angle));
+      range = std::max(range, high - low);
+    }
+    if (range > kLeast) return;
+    throw Ended{fmt::format("the links moved by {:.3f} rad only: raise --max-torque ({:g} N·m)",
+                            range, c_.limits.torque)};
   }
 
   /// Runs work that computes, and counts its processor time.
@@ -127,7 +144,8 @@ class Learner {
         RunCycles(c_, rules, twin_.sensors, estimator, std::move(controller), link_, stop_);
     if (run.motion == 0) {
       if (stop_()) throw Ended{"stopped"};
-      throw Failure(run.reason);
+      if (logs_.empty()) throw Failure(run.reason);
+      throw Ended{run.reason};
     }
     result_.motion += run.motion;
     logs_.push_back(ReadLog(rules.log).front());
@@ -206,6 +224,7 @@ class Learner {
   /// Designs a controller and tries it. Returns whether the machine balanced.
   bool Try() {
     const auto policy = Choose();
+    ExpectBudget();
     say_(fmt::format("try {}: {}", ++result_.tries, policy->name));
     const RunOutcome run =
         Run(TryRules(result_.compensation), Estimator(twin_, 1 / c_.hz), ControllerOf(policy));
@@ -255,12 +274,13 @@ class Learner {
   /// Number of machines, of kDraws of the posterior, that a controller balances.
   int HeldBy(const std::shared_ptr<const LoadedPolicy>& policy, double compensation) const {
     int held = 0;
-    for (int i = 0; i < kDraws && !stop_(); ++i) {
+    for (int i = 0; i < kDraws; ++i) {
       Rng rng(c_.seed, "machine: draws", static_cast<uint64_t>(i));
       TwinLink link(DrawTwin(twin_, rng), {}, c_.seed);
       const RunOutcome run =
           RunCycles(c_, TryRules(compensation), twin_.sensors, Estimator(twin_, 1 / c_.hz),
                     ControllerOf(policy), link, stop_);
+      if (stop_()) throw Ended{"stopped"};
       held += run.summary.upright >= c_.hold ? 1 : 0;
     }
     return held;

@@ -68,15 +68,25 @@ int RunLearn(const LearnArguments& a) {
     fmt::print(stderr, "{}\n", Printable(line));
     report += line + "\n";
   };
-  const LearnResult r =
-      Learn(config, *g_learned, a.out, &pool, say, [] { return StopSignal() != 0; });
+  LearnResult r;
+  try {
+    r = Learn(config, *g_learned, a.out, &pool, say, [] { return StopSignal() != 0; });
+  } catch (const Error&) {  // there was no run, so that the command can be repeated
+    std::error_code error;
+    std::filesystem::remove(std::filesystem::path(a.out) / "log-01.csv", error);
+    std::filesystem::remove(a.out, error);
+    throw;
+  }
   const std::string used = fmt::format("{:.1f} s of motion, {:.1f} s of computing, {}", r.motion,
                                        r.computing, Counted(r.tries, "attempt"));
   report += r.reason.empty() ? "balanced: " : fmt::format("not balanced, {}: ", r.reason);
   report += used + "\n";
-  if (!r.controller.name.empty()) report += CommandOf(a, r) + "\n";
+  if (r.tries > 0) report += CommandOf(a, r) + "\n";
   WriteNamedFile(std::filesystem::path(a.out) / "report.txt", report);
-  if (StopSignal() != 0) return 128 + StopSignal();
+  if (StopSignal() != 0) {
+    fmt::print(stderr, "stopped: {}; written {}\n", used, Printable(a.out));
+    return 128 + StopSignal();
+  }
   if (!r.reason.empty()) throw Failure(fmt::format("not balanced: {} ({})", r.reason, used));
   fmt::print("balanced for {:.1f} s: {}\n{}\nwritten {}\n", r.balanced, used, CommandOf(a, r),
              Printable(a.out));
@@ -104,7 +114,7 @@ void AddLearn(CommandLine& line) {
       "identifies the twin again. You need to know --max-torque, --encoder-counts and the signs\n"
       "of angles and torques (docs/howto/real-machine.md). Beyond a limit and at Ctrl-C the loop\n"
       "brakes. A second Ctrl-C switches the motors off at once.\n"
-      "Exit code: 0 if the machine balanced for --hold; else 1, with the reason in a line.\n\n"
+      "Exit code: 0 if the machine balanced for --hold, 130 after Ctrl-C, else 1.\n\n"
       "Examples:\n"
       "  ./upswing machine learn --link realaigym-twin --encoder-counts 16384 --out rehearsal\n"
       "  ./upswing machine learn --link serial:/dev/ttyACM0 --encoder-counts 4096 \\\n"
