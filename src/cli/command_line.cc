@@ -439,7 +439,7 @@ void ExpectOtherOutputs(std::span<const char* const> words) {
     if (fs::is_regular_file(output.path, error)) {
       return fs::equivalent(output.path, other.path, error);
     }
-    // Other words are names, such as that of an agent.
+    // Other words are names: an agent, for example.
     return other.is_output && !fs::exists(output.path, error) &&
            fs::weakly_canonical(output.path, error) == fs::weakly_canonical(other.path, error);
   };
