@@ -12,6 +12,7 @@
 #include "base/error.h"
 #include "base/format.h"
 #include "base/text.h"
+#include "extras/machine/residuals.h"
 #include "pendulum/posterior.h"
 
 // Symbols: θ values to identify, c constants that follow from θ in a session, x start state of a
@@ -34,21 +35,6 @@ constexpr double kFirstLag = 0.005;                           // s
 // Variance of a new session, as a multiple of the twin's: real machines change more from session to
 // session than the few that a twin knows.
 constexpr double kNewSession = 10;
-
-/// Number of constants: those of the motion without the start, zeros, current_delay and
-/// current_inertia.
-constexpr int kConstants = kTangents - 4 + 4;
-using Constants = Eigen::Matrix<double, kConstants, 1>;
-using ConstantsMatrix = Eigen::Matrix<double, kConstants, kConstants>;
-
-Constants ConstantsOf(const Twin& twin) {
-  const Manipulator m = BodyOf(twin);
-  const Actuator& motor = twin.actuator;
-  Constants c;
-  c << m.J1, m.J2, m.b, m.a, m.G1, m.G2, m.d1, m.d2, m.f1, m.f2, motor.delay, motor.lag,
-      twin.sensors.zero1, twin.sensors.zero2, motor.current_delay, motor.current_inertia;
-  return c;
-}
 
 /// Typical differences of a value: standard deviations of its prior.
 struct Deviations {
@@ -81,19 +67,6 @@ struct Shot {
   LogWindow window;
   Vector4d x, cubic;  // start state now, and the cubic's (rad, rad/s)
   int session;        // index
-};
-
-/// The mean of a window's squared residuals over its rows, angles or torques, and its derivatives
-/// by start state and constants.
-struct Squares {
-  double mean = 0;                                                     // rad² or (N·m)²
-  Eigen::Matrix<double, 4 + kConstants, 4 + kConstants> H = H.Zero();  // half of the second one
-  Eigen::Matrix<double, 4 + kConstants, 1> g = g.Zero();               // half of the first one
-};
-
-/// The residuals of a window.
-struct Share {
-  Squares angle, torque;
 };
 
 /// A window's part of the normal equations of the constants, without its start state.
@@ -369,7 +342,7 @@ class Problem {
   std::vector<Share> Linearize() const {
     std::vector<Share> shares(shots_.size());
     ForEachWindow(theta_, [&](int w, const Twin& twin, const Drive& drive) {
-      shares[w] = ShareOf(shots_[w], shots_[w].x, twin, drive, true);
+      shares[w] = ShareAt(shots_[w], shots_[w].x, twin, drive, true);
     });
     return shares;
   }
@@ -378,70 +351,17 @@ class Problem {
     std::vector<double> costs(shots_.size());
     ForEachWindow(theta, [&](int w, const Twin& twin, const Drive& drive) {
       costs[w] =
-          Cost(ShareOf(shots_[w], starts[w], twin, drive, false)) + StartCost(shots_[w], starts[w]);
+          Cost(ShareAt(shots_[w], starts[w], twin, drive, false)) + StartCost(shots_[w], starts[w]);
     });
     double cost = PriorCost(theta);
     for (const double c : costs) cost += c;
     return cost;
   }
 
-  /// The residuals of a window from the start x, predicted minus measured, with derivatives if
-  /// `linearizes`.
-  Share ShareOf(const Shot& shot, const Vector4d& x, const Twin& twin, const Drive& drive,
+  Share ShareAt(const Shot& shot, const Vector4d& x, const Twin& twin, const Drive& drive,
                 bool linearizes) const {
-    const MachineLog& log = logs_[shot.window.log];
-    const auto [index, first, last, start] = shot.window;
-    const Actuator& motor = twin.actuator;
-    Motion motion;
-    MotionTangents tangents;
-    Predict(BodyOf(twin), drive, {twin.sensors.zero1, twin.sensors.zero2}, {x(0), x(1), x(2), x(3)},
-            log, first, last, motor.current_delay, motion, linearizes ? &tangents : nullptr);
-    const int rows = last - first;
-    Share share;
-    Eigen::Matrix<double, 4 + kConstants, Eigen::Dynamic> J(4 + kConstants,
-                                                            linearizes ? 2 * rows : 0);
-    VectorXd r = VectorXd::Zero(2 * rows);
-    const auto square = [&](Squares& s) {
-      s.mean = r.squaredNorm() / rows;
-      if (!linearizes) return;
-      s.H = J * J.transpose() / rows;
-      s.g = J * r / rows;
-    };
-    for (int k = 0; k < rows; ++k) {
-      for (int j = 0; j < 2; ++j) {
-        const int i = 2 * k + j;
-        r(i) = motion.angle[k][j] - log.angle[first + k][j];
-        if (!linearizes) continue;
-        J.col(i) << tangents.angle.col(i), -tangents.angle(0, i), -tangents.angle(1, i), 0, 0;
-        J(kTangents + j, i) += 1;
-      }
-    }
-    square(share.angle);
-    if (log.measured.empty()) return share;
-    int cursor = 0;
-    r.setZero();
-    if (linearizes) J.setZero();
-    for (int k = 0; k < rows; ++k) {
-      DriveTangents of_torque;
-      const double time = log.time[first + k] - motor.current_delay;
-      const Joints torque = drive.At(time, cursor, linearizes ? &of_torque : nullptr);
-      for (int j = 0; j < 2; ++j) {
-        if (!reported_[index][j]) continue;
-        const int i = 2 * k + j;
-        r(i) = torque[j] - motor.current_inertia * motion.acceleration[k][j] -
-               log.measured[first + k][j];
-        if (!linearizes) continue;
-        const Eigen::Matrix<double, kTangents, 1> slope =
-            -motor.current_inertia * tangents.acceleration.col(i);
-        J.col(i) << slope, -slope(0), -slope(1),
-            of_torque.by_delay[j] + motor.current_inertia * tangents.jerk[k][j],
-            -motion.acceleration[k][j];
-        J(kTangents - 2, i) += of_torque.by_delay[j];
-        J(kTangents - 1, i) += of_torque.by_lag[j];
-      }
-    }
-    square(share.torque);
-    return share;
+    const int log = shot.window.log;
+    return ShareOf(logs_[log], shot.window, reported_[log], x, twin, drive, linearizes);
   }
 
   /// The blocks of the windows. The robust cost ln(1 + r²/s²) weighs squares by 1 / (s² + r²).
