@@ -319,9 +319,11 @@ void Report(const Explanation& e, bool in_proportion, Findings& findings) {
     // The reading of a link that hangs, by the column's own sign.
     const double hangs = -r.sign[j] * (j == 1 && r.absolute ? e.zero[0] + e.zero[1] : e.zero[j]);
     if (std::abs(e.zero[j]) <= kZero) continue;
+    const double zero = std::remainder(hangs, 2 * std::numbers::pi);
     add(Aspect::kAngle, j + 1,
-        fmt::format("another zero, {:.2f} rad when its link {} (key hanging)",
-                    std::remainder(hangs, 2 * std::numbers::pi),
+        fmt::format("another zero, {:.2f} rad ({:.0f} deg) when its link {} (add it to the key "
+                    "hanging, in the column's unit)",
+                    zero, zero * 180 / std::numbers::pi,
                     j == 0 || r.absolute ? "hangs" : "is in line with link 1"));
   }
 }
