@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "pendulum/equations.h"
+#include "pendulum/friction.h"
 
 // Symbols: those of Manipulator; z zeros of the encoders, k1 = G1 z1, k2 = G2 (z1 + z2).
 namespace upswing::machine {
@@ -29,10 +30,10 @@ Terms TermsAt(const Joints& q, const Joints& w) {
   // Momenta: M q̇.
   t.change1 << w[0], w[0] + w[1], c * (2 * w[0] + w[1]), 0, 0, 0, q[0], 0, 0, 0, 0, 0;
   t.change2 << 0, w[0] + w[1], c * w[0], w[1], 0, 0, 0, q[1], 0, 0, 0, 0;
-  t.rate1 << 0, 0, 0, 0, std::sin(q[0]), std::sin(both), 0, 0, std::atan(kFrictionSlope * w[0]), 0,
+  t.rate1 << 0, 0, 0, 0, std::sin(q[0]), std::sin(both), 0, 0, DryFriction(1, w[0]), 0,
       -std::cos(q[0]), -std::cos(both);
-  t.rate2 << 0, 0, s * w[0] * (w[0] + w[1]), 0, 0, std::sin(both), 0, 0, 0,
-      std::atan(kFrictionSlope * w[1]), 0, -std::cos(both);
+  t.rate2 << 0, 0, s * w[0] * (w[0] + w[1]), 0, 0, std::sin(both), 0, 0, 0, DryFriction(1, w[1]), 0,
+      -std::cos(both);
   return t;
 }
 

@@ -242,17 +242,14 @@ class Learner {
   }
 
   /// The first controller that balances all machines drawn from the posterior, or most of them.
-  std::shared_ptr<const LoadedPolicy> Choose() {
+  MachinePolicy Choose() {
     ExpectBudget();
-    std::shared_ptr<const LoadedPolicy> best;
+    MachinePolicy best;
     Compute([&] {
       int most = -1;
-      for (Candidate& candidate : CandidatesFor(twin_.plant)) {
-        candidate.arguments.plant = twin_.plant;
-        // The motors compensate dry friction, unless made_for names it.
-        candidate.arguments.plant->coulomb1 = candidate.arguments.plant->coulomb2 = 0;
+      for (const Candidate& candidate : CandidatesFor(twin_.plant)) {
         try {
-          const auto policy = std::make_shared<const LoadedPolicy>(GetPolicy(candidate.arguments));
+          const MachinePolicy policy = GetMachinePolicy(candidate.arguments, "", twin_);
           const int held = HeldBy(policy, candidate.compensation);
           say_(fmt::format("design: {}: {} of {} machines of the twin", candidate.arguments.name,
                            held, kDraws));
@@ -272,7 +269,7 @@ class Learner {
   }
 
   /// Number of machines, of kDraws of the posterior, that a controller balances.
-  int HeldBy(const std::shared_ptr<const LoadedPolicy>& policy, double compensation) const {
+  int HeldBy(const MachinePolicy& policy, double compensation) const {
     int held = 0;
     for (int i = 0; i < kDraws; ++i) {
       Rng rng(c_.seed, "machine: draws", static_cast<uint64_t>(i));
