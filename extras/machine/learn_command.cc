@@ -31,13 +31,13 @@ std::string CommandOf(const LearnArguments& a, const LearnResult& r) {
   const PolicyArguments& controller = r.controller;
   std::string text = fmt::format("{} run {}", LaunchCommand(), controller.name);
   for (const FlagValue& flag : controller.flags) {
-    text += fmt::format(" {} {}", FlagOf(flag.name), flag.text);
+    text += fmt::format(" {} {}", FlagOf(flag.name), ShellQuoted(flag.text));
   }
   for (const std::string& change : controller.made_for) text += " --made-for " + change;
   const bool in_process = ParseLink(a.link, /*listens=*/false).kind == LinkAddress::Kind::kTwin;
-  const std::string twin = (std::filesystem::path(a.out) / "twin.toml").string();
+  const std::string twin = ShellQuoted((std::filesystem::path(a.out) / "twin.toml").string());
   text += in_process ? fmt::format(" --link {}", twin)
-                     : fmt::format(" --link {} --twin {}", a.link, twin);
+                     : fmt::format(" --link {} --twin {}", ShellQuoted(a.link), twin);
   return text + fmt::format(
                     " --compensation {} --passive-torque {} --max-torque {} "
                     "--max-angle {} --max-velocity {} --max-energy {} --hz {}",
