@@ -168,6 +168,10 @@ Predictor PredictorOf(const std::string& name, const Twin& twin, std::span<const
   return predictor;
 }
 
+bool HasWindows(const MachineLog& log, const Twin& twin, double seconds) {
+  return !WindowsOf(log, twin, seconds).empty() || !WindowsOf(log, twin, seconds, true).empty();
+}
+
 std::vector<double> WindowErrors(const MachineLog& log, const Twin& twin, double seconds,
                                  bool reported) {
   return ErrorsIn(log, twin, WindowsOf(log, twin, seconds, reported), reported);

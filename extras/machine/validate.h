@@ -23,6 +23,10 @@ struct Predictor {
 /// A predictor with the same twin for all logs, in each log's session if the twin knows it.
 Predictor PredictorOf(const std::string& name, const Twin& twin, std::span<const MachineLog> logs);
 
+/// Whether a log has windows of `seconds` in which a twin, driven by commanded or reported torques,
+/// can predict its motion.
+bool HasWindows(const MachineLog& log, const Twin& twin, double seconds);
+
 /// The errors of the windows of a log. `reported`: driven by the torques that the motors reported
 /// instead of the commanded ones.
 std::vector<double> WindowErrors(const MachineLog& log, const Twin& twin, double seconds,
