@@ -373,16 +373,21 @@ export class LearnPanel {
 
   /// The policy on the stage, or the training's newest one if another agent is there.
   private file(): File | null {
-    const { session, scrubber } = this;
-    const shown = this.isAtNewest ? session?.newest : scrubber.checkpoint;
+    const { session, shown } = this;
     return session && shown ? fileOf(session, shown) : null;
   }
 
   /// Whether the policy on the stage is the visitor's own already.
   private get isKept(): boolean {
-    const { session, scrubber, page } = this;
-    const shown = this.isAtNewest ? session?.newest : scrubber.checkpoint;
-    return shown !== undefined && shown !== null && page.agents.ownName === nameOf(session!, shown);
+    const { session, shown, page } = this;
+    return session !== null && shown !== null && page.agents.ownName === nameOf(session, shown);
+  }
+
+  /// The checkpoint that numbers and file belong to; null without a training.
+  private get shown(): Checkpoint | null {
+    const { session, scrubber } = this;
+    if (!session) return null;
+    return this.isAtNewest ? session.newest : scrubber.checkpoint;
   }
 
   /// Whether numbers and file belong to the newest policy: it is followed, or another agent is on

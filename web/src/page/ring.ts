@@ -15,6 +15,7 @@ export class Ring {
   private policy: Policy | null = null; // of the ring in progress, or of the last one
   private plant: World['plant'] | null = null;
   private complete = false;
+  private painted: readonly [Float32Array | null, number, number] = [null, NaN, NaN];
   shown = false;
   /// Clockwise from below; empty: not shown or not estimated.
   colors: readonly string[] = [];
@@ -50,11 +51,13 @@ export class Ring {
   }
 
   private paint([low, high]: readonly [number, number], rewardScale: number): void {
+    const { cells } = this.map;
+    const now = [cells, low, high] as const;
+    if (now.every((part, i) => Object.is(part, this.painted[i]))) return;
+    this.painted = now;
     const known = Number.isFinite(high - low);
     const color = (cell: number) => between(COLORS.value, (cell - low) / (high - low));
-    this.colors = known
-      ? Array.from(this.map.cells!, (cell) => `rgb(${color(cell).join(' ')})`)
-      : [];
+    this.colors = known ? Array.from(cells!, (cell) => `rgb(${color(cell).join(' ')})`) : [];
     const ends = known ? ([low / rewardScale, high / rewardScale] as const) : null;
     for (const scale of this.scales) scale.show('value', ends);
   }
