@@ -69,6 +69,11 @@ class Firmware(threading.Thread):
         self.socket.settimeout(0.3)
         self.start()
 
+    def wait_for_silence(self):
+        """Returns once no command has come for a while: all that were sent are in `commands`."""
+        self.silent.clear()
+        assert self.silent.wait(PATIENCE)
+
     def run(self):
         on = 0
         for number in itertools.count(1):
@@ -106,6 +111,7 @@ class Protection(ProgramTest):
         return run
 
     def assert_off(self, firmware):
+        firmware.wait_for_silence()
         self.assertEqual(firmware.commands[-1], (0, (0, 0)))
         for on, torques in firmware.commands:
             self.assertTrue(all(abs(torque) <= on * 0.1 for torque in torques), (on, torques))
@@ -124,7 +130,6 @@ class Protection(ProgramTest):
                 run.communicate(timeout=PATIENCE)
                 crash = number in (signal.SIGABRT, signal.SIGSEGV)
                 self.assertEqual(run.returncode, -number if crash else 128 + number)
-                self.assertTrue(firmware.silent.wait(PATIENCE))
                 self.assert_off(firmware)
 
     def test_a_second_interrupt_switches_the_motors_off_at_once(self):
@@ -142,7 +147,6 @@ class Protection(ProgramTest):
         run.send_signal(signal.SIGINT)
         run.communicate(timeout=PATIENCE)
         self.assertEqual(run.returncode, -signal.SIGINT)
-        self.assertTrue(firmware.silent.wait(PATIENCE))
         self.assert_off(firmware)
 
     def test_a_program_that_was_stopped_sends_no_old_torque(self):
@@ -157,6 +161,7 @@ class Protection(ProgramTest):
         _, err = run.communicate(timeout=PATIENCE)
         self.assertEqual(run.returncode, 1)
         self.assertRegex(err, r"the last reading is \S+ s old")
+        firmware.wait_for_silence()
         self.assertEqual({on for on, _ in firmware.commands[count:]}, {0})
 
     def test_the_watchdog_acts_where_the_program_is_killed(self):
@@ -188,11 +193,11 @@ class Protection(ProgramTest):
                     _, err = run.communicate(timeout=PATIENCE)
                     self.assertEqual(run.returncode, 1)
                     self.assertRegex(err, "joint 2: the (angle jumps by|encoder saturates)")
+                    self.assert_off(firmware)
                     # The first command after the wrong reading is off.
                     after = [on for (on, _), known in zip(firmware.commands, firmware.known)
                              if known >= wrong[0]]
                     self.assertEqual(after, [0] * 3)
-                    self.assert_off(firmware)
 
     def test_a_datagram_is_one_frame(self):
         for pack in (lambda frame, i: frame + frame, lambda frame, i: frame[:22],
