@@ -31,6 +31,22 @@ std::vector<int> Folds(std::span<const MachineLog> logs, int folds) {
   return fold;
 }
 
+/// Geometric mean over sessions of the median error of a session's windows: each session counts the
+/// same, however many windows it has. `errors` has those of each log; not a number if all are
+/// empty.
+double MeanOfSessions(std::span<const MachineLog> logs,
+                      std::span<const std::vector<double>> errors) {
+  std::map<std::string, std::vector<double>> sessions;
+  for (size_t i = 0; i < logs.size(); ++i) {
+    if (errors[i].empty()) continue;
+    std::vector<double>& session = sessions[SessionOf(logs[i].name)];
+    session.insert(session.end(), errors[i].begin(), errors[i].end());
+  }
+  double sum = 0;
+  for (const auto& [name, session] : sessions) sum += std::log(Median(session));
+  return std::exp(sum / static_cast<double>(sessions.size()));
+}
+
 /// Throws BadInput for a log in which a motor acts without commanded torques, which drive the
 /// model.
 void ExpectCommands(const MachineLog& log) {
@@ -116,7 +132,7 @@ Identification Identify(std::span<const MachineLog> logs, const Twin& first,
       ParallelFor(pool, n, [&](int i) {
         errors[i] = WindowErrors(logs[i], twins[i], kJudgedSeconds, false);
       });
-      const double error = PooledMedian(errors);
+      const double error = MeanOfSessions(logs, errors);
       result.structures.push_back({structures[s], error});
       if (s > 0 && !(error < kWorthwhile * best)) continue;
       best = error;

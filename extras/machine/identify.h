@@ -18,7 +18,7 @@ std::vector<Structure> Structures(bool has_motors);
 /// A structure's errors on runs that were left out.
 struct StructureError {
   Structure structure;
-  double error;  // median over all windows of 1 s, rad
+  double error;  // geometric mean over sessions of the median error at 1 s, rad
 };
 
 /// Settings of an identification with cross-validation.
