@@ -49,11 +49,6 @@ def commands():
     return _table(program("--help"), "(?:Subcommands|Commands)")
 
 
-def agents():
-    """{named agent: description}, in the order of --help."""
-    return _table(program("train", "--help"), "Named agents")
-
-
 def help_of(command, *arguments):
     """The help text of a command."""
     if command in LAUNCHER_COMMANDS:
@@ -105,7 +100,3 @@ def _cut(text, pattern):
     """The text without its matching end, and the group of the match."""
     end = re.search(pattern + "$", text)
     return (text[:end.start()], end[1]) if end else (text, "")
-
-
-def algorithm_of(agent):
-    return settings(agent)["algorithm"].default.strip('"')

@@ -2,7 +2,6 @@
 """Measured numbers and generated tables of the documentation.
 
   results.py write            renders every table in README.md and docs/ from docs/results/data
-                              and from the program
   results.py check            lists the outdated tables; exit code 1 if there are any
   results.py measure ID       runs the commands of a table and rewrites docs/results/data/ID.json
   results.py measure ID --try    prints the table with few seeds and episodes; writes nothing
@@ -16,9 +15,9 @@ docs/results/data/ID.json holds one table, as it is displayed:
 Pages show it between `<!-- table: ID -->` and `<!-- end -->`, above a line that names version, date,
 machine and first command; `<!-- table: ID ROW ROW -->` shows some rows. They show one cell of it in a sentence as
 `<!-- value: ID ROW COLUMN -->text<!-- end -->`. ROW is the text of the first cell without
-backticks; COLUMN is an index or a header. GENERATED lists what else a page can show, such as tables
-that come from the program (`<!-- generated: machines -->` … `<!-- end -->`) and lines of a recorded
-output (`<!-- generated: output first-training 12-13 -->` … `<!-- end -->`).
+backticks; COLUMN is an index or a header. A page can also show the table of the machines
+(`<!-- generated: machines -->` … `<!-- end -->`) and lines of a recorded output
+(`<!-- generated: output first-training 12-13 -->` … `<!-- end -->`).
 """
 
 import argparse
@@ -96,7 +95,7 @@ def cell_of(table, row_and_column):
     raise Problem(f"no row and column are called \"{row_and_column}\"")
 
 
-# --- Tables from the program --------------------------------------------------------------------
+# --- Generated blocks ----------------------------------------------------------------------------
 
 GENERATED = {}
 
@@ -106,34 +105,6 @@ def generated(name):
         GENERATED[name] = function
         return function
     return add
-
-
-@generated("differences")
-def differences_table(algorithm, *names):
-    """A table with named agents as columns (default: all of the algorithm) and the settings in which
-    they differ as rows."""
-    known = [name for name in program.agents() if program.algorithm_of(name) == algorithm]
-    default = program.ALGORITHMS.get(algorithm)
-    names = names or sorted(known, key=lambda name: name != default)
-    if not known or not set(names) <= set(known):
-        raise Problem("expected an algorithm and agents of it, got "
-                      f"{' '.join([algorithm, *names])}")
-    columns = [program.settings(name) for name in names]
-    rows = []
-    for setting in columns[0]:
-        values = [column[setting].default for column in columns]
-        if setting not in BOOKKEEPING and len(set(values)) > 1:
-            rows.append([f"`{setting}`", *(readable(value) for value in values)])
-    return markdown_table(["setting", *(f"`{name}`" for name in names)], rows)
-
-
-BOOKKEEPING = {"agent", "algorithm", "seed", "log_every", "checkpoint_every", "threads",
-               "environment"}
-
-
-def readable(value):
-    """A TOML value as tables show it, such as 1,000,000."""
-    return f"{int(value):,}" if value.isdecimal() else value.strip('"[]')
 
 
 @generated("machines")
