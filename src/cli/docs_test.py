@@ -50,8 +50,9 @@ def pattern_of(shown):
 
 
 def first_column(markdown):
-    """The text in backticks at the beginning of each table row."""
-    return re.findall(r"^\| `([^`]+)`", markdown, re.MULTILINE)
+    """The texts in backticks in the first cell of each table row."""
+    return [name for cell in re.findall(r"^\|([^|]*)\|", markdown, re.MULTILINE)
+            for name in re.findall("`([^`]+)`", cell)]
 
 
 class RunFolder(ProgramTest):
