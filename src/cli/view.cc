@@ -13,7 +13,7 @@
 #include "base/format.h"
 #include "base/text.h"
 #include "cli/commands.h"
-#include "cli/drawer.h"
+#include "cli/python_child.h"
 #include "cli/say.h"
 #include "cli/signals.h"
 #include "judge/rollout.h"
@@ -22,6 +22,10 @@
 #include "os/streams.h"
 
 namespace upswing {
+
+/// The program in Python that draws: the text of python/upswing/_view.py.
+const char* ViewProgram();
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -221,7 +225,8 @@ int RunView(const ViewArguments& a) {
   }
 
   InstallSignalHandlers("");
-  Drawer drawer(job.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  PythonChild drawer("view", ViewProgram(),
+                     job.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
   std::optional<PictureProgress> progress;
   if (making) progress.emplace(job);
   while (const auto request = drawer.Next()) {

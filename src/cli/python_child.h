@@ -9,19 +9,16 @@
 
 namespace upswing {
 
-/// The program in Python that draws: the text of python/upswing/_view.py.
-const char* ViewProgram();
-
-/// A Python that runs ViewProgram. It asks for states in lines, and gets a line for each.
-class Drawer {
+/// A Python that runs a compiled-in program for a command. Both exchange lines.
+class PythonChild {
  public:
-  /// Starts Python with these instructions (JSON). UPSWING_PYTHON names another one than `python3`.
-  /// Throws Failure.
-  explicit Drawer(std::string job);
+  /// Starts Python with a program and its instructions (JSON). UPSWING_PYTHON names another one
+  /// than `python3`. Errors begin with `command`. Throws Failure.
+  PythonChild(std::string command, std::string program, std::string job);
   /// Ends Python if it still runs.
-  ~Drawer();
-  Drawer(const Drawer&) = delete;
-  Drawer& operator=(const Drawer&) = delete;
+  ~PythonChild();
+  PythonChild(const PythonChild&) = delete;
+  PythonChild& operator=(const PythonChild&) = delete;
 
   /// Waits for the next line. Returns nothing if Python ends, or if StopSignal tells to stop.
   std::optional<std::string> Next();
@@ -34,6 +31,7 @@ class Drawer {
  private:
   int Wait();
 
+  std::string command_;
   Descriptor socket_;
   pid_t child_ = -1;
   std::string read_;  // not yet a whole line

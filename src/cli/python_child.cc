@@ -1,4 +1,4 @@
-#include "cli/drawer.h"
+#include "cli/python_child.h"
 
 #include <poll.h>
 #include <spawn.h>
@@ -11,6 +11,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
+#include <utility>
 
 #include "base/error.h"
 #include "base/text.h"
@@ -27,15 +28,16 @@ std::string PythonName() {
 
 }  // namespace
 
-Drawer::Drawer(std::string job) : socket_(-1) {
+PythonChild::PythonChild(std::string command, std::string program, std::string job)
+    : command_(std::move(command)), socket_(-1) {
   std::array<int, 2> ends{};
   if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0) {
-    throw Failure(Concat("view: cannot open a socket: ", std::strerror(errno)));
+    throw Failure(Concat(command_, ": cannot open a socket: ", std::strerror(errno)));
   }
   socket_ = Descriptor(ends[0]);
   const Descriptor other(ends[1]);
   setenv("PYTHONSAFEPATH", "1", 1);  // no modules from the present folder
-  std::string python = PythonName(), flag = "-c", program = ViewProgram();
+  std::string python = PythonName(), flag = "-c";
   const std::array<char*, 5> words{python.data(), flag.data(), program.data(), job.data(), nullptr};
 
   posix_spawn_file_actions_t files;
@@ -52,17 +54,17 @@ Drawer::Drawer(std::string job) : socket_(-1) {
   posix_spawn_file_actions_destroy(&files);
   if (error == 0) return;
   child_ = -1;
-  throw Failure(Concat("view: cannot run ", Printable(python), ": ", std::strerror(error),
-                       ": expected Python 3.11 or newer; UPSWING_PYTHON names another one"));
+  throw Failure(Concat(command_, ": cannot run ", Printable(python), ": ", std::strerror(error),
+                       ": expected Python 3; UPSWING_PYTHON names another one"));
 }
 
-Drawer::~Drawer() {
+PythonChild::~PythonChild() {
   if (child_ < 0) return;
   socket_ = Descriptor(-1);
   Wait();
 }
 
-std::optional<std::string> Drawer::Next() {
+std::optional<std::string> PythonChild::Next() {
   while (StopSignal() == 0) {
     const size_t end = read_.find('\n');
     if (end != std::string::npos) {
@@ -82,22 +84,22 @@ std::optional<std::string> Drawer::Next() {
   return std::nullopt;
 }
 
-void Drawer::Answer(const std::string& line) {
+void PythonChild::Answer(const std::string& line) {
   const std::string text = line + '\n';
   // A short line fits into the socket's buffer. If Python has ended, Next notices.
   (void)!write(socket_.get(), text.data(), text.size());
 }
 
-int Drawer::Finish() {
+int PythonChild::Finish() {
   socket_ = Descriptor(-1);
   const int status = Wait();
   if (WIFSIGNALED(status)) {
-    throw Failure(Concat("view: Python was ended by signal ", WTERMSIG(status)));
+    throw Failure(Concat(command_, ": Python was ended by signal ", WTERMSIG(status)));
   }
   return WEXITSTATUS(status);
 }
 
-int Drawer::Wait() {
+int PythonChild::Wait() {
   int status = 0;
   while (waitpid(child_, &status, 0) < 0 && errno == EINTR) {
   }
