@@ -47,7 +47,7 @@ COMMAND = re.compile(r"extras/\w+/(\w+_command|main)\.cc$")
 # Files that may include each foreign library.
 ALLOWED_FILES = {
     "mujoco": re.compile(r"src/mujoco/"),
-    "zlib.h": re.compile(r"src/os/gzip\.cc$"),
+    "zlib.h": re.compile(r"src/os/gzip(_test)?\.cc$"),
     "google": re.compile(r"(src/runs|extras/deploy)/"),
     "nanobind": re.compile(r"python/"),
     "hwy": re.compile(r"(src/(base/simd(_test)?|nn/(linear|product|registers-inl)|"

@@ -10,18 +10,24 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "cli/commands.h"
+#include "cli/python_child.h"
 #include "cli/signals.h"
 #include "extras/deploy/export.h"
-#include "extras/deploy/web_server.h"
 #include "os/command.h"
 #include "os/file.h"
 
 namespace upswing::deploy {
+
+/// The program in Python that serves: the text of extras/deploy/demo_server.py.
+const char* DemoServer();
+
 namespace {
 
 namespace fs = std::filesystem;
 
 constexpr const char* kAgents = "agents";  // the page's folder of policies
+constexpr int kUsualPort = 4173, kLastPort = 65535;
+constexpr int kPatience = 15;  // s, for a whole request, and for a part of an answer
 
 struct DemoArguments {
   std::vector<std::string> policies;
@@ -105,7 +111,8 @@ int WriteDist(const DemoArguments& a, const fs::path& page) {
 /// Serves the page until a signal ends it. With policies, their files and those of the page's own
 /// agents are in a temporary folder, because the page may be read-only.
 int ServePage(const DemoArguments& a, const fs::path& page) {
-  WebFiles files(page);
+  std::string job = Concat(kPatience, '\n', a.port == 0 ? kUsualPort : a.port, '\n',
+                           a.port == 0 ? kLastPort : a.port, '\n', fs::absolute(page).string());
   std::optional<Making> temporary;
   if (!a.policies.empty()) {
     temporary.emplace(fs::temp_directory_path() / "upswing-demo", Making::Kind::kFolder);
@@ -113,14 +120,15 @@ int ServePage(const DemoArguments& a, const fs::path& page) {
     fs::create_directory(agents);
     if (fs::is_directory(page / kAgents)) CopyContent(page / kAgents, agents);
     AddAgents(a, agents);
-    files.Replace(kAgents, agents);
+    job += '\n' + agents.string();
   }
-  WebServer server(files, static_cast<int>(a.port));
-  files.Compress();
-  fmt::print("The page is at http://localhost:{}/ (stop with Ctrl-C).\n", server.port());
-  std::fflush(stdout);
-  server.Run([] { return StopSignal() != 0; });
-  return 128 + StopSignal();
+  PythonChild server("demo", DemoServer(), job);
+  while (const auto port = server.Next()) {
+    fmt::print("The page is at http://localhost:{}/ (stop with Ctrl-C).\n", *port);
+    std::fflush(stdout);
+  }
+  const int code = server.Finish();
+  return StopSignal() == 0 ? code : 128 + StopSignal();
 }
 
 int RunDemo(const DemoArguments& a) {
@@ -136,15 +144,16 @@ void AddDemo(CommandLine& line) {
   line.Texts("policies", a.policies, "POLICY|RUN",
              "policies to add to the page's: policy.safetensors or run folders");
   Options own;
-  own.Add(&a.port, "port", {1, 65535}, "", "port to listen on").usual =
-      Concat(WebServer::kUsualPort, ", or the next free one");
+  own.Add(&a.port, "port", {1, kLastPort}, "", "port to listen on").usual =
+      Concat(kUsualPort, ", or the next free one");
   line.Arguments(own);
   line.Text("--dist", a.dist, "FOLDER",
             "new or empty folder to write the page into, for any web server, instead of serving",
             "a folder");
   line.Check([&a] { CheckPlace(a); });
   line.Footer(
-      "The server listens on this machine only.\n\n"
+      "The server listens on this machine only. It runs in Python: `python3`, or the one that\n"
+      "UPSWING_PYTHON names.\n\n"
       "Examples:\n"
       "  ./upswing demo\n"
       "  ./upswing demo runs/d3qn-seed1\n"

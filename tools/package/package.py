@@ -210,6 +210,7 @@ Section: science
 Priority: optional
 Installed-Size: {size}
 Depends: libc6 (>= {self.glibc()}), libgcc-s1 (>= 4.2), libstdc++6 (>= 12), zlib1g (>= 1:1.2.0)
+Recommends: python3
 Suggests: gnuplot-nox, libegl1, libgl1, libgl1-mesa-dri, python3-venv
 Description: controllers that swing up and balance a double pendulum
  Upswing trains, compares, explains and deploys controllers of a double
