@@ -52,7 +52,7 @@ ALLOWED_FILES = {
     "nanobind": re.compile(r"python/"),
     "hwy": re.compile(r"(src/(base/simd(_test)?|nn/(linear|product|registers-inl)|"
                       r"pendulum/(closed_form|sine_cosine-inl))|tools/bench/roofline)\.(h|cc)$"),
-    "Eigen": re.compile(r"src/(control/|nn/[^/]*_test\.cc$)|extras/(machine|realaigym)/|tools/bench/"),
+    "Eigen": re.compile(r"src/(control/|nn/[^/]*_test\.cc$)|extras/(machine|realaigym)/"),
 }
 
 # Tests and benchmarks of the portable layers may include headers of the operating system.
