@@ -29,7 +29,6 @@ struct BenchCase {
   std::string name;  // such as "gradient/plain/256-256/batch:128/threads:1"
   double count = 1;  // items, such as steps, in one call of the work
   double flops = 0;  // additions and multiplications that one call needs at least; 0: unknown
-  double bytes = 0;  // bytes that one call reads and writes; 0: unknown
   int threads = 1;   // threads that work at the same time
   /// Makes the work and everything that it needs.
   std::function<BenchWork()> prepare = {};
@@ -40,15 +39,8 @@ using BenchCases = std::vector<BenchCase>;
 inline constexpr int kBenchActions = 9;
 
 // Cases of each part.
-BenchCases KernelCases(const BenchOptions& options);
 BenchCases GradientCases(const BenchOptions& options);
 BenchCases ActCases(const BenchOptions& options);
-BenchCases PhysicsCases(const BenchOptions& options);
 BenchCases EnvCases(const BenchOptions& options);
-
-/// Single-precision multiplications and additions per second, in GFLOP/s, that `threads` threads
-/// reach together with the vector instructions in use, without access to memory. This is the best
-/// of several rounds of milliseconds. A fused multiply-add counts as two.
-double MeasurePeakGflops(int threads);
 
 }  // namespace upswing

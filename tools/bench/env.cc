@@ -1,15 +1,12 @@
-// Cases of `upswing bench` for physics and environments.
+// Cases of `upswing bench env`.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <memory>
 
 #include "base/rng.h"
 #include "base/thread_pool.h"
 #include "mujoco/engines.h"
-#include "pendulum/closed_form.h"
 #include "pendulum/pendulum_env.h"
-#include "pendulum/physics.h"
 #include "rl/torque_levels.h"
 #include "tools/bench/bench.h"
 
@@ -39,47 +36,6 @@ class Torques {
   std::vector<double> values_;  // (kSteps, N)
 };
 
-/// MuJoCo's steps as the environment makes them. Includes the task's calculations at every fourth
-/// step, a few percent of the time.
-BenchWork PhysicsInMuJoCo(int num_envs, int threads) {
-  const auto pool = std::make_shared<ThreadPool>(threads);
-  PendulumEnvConfig config;
-  config.num_envs = num_envs;
-  config.pool = pool.get();
-  const std::shared_ptr<Physics> physics = kMuJoCo.make(config);
-  const auto torques = std::make_shared<Torques>(num_envs);
-  const auto result = std::make_shared<StepResult>(PendulumSpec(config));
-  return [=, keep = pool] { physics->Step(torques->Next(), *result); };
-}
-
-/// Only the steps of the closed form, in chunks as the environment shares them.
-BenchWork PhysicsInClosedForm(int num_envs, int threads) {
-  const auto n = static_cast<size_t>(num_envs);
-  const auto batch = std::make_shared<ClosedFormBatch>(n);
-  for (size_t env = 0; env < n; ++env) batch->SetPlant(env, Plant());
-  const auto pool = std::make_shared<ThreadPool>(threads);
-  const auto torques = std::make_shared<Torques>(num_envs);
-  return [=] {
-    batch->SetTorque(torques->Next());
-    pool->ParallelFor(ClosedFormChunks(n), [&batch = *batch, n](int chunk) {
-      const size_t first = static_cast<size_t>(chunk) * kClosedFormChunk;
-      Advance(batch, kPhysicsSteps, first, std::min(first + kClosedFormChunk, n));
-    });
-  };
-}
-
-/// Case of Runge-Kutta steps, four per control period.
-BenchCase PhysicsCase(const std::string& physics, int num_envs, int threads) {
-  const bool closed_form = &FindEngine(physics, "physics") == &kClosedForm;
-  return {.name = fmt::format("physics/{}/envs:{}/threads:{}", physics, num_envs, threads),
-          .count = static_cast<double>(kPhysicsSteps) * num_envs,
-          .threads = threads,
-          .prepare = [=]() -> BenchWork {
-            return closed_form ? PhysicsInClosedForm(num_envs, threads)
-                               : PhysicsInMuJoCo(num_envs, threads);
-          }};
-}
-
 /// Case of whole environment steps: physics, observation, reward and, at the end of episodes,
 /// reset.
 BenchCase EnvCase(const std::string& physics, int num_envs, int threads) {
@@ -99,23 +55,18 @@ BenchCase EnvCase(const std::string& physics, int num_envs, int threads) {
           }};
 }
 
-/// A case for each engine, number of environments and number of threads.
-template <typename MakeCase>
-BenchCases CasesOf(const BenchOptions& options, const MakeCase& make) {
+}  // namespace
+
+BenchCases EnvCases(const BenchOptions& options) {
   BenchCases cases;
   for (const std::string& physics : EngineNames()) {
     for (const int num_envs : {8, 128, 1024}) {
-      for (const int64_t threads : options.threads)
-        cases.push_back(make(physics, num_envs, threads));
+      for (const int64_t threads : options.threads) {
+        cases.push_back(EnvCase(physics, num_envs, static_cast<int>(threads)));
+      }
     }
   }
   return cases;
 }
-
-}  // namespace
-
-BenchCases PhysicsCases(const BenchOptions& options) { return CasesOf(options, PhysicsCase); }
-
-BenchCases EnvCases(const BenchOptions& options) { return CasesOf(options, EnvCase); }
 
 }  // namespace upswing

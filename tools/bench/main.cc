@@ -2,8 +2,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <iostream>
 #include <map>
+#include <thread>
 
 #include "base/error.h"
 #include "base/simd.h"
@@ -13,11 +16,41 @@
 #include "os/host.h"
 #include "os/streams.h"
 #include "tools/bench/bench.h"
+#include "tools/bench/roofline.h"
 
 namespace upswing {
 namespace {
 
-/// Measures a case. Counters are rates: items, bytes and GFLOP per second.
+/// Single-precision multiplications and additions per second, in GFLOP/s, that `threads` threads
+/// reach together with the vector instructions in use, without access to memory. This is the best
+/// of several rounds of milliseconds. A fused multiply-add counts as two.
+double MeasurePeakGflops(int threads) {
+  // Long enough to have all processors without other load for some rounds.
+  constexpr std::chrono::milliseconds kDuration(300);
+  constexpr int64_t kRounds = 1 << 19;  // a few milliseconds
+  using Clock = std::chrono::steady_clock;
+  ThreadPool pool(threads);
+  double best = 0;
+  for (const auto end = Clock::now() + kDuration; Clock::now() < end;) {
+    std::atomic<int> arrived{0};
+    std::atomic<int64_t> multiply_adds{0};
+    std::vector<Clock::time_point> began(static_cast<size_t>(threads));
+    pool.ParallelFor(threads, [&](int thread) {
+      // Wait until all threads are here. No thread takes a second task before its first has ended.
+      ++arrived;
+      while (arrived < threads) std::this_thread::yield();
+      began[static_cast<size_t>(thread)] = Clock::now();
+      float result = 0;
+      multiply_adds += MultiplyAddChains(kRounds, result);
+      benchmark::DoNotOptimize(result);
+    });
+    const std::chrono::duration<double> elapsed = Clock::now() - *std::ranges::min_element(began);
+    best = std::max(best, 2e-9 * static_cast<double>(multiply_adds) / elapsed.count());
+  }
+  return best;
+}
+
+/// Measures a case. Counters are rates: items and GFLOP per second.
 void Measure(benchmark::State& state, const BenchCase& c) {
   const BenchWork work = c.prepare();
   for ([[maybe_unused]] auto iteration : state) work();
@@ -26,14 +59,13 @@ void Measure(benchmark::State& state, const BenchCase& c) {
     if (amount > 0) state.counters[name] = {amount * calls, benchmark::Counter::kIsRate};
   };
   rate("items_per_second", c.count);
-  rate("bytes_per_second", c.bytes);
   rate("gflops", 1e-9 * c.flops);
 }
 
 /// The cases whose names begin as wanted. Throws BadInput if there is none for a name.
 BenchCases WantedCases(const BenchOptions& options) {
   BenchCases all;
-  for (const auto part : {KernelCases, GradientCases, ActCases, PhysicsCases, EnvCases}) {
+  for (const auto part : {GradientCases, ActCases, EnvCases}) {
     std::ranges::move(part(options), std::back_inserter(all));
   }
   const auto begins = [](const BenchCase& c, const std::string& name) {
@@ -42,8 +74,7 @@ BenchCases WantedCases(const BenchOptions& options) {
   for (const std::string& name : options.names) {
     if (std::ranges::any_of(all, [&](const BenchCase& c) { return begins(c, name); })) continue;
     throw BadInput(
-        Concat("bench: expected beginnings of names of cases, such as kernels, gradient, "
-               "act, physics or env, got \"",
+        Concat("bench: expected beginnings of names of cases, such as gradient, act or env, got \"",
                name, "\""));
   }
   std::erase_if(all, [&](const BenchCase& c) {
@@ -122,19 +153,17 @@ void AddBench(CommandLine& line) {
   line.Arguments(own);
   line.Footer(
       "Cases:\n"
-      "  kernels   layer products, Adam, transposition, memory bandwidth\n"
       "  gradient  updates of DQN: sample a minibatch and learn from it\n"
       "  act       actions of a policy\n"
-      "  physics   Runge-Kutta steps in MuJoCo and in closed form\n"
       "  env       environment steps: physics, observation, reward, reset\n"
       "\nGFLOP/s counts only the necessary multiplications and additions. The peak is measured\n"
       "first: multiply-adds in registers on the same number of threads. CPU time is the sum\n"
       "over all threads; other load affects it less than wall time.\n\n"
       "Examples:\n"
-      "  ./upswing bench                               everything, about a minute\n"
+      "  ./upswing bench                               everything, about half a minute\n"
       "  ./upswing bench gradient env --threads 1,2\n"
       "  ./upswing bench gradient/plain --hidden 256,256 --json rate.json\n"
-      "  ./upswing bench kernels --simd avx2 --seconds 1 --repetitions 5\n");
+      "  ./upswing bench gradient --simd avx2 --seconds 1 --repetitions 5\n");
 }
 
 constexpr Command kCommands[] = {{"bench", AddBench}};

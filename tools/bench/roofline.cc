@@ -1,7 +1,5 @@
 #include "tools/bench/roofline.h"
 
-#include <cassert>
-
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tools/bench/roofline.cc"
 #include <hwy/foreach_target.h>  // includes this file once per target
@@ -34,15 +32,6 @@ int64_t MultiplyAddChains(int64_t rounds, float& result) {
   return rounds * kChains * static_cast<int64_t>(hn::Lanes(d));
 }
 
-void Triad(std::span<const float> b, std::span<const float> c, float factor, std::span<float> a) {
-  const Floats d;
-  const Vec factors = hn::Set(d, factor);
-  for (size_t i = 0; i < a.size(); i += hn::Lanes(d)) {
-    const Vec sum = hn::MulAdd(factors, hn::LoadU(d, c.data() + i), hn::LoadU(d, b.data() + i));
-    hn::StoreU(sum, d, a.data() + i);
-  }
-}
-
 }  // namespace upswing::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -50,15 +39,9 @@ HWY_AFTER_NAMESPACE();
 namespace upswing {
 
 HWY_EXPORT(MultiplyAddChains);
-HWY_EXPORT(Triad);
 
 int64_t MultiplyAddChains(int64_t rounds, float& result) {
   return HWY_DYNAMIC_DISPATCH(MultiplyAddChains)(rounds, result);
-}
-
-void Triad(std::span<const float> b, std::span<const float> c, float factor, std::span<float> a) {
-  assert(a.size() % 16 == 0);  // 16 floats fill the widest vectors
-  HWY_DYNAMIC_DISPATCH(Triad)(b, c, factor, a);
 }
 
 }  // namespace upswing
