@@ -4,13 +4,10 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
-#include <limits>
 
 #include "agents/config_checks.h"
 #include "base/format.h"
-#include "base/sample.h"
 #include "base/text.h"
 #include "cli/progress.h"
 #include "cli/say.h"
@@ -20,22 +17,8 @@
 namespace upswing {
 namespace {
 
-constexpr size_t kMostRows = 50;  // per variant in the table
-constexpr double kNever = std::numeric_limits<double>::infinity();
-
-std::string CountOrDash(double value) { return std::isfinite(value) ? FormatCount(value) : "-"; }
-std::string DurationOrDash(double value) {
-  return std::isfinite(value) ? FormatDuration(value) : "-";
-}
-
-void PrintRow(const std::string& name, double step, double seconds, double success, double reward,
-              const std::string& remark) {
-  Say("  {:<12} {:>11}  {:>12}  {:>6.0f}%  {:>8.0f}{}{}\n", name, CountOrDash(step),
-      DurationOrDash(seconds), 100 * success, reward, remark.empty() ? "" : "  ", remark);
-}
-
-/// The printed view of many runs: a progress line, a line per finished run, a table. Signals stop
-/// the runs.
+/// The printed view of many runs: a progress line, and a line per finished run. Signals stop the
+/// runs.
 class ManyRunsView : public ManyRunsObserver {
  public:
   /// The plan must outlive the view.
@@ -82,21 +65,17 @@ class ManyRunsView : public ManyRunsObserver {
                             standing.left > 0 ? ", " + standing.time_left : ""));
   }
 
-  /// Prints all results and the next command to type.
+  /// If runs are left, prints how many are done and the next command to type.
   void Finish() override {
-    const bool stopped = StopSignal() != 0;
     line_.Clear();
-    for (const Variant& variant : many_.plan.variants) PrintTable(variant);
     const size_t done = Measure().done;
-    Say("\nSuccess and return: evaluation of each run's best policy.\n");
-    if (stopped) {
+    if (StopSignal() != 0) {
       Say("Stopped with {} of {} runs done; the same command resumes the others.\n", done,
           runs_->size());
     }
-    const bool can_be_typed = Printable(many_.plan.folder.string()) == many_.plan.folder.string();
-    if (can_be_typed && (done < runs_->size() || !many_.compared)) {
-      Say("Next:\n  {} compare {}{}\n", LaunchCommand(), ShellQuoted(many_.plan.folder.string()),
-          done < runs_->size() ? " --unfinished" : "");
+    const std::string folder = many_.plan.folder.string();
+    if (done < runs_->size() && Printable(folder) == folder) {
+      Say("Next:\n  {} compare {} --unfinished\n", LaunchCommand(), ShellQuoted(folder));
     }
     std::fflush(stdout);
   }
@@ -171,43 +150,6 @@ class ManyRunsView : public ManyRunsObserver {
     std::fflush(stdout);
   }
 
-  void PrintTable(const Variant& variant) const {
-    Say("\n{}\n", Printable(variant.name.empty() ? many_.what : variant.name));
-    std::vector<double> steps, seconds, success, reward;
-    int64_t solved = 0, not_judged = 0, failed = 0;
-    for (const SeedRun& run : *runs_) {
-      if (run.variant != &variant) continue;
-      if (!run.state || run.state->best_step == 0) {
-        ++(run.problem.empty() ? not_judged : failed);
-        continue;
-      }
-      if (steps.empty()) {
-        Say("  {:<12} {:>11}  {:>12}  {:>7}  {:>8}\n", "", "solved at", "after", "success",
-            "return");
-      }
-      const TrainState& s = *run.state;
-      solved += s.solved ? 1 : 0;
-      steps.push_back(s.solved ? static_cast<double>(s.streak_step) : kNever);
-      seconds.push_back(s.solved ? s.streak_seconds : kNever);
-      success.push_back(s.best_success_rate);
-      reward.push_back(s.best_return);
-      if (steps.size() > kMostRows) continue;
-      PrintRow(fmt::format("seed {}", run.seed), steps.back(), seconds.back(), success.back(),
-               reward.back(),
-               !run.problem.empty() ? "failed"
-               : run.finished       ? ""
-                                    : fmt::format("at step {}", FormatCount(s.steps)));
-    }
-    if (steps.size() > kMostRows) Say("  and {} more\n", steps.size() - kMostRows);
-    if (!steps.empty()) {
-      PrintRow("median", QuartilesOf(steps).median, QuartilesOf(seconds).median,
-               QuartilesOf(success).median, QuartilesOf(reward).median,
-               fmt::format("{} of {} solved", solved, steps.size()));
-    }
-    if (not_judged > 0) Say("  {} not evaluated yet\n", Counted(not_judged, "run"));
-    if (failed > 0) Say("  {} failed\n", Counted(failed, "run"));
-  }
-
   const ManyRuns& many_;
   ProgressLine line_;
   const std::vector<SeedRun>* runs_ = nullptr;
@@ -221,6 +163,14 @@ class ManyRunsView : public ManyRunsObserver {
 int TrainManyAndShow(const ManyRuns& many) {
   ManyRunsView view(many);
   return TrainMany(many, view);
+}
+
+Comparison CompareRuns(const StudyPlan& plan) {
+  CompareRequest request;
+  request.root = plan.folder;
+  request.different_tasks = true;
+  for (const SeedRun& run : RunsOf(plan)) request.paths.push_back(run.path);
+  return Compare(request);
 }
 
 }  // namespace upswing

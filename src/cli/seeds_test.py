@@ -57,9 +57,9 @@ class SeedsTest(ProgramTest):
         self.assertEqual(sorted(path.name for path in (self.folder / "runs/d3qn-small").iterdir()),
                          ["plan.json", "seed1", "seed1.done", "seed1.log", "seed2", "seed2.done",
                           "seed2.log", "settings.toml"])
-        self.assertIn("./upswing compare runs/d3qn-small\n", output)
+        self.assertRegex(output, r"\nd3qn-small\n  seeds +2 \(1-2\)\n")  # the comparison
 
-    def test_the_table_matches_the_runs(self):
+    def test_the_comparison_matches_the_runs(self):
         # Almost without gravity the pendulum stays where it stops, so it is solved soon.
         easy = {"gravity": 0.05, "damping": 1, "hidden": "64,64", "head": 32, "eval_episodes": 1,
                 "eval_every": 2000, "steps": 100000, "threads": None, "out": "easy"}
@@ -69,8 +69,8 @@ class SeedsTest(ProgramTest):
             info = self.succeed("info", f"easy/seed{seed}")
             step = re.search(r"solved +at step ([\d,]+), after", info)[1]
             solved[seed] = int(step.replace(",", ""))
-            self.assertRegex(output, rf"(?m)^  seed {seed} +{step}  .* +100% +-?\d+ *$")
-        self.assertRegex(output, rf"(?m)^  median +{sorted(solved.values())[1]:,} .* 3 of 3 solved")
+            self.assertRegex(output, rf"(?m)^  seed{seed} .* solved at {step} ")
+        self.assertRegex(output, rf"(?m)^  steps to solve +(median )?{sorted(solved.values())[1]:,} ?")
 
     def test_own_model_next_to_the_settings(self):
         self.write("own.xml", MODEL)
@@ -182,10 +182,8 @@ class SeedsTest(ProgramTest):
         failed = self.run_here(*small(**TINY | {"steps": 800}), "--seeds", 3)
         reason = f"many/seed1/{checkpoint.name}: not a valid safetensors file"
         self.assert_one_line(failed, 1, "1 of 3 runs in many failed", "seed1: " + reason)
-        # Reported before the others run, and listed in its place among them.
+        # Reported before the others run.
         self.assertRegex(failed.stdout, rf"(?m)\A.*\n.*\n.*already done.*\n  seed1 +failed: {reason}")
-        self.assertRegex(failed.stdout, r"(?m)^  1 run failed$")
-        self.assertNotIn("not evaluated yet", failed.stdout)
         self.assertIn("./upswing compare many --unfinished\n", failed.stdout)
         self.succeed(*small(**TINY | {"steps": 800, "out": "alone"}), "--seeds", "2-3")
         self.assert_same_runs("many", "alone", (2, 3))

@@ -61,7 +61,7 @@ ManyRuns ReadStudy(const StudyArguments& arguments) {
   many.what = study.title.empty() ? file.stem().string() : Concat("\"", study.title, "\"");
   many.mark_file = kStudyName;
   many.mark_text = text;
-  many.more_steps = many.compared = true;
+  many.more_steps = true;
   StudyPlan& plan = many.plan;
   plan.folder = arguments.folder();
   plan.variants = std::move(study.variants);
@@ -84,11 +84,7 @@ ManyRuns ReadStudy(const StudyArguments& arguments) {
 
 /// Compares the finished runs of a study.
 int CompareStudy(const StudyPlan& plan) {
-  CompareRequest request;
-  request.root = plan.folder;
-  request.different_tasks = true;
-  for (const SeedRun& run : RunsOf(plan)) request.paths.push_back(run.path);
-  const Comparison comparison = Compare(request);
+  const Comparison comparison = CompareRuns(plan);
   const std::vector<std::string> files = WriteComparison(comparison, plan.folder);
   WriteEvaluations(plan);
   Say("All evaluations of all runs: evaluations.csv\n");

@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "cli/commands.h"
+#include "cli/compare_report.h"
 #include "cli/many_runs_view.h"
 #include "cli/signals.h"
 #include "cli/train_view.h"
@@ -53,7 +54,9 @@ int RunSeeds(const TrainArguments& arguments) {
   many.jobs = arguments.jobs > 0 ? arguments.jobs : DefaultJobs(config.train.threads);
   many.more_steps = StepsGiven(arguments.flags);
   CheckMemory(config, AvailableMemory(), many.jobs);
-  return TrainManyAndShow(many);
+  const int exit_code = TrainManyAndShow(many);
+  if (exit_code == 0) PrintComparison(CompareRuns(plan));
+  return exit_code;
 }
 
 /// Prints the settings that the training would use.

@@ -18,7 +18,6 @@ struct ManyRuns {
   std::string mark_file, mark_text;  // file that marks the folder; empty: settings.toml
   int64_t jobs = 1;                  // simultaneous runs
   bool more_steps = false;           // whether runs with fewer steps may be resumed
-  bool compared = false;             // whether a comparison follows when all runs are done
 };
 
 /// Observer of many runs. It also says when to stop.
