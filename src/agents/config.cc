@@ -101,7 +101,7 @@ EnvConfig Config::Environments() const {
   env.memory = static_cast<int>(memory);
   if (identify) env.identified_from = plant;
   env.start = {train.start_noise, random_start_share, random_start_velocity};
-  env.weights = reward;
+  env.reward = reward;
   env.seed = static_cast<uint64_t>(train.seed);
   env.stream = "training environment";
   env.mjcf = mjcf;

@@ -43,7 +43,7 @@ struct Config {
   Plant plant;
   Disturbance disturbance;
   Randomization randomization;
-  RewardWeights reward;
+  RewardConfig reward;
   DqnConfig dqn;
   SacConfig sac;
   PpoConfig ppo;

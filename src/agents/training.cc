@@ -78,7 +78,7 @@ EnvConfig EvaluationEnvironments(const Config& config, int64_t step) {
   env.num_envs = static_cast<int>(config.train.eval_episodes);
   env.episode_seconds = SpecOf(env).evaluation.seconds;
   env.start = StartStates();
-  env.weights = RewardWeights();
+  env.reward = RewardConfig();
   env.stream = Concat("evaluation at step ", step);
   env.for_evaluation = true;
   return env;

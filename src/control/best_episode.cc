@@ -26,8 +26,8 @@ constexpr int kChanges = 100;  // largest number of changes of single torques
 
 /// Reward weights with which the return grows with the time upright. Small energy and height terms
 /// guide the search.
-RewardWeights WeightsOf(Aim aim) {
-  RewardWeights weights;
+RewardConfig WeightsOf(Aim aim) {
+  RewardConfig weights;
   if (aim == Aim::kTime) weights.weight = {0.02, 0.02, 1, 0, 0};
   return weights;
 }
@@ -77,7 +77,7 @@ double BestEpisodeSearch::Hold(const StateVector& deviation, const TorqueTable& 
   return Nearest(upright_.lqr().Torque(deviation), table);
 }
 
-Trajectory BestEpisodeSearch::Sharpen(const Trajectory& trajectory, const RewardWeights& weights) {
+Trajectory BestEpisodeSearch::Sharpen(const Trajectory& trajectory, const RewardConfig& weights) {
   Trajectory now = trajectory, best = trajectory;
   double most = Judge(trajectory.x[0], trajectory.u, {}, weights).reward_sum;
   for (const double width : kWidths) {
@@ -93,7 +93,7 @@ Trajectory BestEpisodeSearch::Sharpen(const Trajectory& trajectory, const Reward
 std::vector<BestEpisode> BestEpisodeSearch::Judge(const StateVector& start,
                                                   std::span<const std::vector<double>> torques,
                                                   const TorqueTable& table,
-                                                  const RewardWeights& weights) {
+                                                  const RewardConfig& weights) {
   std::vector<BestEpisode> episodes;
   for (const auto& sequence : torques) episodes.push_back({start, sequence});
   std::vector<StateVector> x(torques.size(), start);
@@ -142,7 +142,7 @@ BestEpisode BestEpisodeSearch::Polish(BestEpisode episode, const TorqueTable& ta
       }
     }
     bool better = false;
-    for (BestEpisode& other : Judge(episode.start, changed, table, RewardWeights())) {
+    for (BestEpisode& other : Judge(episode.start, changed, table, RewardConfig())) {
       if (!IsBetter(other, episode, aim)) continue;
       episode = std::move(other);
       better = true;

@@ -53,13 +53,13 @@ class BestEpisodeSearch {
 
  private:
   /// Improves the return, by these weights, of a trajectory that swings up.
-  Trajectory Sharpen(const Trajectory& trajectory, const RewardWeights& weights);
+  Trajectory Sharpen(const Trajectory& trajectory, const RewardConfig& weights);
   /// Simulates one episode for each sequence of torques, all from one start.
   std::vector<BestEpisode> Judge(const StateVector& start,
                                  std::span<const std::vector<double>> torques,
-                                 const TorqueTable& table, const RewardWeights& weights);
+                                 const TorqueTable& table, const RewardConfig& weights);
   BestEpisode Judge(const StateVector& start, const std::vector<double>& torques,
-                    const TorqueTable& table = {}, const RewardWeights& weights = {}) {
+                    const TorqueTable& table = {}, const RewardConfig& weights = {}) {
     return Judge(start, {&torques, 1}, table, weights)[0];
   }
   /// The trajectory's episode, rounded to the torques of the table.

@@ -12,7 +12,7 @@ namespace upswing {
 /// left out. A step's reward is that of its first state.
 class RewardCost : public TrajectoryCost {
  public:
-  RewardCost(const Plant& plant, const RewardWeights& weights, double width)
+  RewardCost(const Plant& plant, const RewardConfig& weights, double width)
       : plant_(plant), weights_(weights), width_(width) {}
 
   double Running(const StateVector& x, double u) const override;
@@ -26,7 +26,7 @@ class RewardCost : public TrajectoryCost {
   double Inversion(const StateVector& x) const;
 
   Plant plant_;
-  RewardWeights weights_;
+  RewardConfig weights_;
   double width_;
 };
 

@@ -202,7 +202,7 @@ TEST(ClosedForm, JudgesAsTheFormulasDo) {
     batch.angle_before[i] = MotorAngle(plants[i], s) - rng.Uniform(-0.1, 0.1);
   }
   batch.SetTorque(torque);
-  RewardWeights weights;
+  RewardConfig weights;
   weights.weight = {1, 0.5, 2, 3, 0.25};
   OnEachPath([&](const std::string&) {
     StepResult result = ResultOf(kTrials);
@@ -243,7 +243,7 @@ TEST(ClosedForm, PlaceAndNumberOfEnvironmentsChangeNoBit) {
     plants[i].damping1 = rng.Uniform(0, 1);
     states[i] = RandomState(rng);
   }
-  const RewardWeights weights;
+  const RewardConfig weights;
   // Environments `first` to `last` of the batch, after ten control periods.
   const auto run = [&](size_t first, size_t last) {
     const size_t n = last - first;
@@ -298,7 +298,7 @@ TEST(ClosedForm, NaNAndNumbersBeyondMuJoCosLimitAreBlowUps) {
   for (size_t i = 0; i < states.size(); ++i) batch.SetState(i, states[i]);
   OnEachPath([&](const std::string&) {
     StepResult result = ResultOf(static_cast<int>(states.size()));
-    Judge(batch, RewardWeights(), 0, states.size(), result);
+    Judge(batch, RewardConfig(), 0, states.size(), result);
     EXPECT_EQ(result.terminated, expected);
   });
 }

@@ -198,7 +198,7 @@ void MuJoCoPhysics::Judge(int env, double torque, StepResult& result) const {
   std::ranges::copy(RewardTerms(plant, s, tau), terms.begin());
   result.reward[i] = 0;
   for (size_t k = 0; k < kRewardTerms; ++k) {
-    terms[k] *= config_.weights.weight[k];
+    terms[k] *= config_.reward.weight[k];
     result.reward[i] += terms[k];
   }
   result.at_goal[i] = Inverted(s) ? 1 : 0;

@@ -180,7 +180,7 @@ TEST_P(PendulumEnvs, ABlowUpTerminatesWithFiniteNumbersAndStartsAgain) {
 
 TEST_P(PendulumEnvs, RewardIsTheWeightedSumOfItsTermsAtTheSuccessor) {
   PendulumEnvConfig config = SmallConfig();
-  config.weights.weight = {1, 0.5, 2, 3, 0};
+  config.reward.weight = {1, 0.5, 2, 3, 0};
   PendulumEnv env(config);
   StepResult result = env.MakeResult();
   env.SetState(0, {std::numbers::pi, 0, 1, 1});
@@ -188,7 +188,7 @@ TEST_P(PendulumEnvs, RewardIsTheWeightedSumOfItsTermsAtTheSuccessor) {
   const auto terms = RewardTerms(env.plant(0), env.state(0), 5);
   double sum = 0;
   for (size_t k = 0; k < kRewardTerms; ++k) {
-    EXPECT_NEAR(result.reward_terms[k], config.weights.weight[k] * terms[k], 1e-13);
+    EXPECT_NEAR(result.reward_terms[k], config.reward.weight[k] * terms[k], 1e-13);
     sum += result.reward_terms[k];
   }
   EXPECT_DOUBLE_EQ(result.reward[0], sum);

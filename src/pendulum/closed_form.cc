@@ -264,7 +264,7 @@ HWY_INLINE void JudgeObservation(const Pose& pose, const State& x, Verdict& verd
   }
 }
 
-HWY_INLINE void JudgeReward(const Pose& pose, const State& x, V tau, const RewardWeights& weights,
+HWY_INLINE void JudgeReward(const Pose& pose, const State& x, V tau, const RewardConfig& weights,
                             Verdict& verdict) {
   const V minus_cos30 = Constant(-std::numbers::sqrt3 / 2);
   const auto inverted = hn::And(hn::Le(pose.q1.c, minus_cos30), hn::Le(pose.c12, minus_cos30));
@@ -297,7 +297,7 @@ HWY_INLINE hn::Mask<D> IsSound(const State& x) {
 }
 
 /// Observe, RewardTerms and Inverted of task.h for one vector of environments from `i`.
-HWY_INLINE void JudgeVector(const ClosedFormBatch& batch, const RewardWeights& weights, size_t i,
+HWY_INLINE void JudgeVector(const ClosedFormBatch& batch, const RewardConfig& weights, size_t i,
                             Verdict& verdict) {
   const State x = LoadState(batch, i);
   const V tau = LoadFrom(batch.tau, i);
@@ -309,7 +309,7 @@ HWY_INLINE void JudgeVector(const ClosedFormBatch& batch, const RewardWeights& w
   hn::Store(hn::IfThenElse(IsSound(x), Constant(0), Constant(1)), kDoubles, verdict.blew_up);
 }
 
-void JudgeRange(const ClosedFormBatch& batch, const RewardWeights& weights, size_t first,
+void JudgeRange(const ClosedFormBatch& batch, const RewardConfig& weights, size_t first,
                 size_t last, StepResult& result) {
   const size_t lanes = hn::Lanes(kDoubles);
   Verdict verdict;
@@ -414,7 +414,7 @@ void Advance(ClosedFormBatch& batch, int steps, size_t first, size_t last, doubl
   HWY_DYNAMIC_DISPATCH(AdvanceRange)(batch, steps, first, last, timestep);
 }
 
-void Judge(const ClosedFormBatch& batch, const RewardWeights& weights, size_t first, size_t last,
+void Judge(const ClosedFormBatch& batch, const RewardConfig& weights, size_t first, size_t last,
            StepResult& result) {
   HWY_DYNAMIC_DISPATCH(JudgeRange)(batch, weights, first, last, result);
 }

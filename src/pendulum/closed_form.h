@@ -67,7 +67,7 @@ void Advance(ClosedFormBatch& batch, int steps, size_t first, size_t last,
 /// Fills `result`, except `truncated`, from the states with the formulas of Observe, RewardTerms
 /// and Inverted. A state that is not finite, or beyond MuJoCo's limit of 1e10, has terminated; its
 /// other results have no meaning.
-void Judge(const ClosedFormBatch& batch, const RewardWeights& weights, size_t first, size_t last,
+void Judge(const ClosedFormBatch& batch, const RewardConfig& weights, size_t first, size_t last,
            StepResult& result);
 
 /// Sine and cosine of x (n), rad, within 2 ulp for |x| ≤ 1e6. Source: fdlibm's k_sin.c and k_cos.c.

@@ -14,7 +14,7 @@ class ClosedFormPhysics : public Physics {
  public:
   explicit ClosedFormPhysics(const PhysicsConfig& config)
       : num_envs_(static_cast<size_t>(config.num_envs)),
-        weights_(config.weights),
+        weights_(config.reward),
         batch_(num_envs_),
         pool_(config.pool) {
     for (int env = 0; env < config.num_envs; ++env) SetPlant(env, config.plant(env));
@@ -48,7 +48,7 @@ class ClosedFormPhysics : public Physics {
 
  private:
   size_t num_envs_;
-  RewardWeights weights_;
+  RewardConfig weights_;
   ClosedFormBatch batch_;
   ThreadPool* pool_;
 };

@@ -47,7 +47,7 @@ struct PhysicsConfig {
   const Engine* engine = &kClosedForm;
   std::vector<Plant> plants = std::vector<Plant>(1);  // one for all environments, or one for each
   int num_envs = 1;
-  RewardWeights weights;
+  RewardConfig reward;
   std::string mjcf;            // replaces the built-in model if not empty; see LoadModel
   ThreadPool* pool = nullptr;  // runs the work in parallel; results have the same bits
 

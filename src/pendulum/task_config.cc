@@ -2,7 +2,7 @@
 
 namespace upswing {
 
-void RewardWeights::Describe(Options& o) {
+void RewardConfig::Describe(Options& o) {
   constexpr Range kWeight{0, 1000};
   auto& [energy, height, balance, velocity, torque] = weight;
   o.Section("reward");

@@ -8,7 +8,7 @@
 namespace upswing {
 
 /// Weights of the reward's terms; 0 leaves a term out.
-struct RewardWeights {
+struct RewardConfig {
   std::array<double, kRewardTerms> weight{1, 1, 1, 1, 1};
 
   /// Declares each setting in `options`: name, range, unit, help.
