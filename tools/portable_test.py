@@ -30,12 +30,14 @@ ALLOWED = {
         r"free",
     "numbers":
         r"(a?(sin|cos|tan)h?|sincos|atan2|exp(2|m1)?|log(2|10|1p)?|pow|sqrt|cbrt|hypot|erfc?|fmod|"
-        r"remainder|floor|ceil|l?l?round|nearbyint|rint|trunc|fmin|fmax|copysign|lgamma)f?|"
+        r"remainder|floor|ceil|l?l?round|nearbyint|rint|trunc|fabs|fma|fmin|fmax|copysign|lgamma)f?|"
         r"__(mul|div)[sd]c3|c(abs|exp|log|sqrt)f?",
     "threads: std::mutex, and waiting by std::atomic (on Linux the system call futex)":
         r"pthread_\w+|sched_yield|syscall",
     "toml++, whose parser of text is a shared library":
         r"(typeinfo for |vtable for )?toml::.*",
+    "muParser, the parser of rewards":
+        r"(typeinfo for |vtable for )?mu::.*",
     "Highway: the processor's vector instructions, and error messages":
         r"hwy::.*",
     "assertions, in some builds":

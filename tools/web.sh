@@ -90,8 +90,8 @@ set_up_chromium() {
 set_up_wasm() {
   [ "${UPSWING_COMPILE_WASM:-}" = 1 ] ||
     ! python3 -B "$root/web/wasm/build.py" --check 2>/dev/null || return 0
-  for name in zig highway; do
-    version=$(sed -n 's/^[a-z]*==\([0-9.]*\).*/\1/p' "$root/tools/$name-requirements.txt")
+  for name in zig highway muparser; do
+    version=$(sed -n 's/^[a-z]*\(==\| @ .*_\)\([0-9.]*[0-9]\).*/\2/p' "$root/tools/$name-requirements.txt")
     "$root/tools/fetch_wheel" $name "$root/build/deps/$name-$version" </dev/null || exit 1
   done
 }

@@ -41,6 +41,7 @@ void CheckSettings(Config& config, const std::string& where) {
   try {
     config.learner().Check(config.train.envs);
     (void)config.randomization.MakePosterior();  // throws if there is none to draw from
+    if (!config.reward.expression.empty()) (void)OwnReward(config.reward.expression);
   } catch (const Error& error) {
     throw BadInput(Concat(where, where.empty() ? "" : ": ", error.what()));
   }
@@ -52,7 +53,9 @@ std::vector<std::string> Warnings(const Config& config) {
   const int64_t envs = config.train.envs;
   const int64_t steps = (config.train.steps + envs - 1) / envs * envs;
   std::vector<std::string> warnings = config.learner().Warnings(steps, envs);
-  if (std::ranges::all_of(config.reward.weight, [](double weight) { return weight == 0; })) {
+  const bool built_in = config.reward.expression.empty();
+  if (built_in &&
+      std::ranges::all_of(config.reward.weight, [](double weight) { return weight == 0; })) {
     warnings.emplace_back("every reward weight is 0: the agent learns nothing");
   }
   return warnings;

@@ -8,6 +8,9 @@
 #include <numbers>
 
 #include "base/error.h"
+#include "base/rng.h"
+#include "base/testing.h"
+#include "base/text.h"
 #include "mujoco/testing.h"
 #include "pendulum/mjcf.h"
 
@@ -176,6 +179,61 @@ TEST_P(PendulumEnvs, ABlowUpTerminatesWithFiniteNumbersAndStartsAgain) {
   EXPECT_LT(std::abs(env.state(1).w1), 1);
   env.Step(std::vector<double>{0, 0, 0}, result);
   EXPECT_EQ(result.terminated[1], 0);
+}
+
+TEST_P(PendulumEnvs, ThePostsRewardAsAnExpressionHasTheSameBits) {
+  // The closed form fuses the multiply-add of the squared velocities.
+  const bool fused = GetParam() == &kClosedForm;
+  PendulumEnvConfig config = SmallConfig();
+  config.num_envs = 40;
+  config.start.random_share = 1;
+  PendulumEnv usual(config);
+  config.reward.weight = {0, 0, 0, 0, 2};  // without effect on an expression
+  config.reward.expression =
+      Concat("E; h; 5*inverted; -0.01*inverted*", fused ? "fma(w1, w1, w2*w2)" : "(w1*w1 + w2*w2)",
+             "; -(0.01 + 0.04*inverted)*tau*tau");
+  PendulumEnv own(config);
+  EXPECT_EQ(own.spec().term_names.back(), "term5");
+  StepResult expected = usual.MakeResult(), result = own.MakeResult();
+  Rng rng(1, "torques");
+  std::vector<double> torque(40);
+  int inverted = 0;
+  for (int step = 0; step < 200; ++step) {
+    for (double& x : torque) x = rng.Uniform(-7, 7);
+    usual.Step(torque, expected);
+    own.Step(torque, result);
+    EXPECT_EQ(result.reward, expected.reward);
+    EXPECT_EQ(result.reward_terms, expected.reward_terms);
+    EXPECT_EQ(result.next_obs, expected.next_obs);
+    inverted += static_cast<int>(std::ranges::count(result.at_goal, 1));
+  }
+  EXPECT_GT(inverted, 0);
+}
+
+TEST_P(PendulumEnvs, AnExpressionRemembersUntilTheEpisodeEnds) {
+  PendulumEnvConfig config = SmallConfig();
+  config.reward.expression = "dtau; pull: tau; 100*upright";
+  PendulumEnv env(config), other(config);
+  StepResult result = env.MakeResult();
+  env.SetState(0, {std::numbers::pi, 0, 0, 0});
+  env.Step(std::vector<double>{1, 1, 1}, result);
+  env.SetState(1, PendulumState());
+  env.Hold(2);
+  env.Step(std::vector<double>{3, 3, 3}, result);
+  EXPECT_EQ(result.reward_terms, (std::vector<double>{2, 3, 4, 3, 3, 0, 0, 0, 0}));
+  // A set of environments that loads the state goes on alike; the held one was left as it was.
+  SaveAndLoad([&](const Archive& archive) { env.State(archive); },
+              [&](const Archive& archive) { other.State(archive); });
+  other.Step(std::vector<double>{4, 4, 4}, result);
+  EXPECT_EQ(result.reward_terms, (std::vector<double>{1, 4, 6, 1, 4, 0, 3, 4, 0}));
+  env.Step(std::vector<double>{0, 0, 0}, result);
+  env.SetState(0, {0, 0, 1e200, 0});
+  env.Step(std::vector<double>{0, 0, 0}, result);  // blows up
+  EXPECT_EQ(result.terminated[0], 1);
+  EXPECT_EQ(result.reward[0], 0);
+  EXPECT_EQ(result.reward_terms[2], 0);
+  env.Step(std::vector<double>{2, 2, 2}, result);
+  EXPECT_EQ(result.reward_terms[0], 2);
 }
 
 TEST_P(PendulumEnvs, RewardIsTheWeightedSumOfItsTermsAtTheSuccessor) {

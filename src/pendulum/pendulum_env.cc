@@ -27,6 +27,13 @@ std::optional<Disturber> MakeDisturber(const PendulumEnvConfig& config) {
                    NoiseStream(config.stream), config.first_index);
 }
 
+/// The settings of the physics, which judges by the built-in terms that an expression may use.
+PhysicsConfig PhysicsOf(const PendulumEnvConfig& config) {
+  PhysicsConfig physics = config;
+  if (!config.reward.expression.empty()) physics.reward = RewardConfig();
+  return physics;
+}
+
 }  // namespace
 
 EnvSpec PendulumSpec(const PendulumEnvConfig& config) {
@@ -38,6 +45,8 @@ EnvSpec PendulumSpec(const PendulumEnvConfig& config) {
   spec.action_limit = {config.plant(0).torque_limit};
   spec.step_seconds = kControlPeriod;
   spec.term_names = {kRewardTermNames.begin(), kRewardTermNames.end()};
+  const std::string& reward = config.reward.expression;
+  if (!reward.empty()) spec.term_names = OwnReward(reward).names();
   spec.state_names = {"q1", "q2", "w1", "w2"};
   spec.state_units = {"rad", "rad", "rad/s", "rad/s"};
   spec.mirror_signs = {kMirrorSigns.begin(), kMirrorSigns.end()};
@@ -54,13 +63,15 @@ EnvSpec PendulumSpec(const PendulumEnvConfig& config) {
 PendulumEnv::PendulumEnv(const PendulumEnvConfig& config)
     : config_(config),
       spec_(PendulumSpec(config)),
-      physics_(config.engine->make(config)),
+      physics_(config.engine->make(PhysicsOf(config))),
       episode_steps_(std::max<int64_t>(1, std::llround(config_.episode_seconds / kControlPeriod))),
       disturber_(MakeDisturber(config)),
       posterior_(config.randomization.MakePosterior()),
       builder_(config.num_envs, config.memory, config.identified_from),
       exact_(!disturber_ && !config.assumed_plant && !config.identified_from) {
   const auto n = static_cast<size_t>(config_.num_envs);
+  const std::string& reward = config.reward.expression;
+  if (!reward.empty()) reward_ = std::make_unique<OwnReward>(reward, config.num_envs);
   step_counts_.resize(n);
   obs_.resize(n * static_cast<size_t>(spec_.obs_size));
   if (config_.randomization.any()) plants_.resize(n);
@@ -96,6 +107,7 @@ void PendulumEnv::SetState(int env, const PendulumState& s) {
   physics_->SetState(env, s);
   step_counts_[static_cast<size_t>(env)] = 0;
   if (disturber_) disturber_->Begin(env, s);
+  if (reward_) reward_->Begin(env);
   builder_.Begin(env, ObservedPlant(env), Measure(env, 0).state, Row(obs_, env));
 }
 
@@ -161,8 +173,11 @@ void PendulumEnv::Hold(int env) {
 }
 
 void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
+  if (reward_) reward_->SwapTerms(result);
   physics_->Step(Actuate(torque), result);
+  if (reward_) reward_->SwapTerms(result);
   RestoreHeld(result);
+  JudgeByOwnReward(result);
   ObserveSuccessors(torque, result);
   KeepTime(result);
   StandIn(result);
@@ -179,6 +194,13 @@ void PendulumEnv::RestoreHeld(StepResult& result) {
     physics_->SetState(static_cast<int>(i), *held_[i]);
     if (disturber_) disturber_->Undo(static_cast<int>(i), step_counts_[i]);
     result.terminated[i] = 0;
+  }
+}
+
+void PendulumEnv::JudgeByOwnReward(StepResult& result) {
+  for (int env = 0; reward_ && env < config_.num_envs; ++env) {
+    if (IsHeld(env) || result.terminated[static_cast<size_t>(env)]) continue;
+    reward_->Judge(env, plant(env), state(env), result);
   }
 }
 
@@ -209,11 +231,12 @@ void PendulumEnv::KeepTime(StepResult& result) {
 }
 
 void PendulumEnv::StandIn(StepResult& result) const {
+  const size_t K = spec_.term_names.size();
   for (int env = 0; env < config_.num_envs; ++env) {
     const auto i = static_cast<size_t>(env);
     if (!IsHeld(env) && !result.terminated[i]) continue;
     std::ranges::copy(Row(obs_, env), Row(result.next_obs, env).begin());
-    std::ranges::fill(std::span(result.reward_terms).subspan(i * kRewardTerms, kRewardTerms), 0.0);
+    std::ranges::fill(std::span(result.reward_terms).subspan(i * K, K), 0.0);
     result.reward[i] = 0;
     result.at_goal[i] = 0;
     result.torque[i] = 0;
@@ -243,6 +266,7 @@ void PendulumEnv::State(const Archive& archive) {
   archive.Array("obs", std::span(obs_));
   archive.Scalar("start_noise", config_.start.noise, {0, 10});
   if (disturber_) disturber_->State(archive.In("disturbance"));
+  if (reward_) reward_->State(archive.In("reward"));
   builder_.State(archive);
   for (size_t i = 0; i < rngs_.size(); ++i) rngs_[i].State(archive.In(Concat("rng.", i)));
 }

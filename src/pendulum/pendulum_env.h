@@ -12,6 +12,7 @@
 #include "base/rng.h"
 #include "pendulum/disturbance.h"
 #include "pendulum/observation.h"
+#include "pendulum/own_reward.h"
 #include "pendulum/physics.h"
 #include "pendulum/randomization.h"
 #include "pendulum/task.h"
@@ -110,6 +111,8 @@ class PendulumEnv : public VectorEnv {
   void ObserveSuccessors(std::span<const double> chosen, StepResult& result);
   /// Counts the steps of the episodes and truncates those whose time is up.
   void KeepTime(StepResult& result);
+  /// Replaces the built-in reward by the expression of the settings.
+  void JudgeByOwnReward(StepResult& result);
   /// Puts held environments back into their states.
   void RestoreHeld(StepResult& result);
   /// Replaces the results of steps that blew up or were held back: the successor by the last
@@ -140,6 +143,7 @@ class PendulumEnv : public VectorEnv {
   int64_t episode_steps_;
   std::optional<Disturber> disturber_;  // none if sensors and motors are perfect
   std::optional<Posterior> posterior_;  // if plants and sensors are drawn from it
+  std::unique_ptr<OwnReward> reward_;   // if the settings have an expression
   std::vector<Rng> rngs_;               // (N)
   // Only with randomised plants, else empty:
   std::vector<Plant> plants_;         // (N) plants of the running episodes

@@ -11,6 +11,11 @@ void RewardConfig::Describe(Options& o) {
   o.Add(&balance, "balance_weight", kWeight, "", "reward weight of the balance term");
   o.Add(&velocity, "velocity_weight", kWeight, "", "reward weight of the velocity penalty");
   o.Add(&torque, "torque_weight", kWeight, "", "reward weight of the torque penalty");
+  Option& own = o.Add(&expression, "reward",
+                      "reward of the training as an expression, such as \"E + h + 5*inverted\", in "
+                      "place of the built-in reward and its weights");
+  own.implied = true;
+  own.usual = "the built-in reward";
 }
 
 }  // namespace upswing

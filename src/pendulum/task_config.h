@@ -1,15 +1,18 @@
 #pragma once
 
 #include <array>
+#include <string>
 
 #include "base/options.h"
 #include "pendulum/task.h"
 
 namespace upswing {
 
-/// Weights of the reward's terms; 0 leaves a term out.
+/// The reward: the weights of the built-in terms, 0 leaves a term out; or an expression of your own
+/// in their place (see OwnReward).
 struct RewardConfig {
   std::array<double, kRewardTerms> weight{1, 1, 1, 1, 1};
+  std::string expression;  // empty: the built-in terms
 
   /// Declares each setting in `options`: name, range, unit, help.
   void Describe(Options& options);

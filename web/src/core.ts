@@ -82,6 +82,8 @@ export class Core {
         return 0;
       },
       fd_close: () => EBADF,
+      fd_fdstat_get: () => EBADF,
+      fd_read: () => EBADF,
       fd_seek: () => EBADF,
       fd_write: () => EBADF,
       proc_exit: (code: number) => {

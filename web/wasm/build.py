@@ -29,11 +29,12 @@ WORK = ROOT / "build/wasm"
 def pinned(name):
     """The version in tools/NAME-requirements.txt."""
     text = (ROOT / f"tools/{name}-requirements.txt").read_text(encoding="utf-8")
-    return re.search(r"==([0-9.]+)", text)[1]
+    return re.search(r"(?:==| @ .*_)(\d[\d.]*\d)", text)[1]
 
 
 ZIG = DEPS / f"zig-{pinned('zig')}"
 HIGHWAY = DEPS / f"highway-{pinned('highway')}"  # the version of NumPy that it comes with
+MUPARSER = DEPS / f"muparser-{pinned('muparser')}"
 
 # Vectors of 128 bits, exceptions, and features of all browsers with those.
 TARGET = ["-target", "wasm32-wasi", "-mcpu=generic+simd128+exception_handling+bulk_memory"
@@ -47,6 +48,9 @@ LAYERS = ["base", "nn", "pendulum", "rl", "control", "agents"]
 FAST = ["nn/linear", "nn/product", "pendulum/closed_form", "control/trajectory", "control/pendulum_model", "rl/replay", "rl/sum_tree", "rl/n_step",
         "rl/sac_update"]
 
+# The needed sources of muParser.
+PARSER = ["", "Base", "Bytecode", "Callback", "Error", "TokenReader"]
+
 # The needed sources of LLVM's libraries.
 CXXABI = ["abort_message", "cxa_aux_runtime", "cxa_default_handlers", "cxa_exception",
           "cxa_exception_storage", "cxa_guard", "cxa_handlers", "cxa_personality", "cxa_virtual",
@@ -55,6 +59,7 @@ CXXABI = ["abort_message", "cxa_aux_runtime", "cxa_default_handlers", "cxa_excep
 CXX = ["algorithm", "call_once", "charconv", "chrono", "error_category", "exception", "functional",
        "hash", "memory", "new", "new_handler", "new_helpers",
        "stdexcept", "string", "system_error", "variant", "vector", "verbose_abort",
+       "ios", "ios.instantiations", "locale", "ostream", "iostream",
        "ryu/d2s", "ryu/f2s", "filesystem/path"]
 
 # The tag by which throw and catch find each other. Clang expects it in the run-time library.
@@ -99,7 +104,7 @@ def versions():
     json = [f"NLOHMANN_JSON_VERSION_{part}" for part in ("MAJOR", "MINOR", "PATCH")]
     toml = [f"TOML_LIB_{part}" for part in ("MAJOR", "MINOR", "PATCH")]
     abi = Path("/usr/include/nlohmann/detail/abi_macros.hpp")
-    found = {"zig": pinned("zig"), "highway of numpy": pinned("highway"),
+    found = {"zig": pinned("zig"), "highway of numpy": pinned("highway"), "muparser": pinned("muparser"),
              "nlohmann-json": of("nlohmann/detail/abi_macros.hpp" if abi.exists()
                                  else "nlohmann/json.hpp", *json),
              "toml++": of("toml++/impl/version.h", *toml)}
@@ -127,7 +132,7 @@ def sources_hash():
                  Path(__file__).resolve()]:
         data = path.read_bytes()
         text.update(f"{path.relative_to(ROOT)} {len(data)}\n".encode() + data)
-    text.update(" ".join(map(str, (project_version(), ZIG.name, HIGHWAY.name))).encode())
+    text.update(" ".join(map(str, (project_version(), ZIG.name, HIGHWAY.name, MUPARSER.name))).encode())
     return text.hexdigest()
 
 
@@ -191,9 +196,12 @@ def jobs():
     own = ["-std=c++20", "-Wall", "-Wextra", "-Wpedantic", "-ffp-contract=off",
            "-DTOML_FLOAT_CHARCONV=1", f'-DUPSWING_VERSION="{project_version()}"',
            "-U_LIBCPP_HAS_FILESYSTEM", "-D_LIBCPP_HAS_FILESYSTEM=1", *include(SOURCE, ROOT),
-           *(f"-isystem{folder}" for folder in (headers, HIGHWAY))]
+           *(f"-isystem{folder}" for folder in (headers, HIGHWAY, MUPARSER / "include"))]
     for source in [*own_sources(), agents]:
         yield source, [*own, "-O3" if f"{source.parent.name}/{source.stem}" in FAST else "-Oz"]
+    for name in PARSER:
+        yield (MUPARSER / f"src/muParser{name}.cpp",
+               ["-std=c++20", "-Oz", "-w", "-ffp-contract=off", f"-I{MUPARSER / 'include'}"])
     cxx = ["-std=c++23", "-Oz", "-w", "-D_LIBCPP_BUILDING_LIBRARY", "-D_LIBCXXABI_BUILDING_LIBRARY",
            "-DLIBCXX_BUILDING_LIBCXXABI", "-DLIBCXXABI_SILENT_TERMINATE",
            "-D_LIBCXXABI_HAS_NO_THREADS",
@@ -210,7 +218,7 @@ def jobs():
 
 def make(module):
     """Writes the module and its record."""
-    for folder in (ZIG, HIGHWAY):
+    for folder in (ZIG, HIGHWAY, MUPARSER):
         if not folder.exists():
             sys.exit(f"build.py: {folder} is missing: ./upswing test installs it")
     WORK.mkdir(parents=True, exist_ok=True)

@@ -5,6 +5,7 @@ import { Core, core } from '../core';
 import { Policy } from '../policy';
 import { BadInput } from '../bad_input';
 import { agentSettings, Learner } from './learner';
+import type { LearnSettings } from './learner';
 
 const newCore = async () => Core.start(await coreModule());
 /// The tensors of a policy file. The header before them also lists settings, whose number grows;
@@ -76,6 +77,26 @@ test('a training that diverges ends with a reason, and its core goes on', async 
   }).toThrow("the gradient's norm is inf, expected a finite number");
   learner.close();
   expect(new Learner(host, 'fast', 1).run(1)).toBe(true);
+});
+
+test('a training by a reward of your own', () => {
+  const learn = (settings: LearnSettings) => {
+    const learner = new Learner(core(), 'fast', 1, { learning_starts: '256', ...settings });
+    learner.run(20);
+    const policy = new Uint8Array(learner.policy().slice(-4000)); // the numbers, not the settings
+    learner.close();
+    return policy;
+  };
+  const post =
+    'E; h; 5*inverted; -0.01*inverted*(w1*w1 + w2*w2); -(0.01 + 0.04*inverted)*tau*tau';
+  expect(learn({ reward: post })).toEqual(learn({}));
+  expect(learn({ reward: 'h - 0.1*abs(tau)' })).not.toEqual(learn({}));
+  expect(() => learn({ reward: 'E + w3' })).toThrow(
+    'reward: term1: expected a known name, got "w3" (did you mean w1?)',
+  );
+  expect(() => learn({ reward: 'sqrt(0.5 - h)' })).toThrow(
+    /^reward: term1: expected a number within ±1e9, got nan at q1 = /,
+  );
 });
 
 test("the settings of an agent, with the program's descriptions", () => {

@@ -1,0 +1,224 @@
+#include "pendulum/own_reward.h"
+
+#include <muParser.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "base/error.h"
+#include "base/steps.h"
+#include "base/text.h"
+#include "pendulum/task.h"
+
+namespace upswing {
+namespace {
+
+constexpr size_t kLongest = 1000;  // characters, which bounds the time of a step, too
+constexpr size_t kMostTerms = 16, kLongestName = 24;
+constexpr int kMostDepth = 16;  // parentheses within each other
+constexpr double kLargest = 1e9;
+constexpr std::string_view kLetters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ";
+constexpr std::string_view kInNames = "0123456789_", kOperators = " .,;:?()+-*/^<>=!&|";
+constexpr size_t kNone = std::string_view::npos;
+// Columns of episodes.csv, in which each term has one, too.
+const std::vector<std::string> kTaken{"step", "episode", "return", "length", "terminated"};
+
+/// Defines the functions and constants of an expression in place of muParser's own, and returns
+/// their names.
+std::vector<std::string> DefineFunctions(mu::Parser& parser) {
+  using One = double (*)(double);
+  using Two = double (*)(double, double);
+  using Three = double (*)(double, double, double);
+  constexpr std::pair<const char*, One> kOne[] = {
+      {"sin", std::sin},   {"cos", std::cos},   {"tan", std::tan},   {"asin", std::asin},
+      {"acos", std::acos}, {"atan", std::atan}, {"tanh", std::tanh}, {"exp", std::exp},
+      {"log", std::log},   {"sqrt", std::sqrt}, {"abs", std::fabs},  {"wrap", Wrapped}};
+  // NaN as an argument gives NaN.
+  constexpr std::pair<const char*, Two> kTwo[] = {
+      {"atan2", std::atan2},
+      {"min", [](double a, double b) { return std::isnan(a) || a < b ? a : b; }},
+      {"max", [](double a, double b) { return std::isnan(a) || a > b ? a : b; }}};
+  constexpr std::pair<const char*, Three> kThree[] = {{"clamp",
+                                                       [](double x, double low, double high) {
+                                                         return x < low ? low : x > high ? high : x;
+                                                       }},
+                                                      {"fma", std::fma}};
+  parser.ClearFun();
+  parser.ClearConst();
+  parser.DefineConst("pi", std::numbers::pi);
+  std::vector<std::string> names{"pi"};
+  const auto define = [&](const auto& functions) {
+    for (const auto& [name, function] : functions) {
+      parser.DefineFun(name, function);
+      names.emplace_back(name);
+    }
+  };
+  define(kOne);
+  define(kTwo);
+  define(kThree);
+  return names;
+}
+
+/// The name before the colon of a term, which is removed from it; empty if there is none.
+std::string TakeName(std::string_view& term) {
+  const size_t end = std::min(term.find_first_of("?:"), term.size());
+  if (end == term.size() || term[end] == '?') return "";
+  const std::string name(Trim(term.substr(0, end)));
+  const bool fits = !name.empty() && name.size() <= kLongestName &&
+                    name.find_first_not_of(Concat(kLetters, kInNames)) == kNone;
+  if (!fits || std::ranges::find(kTaken, name) != kTaken.end()) {
+    throw BadInput(Concat("reward: expected as a term's name 1 to ", kLongestName,
+                          " letters, digits or _, and none of ", Join(kTaken, ", "), ", got \"",
+                          name, "\""));
+  }
+  term.remove_prefix(end + 1);
+  return name;
+}
+
+/// Throws BadInput if an expression is too long or too deep, or has characters of strings,
+/// assignments or other languages.
+void CheckText(const std::string& text) {
+  if (text.size() > kLongest) {
+    throw BadInput(Concat("reward: expected at most ", kLongest, " characters, got ", text.size()));
+  }
+  const size_t at = text.find_first_not_of(Concat(kLetters, kInNames, kOperators));
+  if (at != kNone) {
+    throw BadInput(Concat("reward: expected letters, digits, _ and", kOperators, ", got \"",
+                          Printable(text.substr(at, 1)), "\""));
+  }
+  int depth = 0;
+  for (size_t i = 0; i < text.size(); ++i) {
+    depth += text[i] == '(' ? 1 : text[i] == ')' ? -1 : 0;
+    if (depth > kMostDepth) {
+      throw BadInput(Concat("reward: expected at most ", kMostDepth,
+                            " parentheses within each other, got more"));
+    }
+    // A comparison is ==, <=, >= or !=.
+    if (text[i] != '=' || (i > 0 && std::string_view("=<>!").find(text[i - 1]) != kNone)) continue;
+    if (text[i + 1] == '=') continue;
+    throw BadInput("reward: expected an expression without assignment, got =; use == to compare");
+  }
+}
+
+}  // namespace
+
+/// The terms as parsers, and the variables that they read.
+struct OwnReward::Parsed {
+  Parsed() = default;
+  Parsed(const Parsed&) = delete;  // the parsers point to the variables
+
+  /// Adds a term. Throws BadInput that begins with `where`.
+  void Add(std::string_view text, const std::string& where);
+  /// The message about the value of a term for the present variables; empty if it is in range.
+  std::string Problem(double value, const std::string& name) const;
+
+  PendulumState s;
+  Plant plant;
+  double E = 0, h = 0, inverted = 0, tau = 0, dtau = 0, upright = 0;
+  const std::vector<std::pair<const char*, double*>> step{{"q1", &s.q1},   {"q2", &s.q2},
+                                                          {"w1", &s.w1},   {"w2", &s.w2},
+                                                          {"tau", &tau},   {"E", &E},
+                                                          {"h", &h},       {"inverted", &inverted},
+                                                          {"dtau", &dtau}, {"upright", &upright}};
+  const Options parameters = OptionsOf(plant);
+  std::vector<mu::Parser> terms;
+};
+
+void OwnReward::Parsed::Add(std::string_view text, const std::string& where) {
+  mu::Parser& parser = terms.emplace_back();
+  std::vector<std::string> names = DefineFunctions(parser);
+  const auto define = [&](const std::string& name, double* variable) {
+    parser.DefineVar(name, variable);
+    names.push_back(name);
+  };
+  for (const auto& [name, variable] : step) define(name, variable);
+  for (const Option& option : parameters.all()) {
+    define(option.name, std::get<double*>(option.target));
+  }
+  try {
+    parser.SetExpr(std::string(text));
+    parser.Eval();
+    if (parser.GetNumResults() == 1) return;
+    throw BadInput(Concat(where, "expected one expression, got ", parser.GetNumResults(),
+                          " with commas between them; a semicolon separates terms"));
+  } catch (const mu::ParserError& error) {
+    const std::string& token = error.GetToken();
+    if (error.GetCode() == mu::ecUNASSIGNABLE_TOKEN && kLetters.find(token[0]) != kNone) {
+      const std::string hint = DidYouMean(token, names);
+      throw BadInput(Concat(where, "expected a known name, got \"", token, "\"",
+                            hint.empty() ? Concat("; known are ", Join(names, ", ")) : hint));
+    }
+    throw BadInput(
+        Concat(where, "expected an expression, got \"", Trim(text), "\": ", error.GetMsg()));
+  }
+}
+
+std::string OwnReward::Parsed::Problem(double value, const std::string& name) const {
+  if (std::abs(value) <= kLargest) return "";
+  std::vector<std::string> values;
+  for (const auto& [variable, number] : step) {
+    values.push_back(Concat(variable, " = ", FormatNumber(*number)));
+  }
+  return Concat("reward: ", name, ": expected a number within ±1e9, got ",
+                std::isnan(value) ? "nan" : FormatNumber(value), " at ", Join(values, ", "));
+}
+
+OwnReward::OwnReward(const std::string& expression, int num_envs)
+    : parsed_(std::make_unique<Parsed>()) {
+  CheckText(expression);
+  for (std::string_view term : Split(expression, ';')) {
+    std::string name = TakeName(term);
+    if (name.empty()) name = Concat("term", names_.size() + 1);
+    if (std::ranges::find(names_, name) != names_.end() || names_.size() == kMostTerms) {
+      throw BadInput(Concat("reward: expected at most ", kMostTerms,
+                            " terms with different names, got another \"", name, "\""));
+    }
+    names_.push_back(name);
+    parsed_->Add(term, Concat("reward: ", name, ": "));
+    const std::string problem = parsed_->Problem(parsed_->terms.back().Eval(), name);
+    if (!problem.empty()) throw BadInput(problem);
+  }
+  const auto n = static_cast<size_t>(num_envs);
+  built_in_.resize(n * kRewardTerms);
+  last_torque_.resize(n);
+  inverted_steps_.resize(n);
+}
+
+OwnReward::~OwnReward() = default;
+
+void OwnReward::Begin(int env) {
+  last_torque_[static_cast<size_t>(env)] = 0;
+  inverted_steps_[static_cast<size_t>(env)] = 0;
+}
+
+void OwnReward::Judge(int env, const Plant& plant, const PendulumState& s, StepResult& result) {
+  const auto i = static_cast<size_t>(env);
+  Parsed& now = *parsed_;
+  now.plant = plant;
+  now.s = s;
+  now.E = built_in_[i * kRewardTerms];
+  now.h = built_in_[i * kRewardTerms + 1];
+  now.inverted = result.at_goal[i];
+  now.tau = result.torque[i];
+  now.dtau = now.tau - std::exchange(last_torque_[i], now.tau);
+  inverted_steps_[i] = result.at_goal[i] != 0 ? inverted_steps_[i] + 1 : 0;
+  now.upright = static_cast<double>(inverted_steps_[i]) * kControlPeriod;
+
+  const size_t K = names_.size();
+  result.reward[i] = 0;
+  for (size_t k = 0; k < K; ++k) {
+    const double value = now.terms[k].Eval();
+    if (!(std::abs(value) <= kLargest)) throw Failure(now.Problem(value, names_[k]));
+    result.reward_terms[i * K + k] = value;
+    result.reward[i] += value;
+  }
+}
+
+void OwnReward::State(const Archive& archive) {
+  archive.Array("last_torque", std::span(last_torque_));
+  archive.Array("inverted_steps", std::span(inverted_steps_), {0, kMostSteps});
+}
+
+}  // namespace upswing
