@@ -132,6 +132,14 @@ export class World {
     return this.uprightSince === null ? null : (this.steps - this.uprightSince) / STEPS_PER_SECOND;
   }
 
+  /// Whether it hangs still, and nothing will move it.
+  get resting(): boolean {
+    const { state, agentOn, byHand, torque, drag, shove, twin } = this;
+    const { q1, q2, w1, w2 } = state;
+    if (agentOn || drag || shove.steps > 0 || twin?.resting === false) return false;
+    return [q1, q2, w1, w2, byHand, torque].every((x) => x === 0);
+  }
+
   /// Starts again from `state`, without forces or delayed torques.
   reset(state: State = HANGING): void {
     this.simulator.state = state;
@@ -173,7 +181,7 @@ export class World {
     --this.untilControl;
     if (valid) this.advanceTwin();
     else this.reset();
-    this.onChange();
+    if (!this.resting) this.onChange();
     return valid;
   }
 

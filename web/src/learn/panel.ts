@@ -25,6 +25,7 @@ import { Session } from './session';
 /// recorded training of the default agent can be shown instead.
 
 const SEEDS_AT_ONCE = 4;
+const REPORTED = 100; // ms from a report until its drawing, which also shows later reports
 /// Smallest rewards per step of a trial of 4 s that prove balancing. A step earns at most 1.5 for
 /// energy and 1 for height, and 5 more only while both links are up.
 const DOWN = 2.5;
@@ -262,6 +263,19 @@ export class LearnPanel {
     return session?.running && scrubber.follows ? session.poses : [];
   }
 
+  /// Whether a training runs now.
+  get running(): boolean {
+    return this.sessions.some((session) => session.running);
+  }
+
+  /// The last test of the training whose agents are on the stage one after another, or the training
+  /// before its first test; null otherwise.
+  get lastTest(): object | null {
+    const { session, scrubber } = this;
+    if (!session?.running || !scrubber.follows || !scrubber.onStage) return null;
+    return session.evaluations.at(-1) ?? session;
+  }
+
   /// At each frame.
   follow(): void {
     this.scrubber.attempt();
@@ -296,16 +310,16 @@ export class LearnPanel {
     this.page.learned();
   }
 
-  /// Draws after reports, at most once a frame.
+  /// Draws after reports, some times a second.
   private news(): void {
     if (this.scheduled) return;
     this.scheduled = true;
-    requestAnimationFrame(() => {
+    setTimeout(() => {
       this.scheduled = false;
       this.scrubber.update();
       this.draw();
       void this.takeOver();
-    });
+    }, REPORTED);
   }
 
   /// Once a training has solved the task, keeps its best policy as the visitor's own, unless that
@@ -437,7 +451,7 @@ export class LearnPanel {
     element<HTMLButtonElement>('learn-save').disabled = !has;
     element<HTMLButtonElement>('learn-keep').disabled = !has || this.isKept;
     // A sign of a training that goes on while something else is shown.
-    const goesOn = running && !this.paused;
+    const goesOn = this.running;
     document.documentElement.toggleAttribute('data-training', goesOn);
     const link = document.querySelector<HTMLElement>('nav a[href="#learn"]')!;
     link.title = goesOn ? 'A training is running' : '';

@@ -56,7 +56,8 @@ export class Page {
   private readonly agentPanel: AgentPanel;
   private readonly frames = new Frames(
     (seconds) => this.frame(seconds),
-    () => !this.paused,
+    () => !this.paused && (!this.world.resting || this.learn.running),
+    () => this.learn.running,
   );
   laboratory = ''; // last address of Everything
   private takes = 0; // to drop late answers
@@ -396,7 +397,7 @@ export class Page {
 
   private draw(): void {
     const { world } = this;
-    this.ring.follow(world, this.map.valueRange);
+    this.ring.follow(world, this.map.valueRange, this.learn.lastTest ?? world.policy);
     this.scene.ring = this.ring.colors;
     const trail = prefersStill() ? [] : this.history.from(world.time - TRAIL_SECONDS);
     this.scene.draw(world, this.clock.state, trail);

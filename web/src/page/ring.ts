@@ -1,5 +1,4 @@
 import { rangeOfValues, ValueMap } from '../map';
-import type { Policy } from '../policy';
 import { between, COLORS } from '../view/map';
 import { Scale } from '../view/scale';
 import type { World } from '../world';
@@ -12,7 +11,7 @@ const MILLISECONDS = 2; // per frame
 export class Ring {
   private readonly map = new ValueMap(CELLS, 1);
   private readonly scales: readonly Scale[];
-  private policy: Policy | null = null; // of the ring in progress, or of the last one
+  private version: object | null = null; // of the ring in progress, or of the last one
   private plant: World['plant'] | null = null;
   private complete = false;
   private painted: readonly [Float32Array | null, number, number] = [null, NaN, NaN];
@@ -31,17 +30,17 @@ export class Ring {
     return this.shown && !this.complete;
   }
 
-  /// Call at each frame. `range`: values at the ends of the colours; null: the ring's own. Keeps the
-  /// colours of the policy before until those of a new one are complete.
-  follow(world: World, range: readonly [number, number] | null): void {
+  /// Call at each frame. `range`: values at the ends of the colours; null: the ring's own. Computes
+  /// again when `version` changes, and keeps the colours before until the new ones are complete.
+  follow(world: World, range: readonly [number, number] | null, version: object | null): void {
     const { policy, plant } = world;
     if (!this.shown || !policy?.isQuick) {
-      this.policy = null;
+      this.version = null;
       this.complete = true;
       return this.paint([NaN, NaN], 1);
     }
-    if (policy !== this.policy || plant !== this.plant) {
-      [this.policy, this.plant, this.complete] = [policy, plant, false];
+    if (version !== this.version || plant !== this.plant) {
+      [this.version, this.plant, this.complete] = [version, plant, false];
       this.map.clear();
     }
     this.complete ||= this.map.work(world, MILLISECONDS) !== null;

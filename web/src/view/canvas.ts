@@ -1,8 +1,11 @@
 const NEAR = '100px'; // from the edge of the screen
+const SHARPEST = 2; // pixels of the screen per CSS pixel; 1 on a slow device
 
 /// A canvas as sharp as the screen, in CSS pixels, with colours from the style sheet. If that sets
 /// --zoom, letters and lines grow with it.
 export class Canvas {
+  /// Whether this device draws slowly. Then each canvas has fewer pixels from its next drawing on.
+  static coarse = false;
   readonly element: HTMLCanvasElement;
   readonly context: CanvasRenderingContext2D;
   zoom = 1; // CSS pixels per pixel
@@ -12,6 +15,7 @@ export class Canvas {
   private seen = true; // on the screen, or near it
   private colors = new Map<string, string>();
   private family: string | null = null;
+  private coarse = false; // whether it has fewer pixels
 
   constructor(id: string) {
     this.element = document.getElementById(id) as HTMLCanvasElement;
@@ -51,7 +55,9 @@ export class Canvas {
     this.colors.clear();
   }
 
+  /// Call before each drawing.
   clear(): void {
+    if (this.coarse !== Canvas.coarse) this.resize();
     this.context.clearRect(0, 0, this.width, this.height);
   }
 
@@ -109,7 +115,8 @@ export class Canvas {
     const style = getComputedStyle(this.element);
     this.zoom = Number(style.getPropertyValue('--zoom')) || 1;
     this.letters = parseFloat(style.fontSize);
-    const ratio = this.zoom * Math.min(window.devicePixelRatio || 1, 2);
+    this.coarse = Canvas.coarse;
+    const ratio = this.zoom * Math.min(window.devicePixelRatio || 1, this.coarse ? 1 : SHARPEST);
     this.width = this.element.clientWidth / this.zoom;
     this.height = this.element.clientHeight / this.zoom;
     const [width, height] = [this.width, this.height].map((side) => Math.round(side * ratio));

@@ -26,6 +26,7 @@ export const COLORS: Readonly<Record<Quantity, readonly Color[]>> = {
   ],
 };
 const EASE = 0.25; // share of the way to a new map, at each drawing
+const SAME = 1 / 256; // share of the scale, an invisible difference
 const APART = 8; // pixels, smallest gap of two names
 const [LEFT, BOTTOM] = [16, 18]; // pixels, for the names of the axes
 
@@ -35,6 +36,7 @@ export class MapChart {
   private readonly image: HTMLCanvasElement = document.createElement('canvas');
   private pixels: ImageData | null = null; // of the image
   private shown: Float32Array | null = null; // 0 to 1, eased towards the map
+  private painted: unknown[] = []; // what the image shows once it has come to rest
 
   /// Drops the map, so that the next one appears at once.
   clear(): void {
@@ -70,10 +72,17 @@ export class MapChart {
     const shareOf = (cell: number) => (high > low ? (cell - low) / (high - low) : 0.5);
     this.shown ??= map.cells.map(shareOf);
     const { shown } = this;
-    map.cells.forEach((cell, i) => {
-      shown[i]! += EASE * (shareOf(cell) - shown[i]!);
-    });
-    this.paint(map.columns, COLORS[map.quantity]);
+    const sight = [map.cells, low, high, shown];
+    if (!sight.every((part, i) => part === this.painted[i])) {
+      let furthest = 0;
+      map.cells.forEach((cell, i) => {
+        const away = shareOf(cell) - shown[i]!;
+        shown[i]! += EASE * away;
+        furthest = Math.max(furthest, Math.abs(away));
+      });
+      this.paint(map.columns, COLORS[map.quantity]);
+      this.painted = furthest < SAME ? sight : [];
+    }
     canvas.context.imageSmoothingQuality = 'high';
     canvas.context.drawImage(this.image, LEFT, 0, width - LEFT, height - BOTTOM);
     this.drawWay(map, way, now);
