@@ -22,13 +22,14 @@ export class Policy {
   readonly plant: Plant;
   /// Factor of the rewards, and so of its values, during training.
   readonly rewardScale: number;
-  private readonly file: ArrayBuffer | null; // null: a controller
+  /// Its file, or the name of a controller.
+  readonly source: ArrayBuffer | string;
   private _neurons: Neurons | null | undefined; // undefined: not read yet
 
   /// Reads and checks a file, as the program does, or designs the controller with this name. Throws
   /// BadInput.
   constructor(from: ArrayBuffer | string) {
-    this.file = typeof from === 'string' ? null : from;
+    this.source = from;
     try {
       const controller = new CoreController(from);
       this.controller = controller;
@@ -46,7 +47,10 @@ export class Policy {
 
   /// Its neurons, for display; null if it has none to show.
   get neurons(): Neurons | null {
-    if (this._neurons === undefined) this._neurons = this.file && Neurons.of(this.file);
+    const { source } = this;
+    if (this._neurons === undefined) {
+      this._neurons = typeof source === 'string' ? null : Neurons.of(source);
+    }
     return this._neurons;
   }
 

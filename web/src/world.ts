@@ -74,6 +74,7 @@ export class World {
   private steps = 0; // physics steps since the page was opened
   private uprightSince: number | null = null; // physics step; null if the links are not upright
   private untilControl = 0; // steps until the agent chooses again
+  private begun = 0; // physics step of the start
   private shove = { force: 0, steps: 0 };
 
   constructor(simulator: Simulator) {
@@ -126,6 +127,16 @@ export class World {
     return this.steps / STEPS_PER_SECOND;
   }
 
+  /// Time (s) since the start.
+  get elapsed(): number {
+    return (this.steps - this.begun) / STEPS_PER_SECOND;
+  }
+
+  /// Whether the next physics step begins with a new torque.
+  get isAtControl(): boolean {
+    return this.untilControl === 0;
+  }
+
   /// How long (s) both links have been upright without a break; null if they are not. Counted in
   /// steps, so that 1 s is exact.
   get uprightFor(): number | null {
@@ -150,6 +161,7 @@ export class World {
     this.identifies = false;
     this.forget();
     this.untilControl = 0;
+    this.begun = this.steps;
     this.torque = 0;
     this.push = null;
     this.shoved = null;

@@ -7,6 +7,8 @@ const LONGEST_FRAME = 0.1; // s: a tab that comes back does not jump
 /// Advances the world in real time, slower or faster.
 export class Clock {
   speed = 1;
+  /// Whether the next step can be made, or a controller in another thread still computes.
+  ready: () => boolean = () => true;
   private readonly world: World;
   private due = 0; // physics steps not yet made, with a fraction
   private before: State;
@@ -19,9 +21,10 @@ export class Clock {
 
   /// Advances by `seconds` of real time. False if the state blew up.
   advance(seconds: number): boolean {
-    this.due += Math.min(seconds, LONGEST_FRAME) * this.speed * STEPS_PER_SECOND;
+    const most = LONGEST_FRAME * this.speed * STEPS_PER_SECOND;
+    this.due = Math.min(this.due + seconds * this.speed * STEPS_PER_SECOND, most);
     let sound = true;
-    for (; this.due >= 1; --this.due) {
+    for (; this.due >= 1 && this.ready(); --this.due) {
       this.remember();
       sound = this.world.advance() && sound;
     }
@@ -51,7 +54,8 @@ export class Clock {
   }
 
   private between(from: State, to: State): State {
-    const between = (a: number, b: number) => a + this.due * (b - a);
+    const share = Math.min(this.due, 1);
+    const between = (a: number, b: number) => a + share * (b - a);
     return {
       q1: between(from.q1, to.q1),
       q2: between(from.q2, to.q2),

@@ -32,9 +32,10 @@ import { changeTheme, onThemeChange } from './theme';
 import { Tour } from './tour';
 import { Twin } from './twin';
 import { showView, viewOf } from './views';
+import { WritePanel } from '../write/panel';
 
 const REMEMBERED = 60; // s of history
-const LEARN_KEYS = ['g', 'r', 'ArrowLeft', 'ArrowRight']; // pauses a training, not the pendulum
+const PANEL_KEYS = ['g', 'r', 'ArrowLeft', 'ArrowRight']; // pauses a training, not the pendulum
 
 /// The parts of the page and the actions of its buttons.
 export class Page {
@@ -50,6 +51,7 @@ export class Page {
   private readonly map = new MapPanel((where) => this.start(where));
   private readonly ring = new Ring(document.querySelectorAll('.scale.of-ring'));
   readonly learn: LearnPanel;
+  readonly write: WritePanel;
   private readonly tour: Tour;
   readonly twin: Twin;
   private readonly address = new Address(() => this.hash());
@@ -59,6 +61,7 @@ export class Page {
     () => !this.paused && (!this.world.resting || this.learn.running),
     () => this.learn.running,
   );
+  private view = viewOf(location.hash).name;
   laboratory = ''; // last address of Everything
   private takes = 0; // to drop late answers
   private paused = false;
@@ -85,6 +88,7 @@ export class Page {
       brought: (file) => void this.bring(file),
     });
     this.learn = new LearnPanel(this, agents.list[0]!.id);
+    this.write = new WritePanel(this);
     this.tour = new Tour(
       this,
       (id) => agents.has(id),
@@ -117,9 +121,10 @@ export class Page {
   /// Shows the view of an address, with its settings.
   async open(hash = location.hash): Promise<void> {
     const view = viewOf(hash);
-    const { dataset } = document.documentElement;
-    const isOther = dataset.view !== view.name;
-    if (isOther && dataset.view === 'everything' && this.agent) this.laboratory = this.hash();
+    const isOther = this.view !== view.name;
+    if (isOther && this.view === 'everything' && this.agent) this.laboratory = this.hash();
+    this.view = view.name;
+    this.write.leave();
     if (isOther) scrollTo(0, 0);
     const returns = isOther && hash === '#everything';
     showView(view);
@@ -129,9 +134,11 @@ export class Page {
       return this.tour.go(view.step);
     }
     const learns = view.name === 'learn';
-    const { shared, problems }: { shared: Partial<Shared>; problems: string[] } = learns
-      ? { shared: {}, problems: [] }
-      : decode(returns ? this.laboratory : hash, RANGES, (id) => this.agents.has(id));
+    const writes = view.name === 'write';
+    const { shared, problems }: { shared: Partial<Shared>; problems: string[] } =
+      learns || writes
+        ? { shared: {}, problems: [] }
+        : decode(returns ? this.laboratory : hash, RANGES, (id) => this.agents.has(id));
     // A policy learned in the page stays on the stage.
     const isAsked = shared.agent && !returns;
     if ((learns || this.tour.number > 0) && this.learn.keeps && !isAsked) {
@@ -145,6 +152,7 @@ export class Page {
       problems.push(...this.learn.open(hash));
       this.learn.show();
     }
+    if (writes) problems.push(...this.write.open(hash));
     if (problems.length > 0) warn(problemText(problems));
   }
 
@@ -188,12 +196,16 @@ export class Page {
   }
 
   private frame(seconds: number): void {
-    if (!this.paused && !this.clock.advance(seconds)) {
-      this.restarted();
-      warn('The pendulum spun too fast to be computed; it hangs again.');
-    }
+    this.advance(seconds);
     this.draw();
     if (this.map.busy || this.ring.busy) this.frames.wake();
+  }
+
+  /// Advances the pendulum by `seconds` of real time, unless it is paused.
+  advance(seconds: number): void {
+    if (this.paused || this.clock.advance(seconds)) return;
+    this.restarted();
+    warn('The pendulum spun too fast to be computed; it hangs again.');
   }
 
   /// Changes to another agent. If it cannot be loaded, shows the reason, keeps the old one and
@@ -225,9 +237,9 @@ export class Page {
 
   /// Sets up the stage for the view, step or training.
   private arranged(): void {
-    const { view, step } = document.documentElement.dataset;
-    this.learning = view === 'learn' || step === 'learn';
-    this.map.atRest = view !== 'everything';
+    const { step } = document.documentElement.dataset;
+    this.learning = this.view === 'learn' || step === 'learn';
+    this.map.atRest = this.view !== 'everything';
     this.ring.shown = (this.learning && this.learn.begun) || step === 'map';
     if (!this.learning) this.learn.leave();
   }
@@ -256,7 +268,7 @@ export class Page {
     const shoveRight = () => this.world.shoveTo(1);
     const actions = { toggleAgent, togglePause, step, reset, shoveLeft, shoveRight };
     listenToKeys(actions, () =>
-      this.learning && this.tour.number === 0 ? LEARN_KEYS : this.tour.keys,
+      ['learn', 'write'].includes(this.view) ? PANEL_KEYS : this.tour.keys,
     );
     button('agent-on', toggleAgent);
     button('pause', togglePause);
@@ -374,7 +386,8 @@ export class Page {
   /// The page's state for the address, or for a link to others, who lack the visitor's own policy.
   private hash(forOthers = false): string {
     if (this.tour.number > 0) return `tour=${this.tour.number}`;
-    if (document.documentElement.dataset.view === 'learn') return this.learn.address;
+    if (this.view === 'learn') return this.learn.address;
+    if (this.view === 'write') return this.write.address;
     return encode({
       agent: forOthers && this.agent?.id === OWN ? null : (this.agent?.id ?? null),
       twin: this.twin.id === OWN ? null : this.twin.id,

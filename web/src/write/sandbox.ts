@@ -1,0 +1,81 @@
+import { printable } from '../text';
+import { STRANGE } from './asker';
+import PRELUDE from './prelude.js?raw';
+
+/// Runs a visitor's controller in a worker of a sandboxed frame (public/sandbox.html). The page
+/// trusts nothing that comes from there.
+
+const HEAD = `${PRELUDE}\nfunction torque(q1, q2, w1, w2, t) {\n`;
+const ROWS_BEFORE = HEAD.split('\n').length - 1;
+const PATIENCE = 30_000; // ms until a frame that does not load counts as missing
+const LONGEST_PROBLEM = 160; // characters
+
+/// Why a controller failed, in one line, and its row (from 1 on) if that is known.
+export interface Problem {
+  text: string;
+  row: number | null;
+}
+
+export class Sandbox {
+  private readonly text: string;
+  private readonly port: MessagePort;
+  private readonly onProblem: (problem: Problem) => void;
+  private readonly frame = document.createElement('iframe');
+  private timer: number;
+
+  /// `text`: the lines of a function of the state that returns the motor's torque (N·m). `port`: for
+  /// an Asker at its other end. `onProblem`: called at most once; the worker has ended then.
+  constructor(text: string, port: MessagePort, onProblem: (problem: Problem) => void) {
+    this.text = text;
+    this.port = port;
+    this.onProblem = onProblem;
+    addEventListener('message', this.hear);
+    const { frame } = this;
+    frame.hidden = true;
+    frame.title = 'Sandbox';
+    frame.sandbox.add('allow-scripts');
+    frame.src = 'sandbox.html';
+    document.body.append(frame);
+    const offline = 'the device is offline, and the sandbox for it has not been loaded yet';
+    const missing = 'the sandbox for it could not be loaded';
+    this.timer = window.setTimeout(
+      () => this.fail({ text: navigator.onLine ? missing : offline, row: null }),
+      PATIENCE,
+    );
+  }
+
+  /// Ends the worker.
+  close(): void {
+    clearTimeout(this.timer);
+    removeEventListener('message', this.hear);
+    this.frame.remove();
+  }
+
+  /// Ends the worker because of a problem.
+  fail({ text, row }: Problem): void {
+    this.close();
+    this.onProblem({ text: printable(text, LONGEST_PROBLEM), row });
+  }
+
+  /// Messages of the frame: that it is there, or an error in the worker.
+  private readonly hear = ({ data, source }: MessageEvent): void => {
+    const { contentWindow } = this.frame;
+    if (source === null || source !== contentWindow) return;
+    if (data === 'ready' && this.timer !== 0) {
+      clearTimeout(this.timer);
+      this.timer = 0;
+      // An opaque origin has no name.
+      contentWindow.postMessage(`${HEAD}${this.text}\n}`, '*', [this.port]);
+      return;
+    }
+    const { problem, row } = (data ?? {}) as { problem?: unknown; row?: unknown };
+    if (typeof problem !== 'string' || typeof row !== 'number') {
+      return this.fail({ text: STRANGE, row: null });
+    }
+    const rows = this.text.split('\n').length;
+    const own = row - ROWS_BEFORE;
+    const text = problem.replace(/^Uncaught /, '');
+    if (own > rows) this.fail({ text: `${text}: is a bracket still open?`, row: rows });
+    else this.fail({ text, row: own >= 1 ? own : null });
+  };
+}
