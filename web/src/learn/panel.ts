@@ -9,7 +9,7 @@ import { saveFile } from '../page/save';
 import { onThemeChange } from '../page/theme';
 import { LearnChart, stepsOf } from './chart';
 import type { Checkpoint, Course, Recording } from './course';
-import { film, filmType } from './film';
+import { film, filmType } from '../page/film';
 import { Filmstrip } from './filmstrip';
 import { Knobs, LEARNERS } from './knobs';
 import './learn.css';

@@ -1,4 +1,4 @@
-import { saveFile } from '../page/save';
+import { saveFile } from './save';
 import type { Canvas } from '../view/canvas';
 
 const SECONDS = 5;
