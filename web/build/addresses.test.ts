@@ -11,8 +11,18 @@ function built(env: Record<string, string>): string {
   return transformIndexHtml.handler(PAGE);
 }
 
-test('a page of which nobody says where it is names no address', () => {
+test('a build that does not know the address names none', () => {
   expect(built({})).toBe('<meta property="og:image" content="./card.png" /><footer></footer>');
+});
+
+test('the card has an absolute address on GitHub and GitLab without a setting', () => {
+  for (const [env, site] of [
+    [{ GITHUB_REPOSITORY: 'Some-One/upswing' }, 'https://some-one.github.io/upswing/'],
+    [{ CI_PAGES_URL: 'https://a.gitlab.io/b' }, 'https://a.gitlab.io/b/'],
+    [{ CI_PAGES_URL: 'https://a.gitlab.io/b', UPSWING_SITE: 'https://c.org' }, 'https://c.org/'],
+  ] as const) {
+    expect(built(env)).toContain(`content="${site}card.png"`);
+  }
 });
 
 test('the card has a whole address, and the footer a link, where they are known', () => {

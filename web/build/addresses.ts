@@ -1,8 +1,7 @@
 import type { Plugin } from 'vite';
 
-/// Where the page and its source are on the web, which only who publishes it knows: UPSWING_SITE, the
-/// folder that the page is served from, so that others can show its card; and UPSWING_SOURCE, its
-/// repository, for a link in the footer.
+/// Writes the page's addresses on the web. UPSWING_SITE is the folder that the page is served from, so
+/// that other sites can show its card; UPSWING_SOURCE is its repository, for a link in the footer.
 export function addresses(env: NodeJS.ProcessEnv = process.env): Plugin {
   const quoted = (url: URL) => url.href.replaceAll('&', '&amp;').replaceAll('"', '%22');
   return {
@@ -10,7 +9,8 @@ export function addresses(env: NodeJS.ProcessEnv = process.env): Plugin {
     transformIndexHtml: {
       order: 'post',
       handler(html) {
-        const { UPSWING_SITE: site, UPSWING_SOURCE: source } = env;
+        const { UPSWING_SOURCE: source } = env;
+        const site = siteOf(env);
         let made = html;
         if (site) {
           const card = quoted(new URL('card.png', site.replace(/\/*$/, '/')));
@@ -26,4 +26,12 @@ export function addresses(env: NodeJS.ProcessEnv = process.env): Plugin {
       },
     },
   };
+}
+
+/// UPSWING_SITE, or else the address at which the pages of a GitHub or GitLab project appear, which
+/// their builds know.
+function siteOf(env: NodeJS.ProcessEnv): string | undefined {
+  const [owner, name] = env.GITHUB_REPOSITORY?.split('/') ?? [];
+  const github = owner && name && `https://${owner.toLowerCase()}.github.io/${name}/`;
+  return env.UPSWING_SITE || env.CI_PAGES_URL || github || undefined;
 }

@@ -346,6 +346,7 @@ test('a film has the agent and its score as a title', async ({ stage: page }) =>
   expect(await filmTitle(page)).toEqual([
     'Dueling Double DQN',
     'after 240,000 steps, success 100%',
+    new URL(page.url()).host,
   ]);
   await expect(page.locator('#learn-film')).toHaveText('Film 5 s');
 });

@@ -1,15 +1,14 @@
 import { addressOf } from '../page/address';
-import { copy } from '../page/clipboard';
+import { send } from '../page/clipboard';
 import { CONTROL_PERIOD } from '../pendulum';
 import type { Scene } from '../view/scene';
 import { button, element } from '../page/dom';
-import { note, warn } from '../page/message';
+import { note } from '../page/message';
 import { prefersStill } from '../page/motion';
 import { saveFile } from '../page/save';
 import { onThemeChange } from '../page/theme';
 import { LearnChart, stepsOf } from './chart';
 import type { Checkpoint, Course, Recording } from './course';
-import { film, filmType } from '../page/film';
 import { Filmstrip } from './filmstrip';
 import { Knobs, LEARNERS } from './knobs';
 import './learn.css';
@@ -92,9 +91,10 @@ export class LearnPanel {
     button('learn-save', () => this.save());
     button('learn-keep', () => void this.keep());
     button('learn-reset', () => this.knobs.reset());
-    button('learn-share', () => void copy(addressOf(this.address), 'The link to this training'));
-    const filming = button('learn-film', () => void this.film(filming));
-    filming.hidden = filmType === undefined;
+    button(
+      'learn-share',
+      () => void send('', addressOf(this.address), 'The link to this training'),
+    );
     button('learn-recorded', () => this.showRecording(recorded));
     element('learn-recorded').hidden = page.agents.recording(recorded) === null;
     this.agent.addEventListener('change', () => this.knobs.show(this.agent.value));
@@ -350,7 +350,7 @@ export class LearnPanel {
   }
 
   /// A film's title: the agent on the stage and its success.
-  private get title(): readonly [string, string] {
+  get title(): readonly [string, string] {
     const { session, scrubber, page } = this;
     const { course } = scrubber;
     if (!course || !scrubber.onStage) return [page.agentTitle, ''];
@@ -360,24 +360,6 @@ export class LearnPanel {
     const chosen = [...this.agent.options].find(({ value }) => value === session?.agent);
     const name = session ? `${chosen?.text ?? session.agent}, ${session.name}` : course.name;
     return [name, `after ${step.toLocaleString('en')} steps${score}`];
-  }
-
-  private async film(button: HTMLButtonElement): Promise<void> {
-    button.disabled = true;
-    button.textContent = 'Filming …';
-    const { scene } = this.page;
-    try {
-      await film(
-        scene.canvas,
-        () => scene.square,
-        'upswing',
-        () => this.title,
-      );
-    } catch {
-      warn('This browser could not film the stage.');
-    }
-    button.textContent = 'Film 5 s';
-    button.disabled = false;
   }
 
   private save(): void {

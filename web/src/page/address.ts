@@ -1,4 +1,4 @@
-import { copy } from './clipboard';
+import { send } from './clipboard';
 
 const DELAY = 300; // ms: browsers refuse an address that changes with each pixel of a slider
 
@@ -23,10 +23,10 @@ export class Address {
     this.timer = window.setTimeout(() => this.write(), DELAY);
   }
 
-  /// Copies a link with `hash` after the #, or shows it. `without`: what the link leaves out, in
+  /// Shares a link with `hash` after the #. `without`: what the link leaves out, in
   /// words.
   share(hash: string, without: string): Promise<void> {
-    return copy(addressOf(hash), `The link${without}`);
+    return send('', addressOf(hash), `The link${without}`);
   }
 
   private write(): void {

@@ -11,7 +11,9 @@ import { AgentPanel } from './agent_panel';
 import type { Agent, Agents } from './agents';
 import { Clock } from './clock';
 import { Badge } from './badge';
+import { nameSendButtons } from './clipboard';
 import { Dashboard } from './dashboard';
+import { listenToFilms } from './film';
 import { button, element } from './dom';
 import { Frames } from './frames';
 import { Hand } from './hand';
@@ -32,7 +34,7 @@ import { changeTheme, onThemeChange } from './theme';
 import { Tour } from './tour';
 import { Twin } from './twin';
 import { showView, viewOf } from './views';
-import { WritePanel } from '../write/panel';
+import type { WritePanel } from '../write/panel';
 
 const REMEMBERED = 60; // s of history
 const PANEL_KEYS = ['g', 'r', 'ArrowLeft', 'ArrowRight']; // pauses a training, not the pendulum
@@ -51,7 +53,7 @@ export class Page {
   private readonly map = new MapPanel((where) => this.start(where));
   private readonly ring = new Ring(document.querySelectorAll('.scale.of-ring'));
   readonly learn: LearnPanel;
-  readonly write: WritePanel;
+  write: WritePanel | null = null; // loaded when it is needed first
   private readonly tour: Tour;
   readonly twin: Twin;
   private readonly address = new Address(() => this.hash());
@@ -88,7 +90,6 @@ export class Page {
       brought: (file) => void this.bring(file),
     });
     this.learn = new LearnPanel(this, agents.list[0]!.id);
-    this.write = new WritePanel(this);
     this.tour = new Tour(
       this,
       (id) => agents.has(id),
@@ -124,14 +125,14 @@ export class Page {
     const isOther = this.view !== view.name;
     if (isOther && this.view === 'everything' && this.agent) this.laboratory = this.hash();
     this.view = view.name;
-    this.write.leave();
+    this.write?.leave();
     if (isOther) scrollTo(0, 0);
     const returns = isOther && hash === '#everything';
     showView(view);
     placeCharts();
     this.setPaused(false);
     if (view.name === 'tour') {
-      return this.tour.go(view.step);
+      return this.tour.go(view.step, false, new URLSearchParams(hash.slice(1)).get('ghost') ?? '');
     }
     const learns = view.name === 'learn';
     const writes = view.name === 'write';
@@ -152,8 +153,19 @@ export class Page {
       problems.push(...this.learn.open(hash));
       this.learn.show();
     }
-    if (writes) problems.push(...this.write.open(hash));
+    if (writes) problems.push(...(await this.openWriting(hash)));
     if (problems.length > 0) warn(problemText(problems));
+  }
+
+  /// Opens the editor of a controller. Returns the problems of the address.
+  private async openWriting(hash: string): Promise<readonly string[]> {
+    try {
+      const { WritePanel } = await import('../write/panel');
+      this.write ??= new WritePanel(this);
+    } catch {
+      return ['the editor cannot be loaded'];
+    }
+    return this.view === 'write' ? this.write.open(hash) : [];
   }
 
   /// Sets agent and settings; all others get their initial values. The pendulum moves on. False if
@@ -283,6 +295,11 @@ export class Page {
       void this.address.share(this.hash(true) || 'everything', own);
     });
     button('save', () => save(this.history));
+    nameSendButtons();
+    listenToFilms(
+      () => (this.world.twin ? [this.scene, this.twin.scene] : [this.scene]),
+      () => this.title,
+    );
     button('own-remove', () => void this.forgetOwn());
     button('theme', changeTheme);
     const speed = element<HTMLInputElement>('speed');
@@ -376,6 +393,14 @@ export class Page {
     this.setAgentOn(shared.on);
   }
 
+  /// The title of a film: what the stage shows.
+  private get title(): readonly [string, string] {
+    if (this.learning) return this.learn.title;
+    if (this.view === 'write') return ['A controller of my own', ''];
+    if (this.view === 'tour') return [this.tour.title, ''];
+    return [this.agentTitle, this.world.twin ? `and ${element('twin-name').textContent}` : ''];
+  }
+
   /// Call after a setting changed: updates the address.
   private changed(): void {
     if (this.paused) this.world.look();
@@ -385,9 +410,9 @@ export class Page {
 
   /// The page's state for the address, or for a link to others, who lack the visitor's own policy.
   private hash(forOthers = false): string {
-    if (this.tour.number > 0) return `tour=${this.tour.number}`;
+    if (this.tour.number > 0) return this.tour.address;
     if (this.view === 'learn') return this.learn.address;
-    if (this.view === 'write') return this.write.address;
+    if (this.view === 'write') return this.write?.address ?? 'write';
     return encode({
       agent: forOthers && this.agent?.id === OWN ? null : (this.agent?.id ?? null),
       twin: this.twin.id === OWN ? null : this.twin.id,

@@ -3,7 +3,7 @@ import type { State } from '../pendulum';
 import type { Label } from '../view/labels';
 import type { Moment, World } from '../world';
 import { addressOf } from './address';
-import { copy } from './clipboard';
+import { send } from './clipboard';
 import { button, element, write } from './dom';
 import { Game } from './game';
 import { prefersStill } from './motion';
@@ -47,14 +47,16 @@ export interface Step {
   readonly agents: readonly string[]; // needed for this step; without them it is left out
   readonly keys?: readonly string[]; // the page's keys that it names; all others do nothing
   readonly labels?: (world: World) => Label[]; // on the stage
-  /// Called when the step is shown.
-  begin(): Promise<void>;
+  /// Called when the step is shown. `ghost`: a try in the address; empty: none.
+  begin(ghost: string): Promise<void>;
   /// Called when another step is shown.
   end?(): void;
   /// Whether its pendulum moves at once. With reduced motion it waits for a button.
   readonly moves?: boolean;
   /// A pendulum to draw behind the first one.
   readonly ghost?: () => State | null;
+  /// The try in the page's address; empty: none.
+  readonly code?: () => string;
   /// Called at each control step.
   moment?(moment: Moment): void;
   /// Called after a click on the map started the pendulum somewhere.
@@ -112,15 +114,16 @@ function motor(stage: Stage): Step {
     id: 'motor',
     agents: [],
     labels: ({ torque }) => (torque === 0 ? [GOAL] : [GOAL, { at: 'motor', text: 'your torque' }]),
-    async begin() {
+    async begin(ghost) {
       keys.enabled = true;
-      if (await stage.begin({ agent: NOMINAL_AGENT, on: false })) game.open();
+      if (await stage.begin({ agent: NOMINAL_AGENT, on: false })) game.open(ghost);
     },
     end() {
       keys.enabled = false;
       game.close();
     },
     ghost: () => game.ghost,
+    code: () => game.code,
     moment: ({ state }) => game.moment(state),
     answer() {
       game.draw();
@@ -291,7 +294,7 @@ function map(stage: Stage): Step {
 
 /// The last step: a summary and links.
 function end(stage: Stage): Step {
-  button('tour-send', () => void copy(`${INVITATION} ${addressOf('tour')}`, 'An invitation'));
+  button('tour-send', () => void send(INVITATION, addressOf('tour'), 'An invitation'));
   return {
     id: 'end',
     agents: [NOMINAL_AGENT],

@@ -48,14 +48,26 @@ export class Tour {
     return this.now ? this.steps.indexOf(this.now) + 1 : 0;
   }
 
+  /// The part of the address after #; empty outside of the tour.
+  get address(): string {
+    if (!this.now) return '';
+    const code = this.now.code?.() ?? '';
+    return `tour=${this.number}${code && `&ghost=${code}`}`;
+  }
+
+  /// The shown step's heading.
+  get title(): string {
+    return this.now ? heading(this.now).textContent : '';
+  }
+
   /// The keys that the shown step names; null outside of the tour.
   get keys(): readonly string[] | null {
     return this.now && (this.now.keys ?? []);
   }
 
-  /// Shows the nearest existing step. When the visitor goes there, moves the focus to it and adds
-  /// it to the browser's history.
-  async go(number: number, focus = false): Promise<void> {
+  /// Shows the nearest existing step, with a try of the game in the address. When the visitor goes
+  /// there, moves the focus to it and adds it to the browser's history.
+  async go(number: number, focus = false, ghost = ''): Promise<void> {
     this.leave();
     const i = Math.min(Math.max(Math.round(number) || 1, 1), this.steps.length) - 1;
     const now = this.steps[i]!;
@@ -75,7 +87,7 @@ export class Tour {
       heading(now).focus({ preventScroll: true });
     }
     this.onStep();
-    await now.begin();
+    await now.begin(ghost);
   }
 
   /// Call after a click on the map started the pendulum somewhere.

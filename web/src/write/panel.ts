@@ -1,7 +1,7 @@
 import { coreModule } from '../core';
 import type { Agent } from '../page/agents';
 import { addressOf } from '../page/address';
-import { copy } from '../page/clipboard';
+import { send } from '../page/clipboard';
 import type { Clock } from '../page/clock';
 import { button, element, write } from '../page/dom';
 import { recall, remember } from '../page/storage';
@@ -52,7 +52,7 @@ export class WritePanel {
     button('write-run', () => this.run());
     button('write-stop', () => this.leave());
     button('write-score', () => void this.score());
-    button('write-share', () => void copy(addressOf(encodeText(this.text)), 'The link'));
+    button('write-share', () => void send('', addressOf(encodeText(this.text)), 'The link'));
     button('write-hint', () => this.set(HINT, true));
     button('write-again', () => this.set(START, true));
     this.editor.addEventListener('input', () => {
