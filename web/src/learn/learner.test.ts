@@ -87,8 +87,7 @@ test('a training by a reward of your own', () => {
     learner.close();
     return policy;
   };
-  const post =
-    'E; h; 5*inverted; -0.01*inverted*(w1*w1 + w2*w2); -(0.01 + 0.04*inverted)*tau*tau';
+  const post = 'E; h; 5*inverted; -0.01*inverted*(w1*w1 + w2*w2); -(0.01 + 0.04*inverted)*tau*tau';
   expect(learn({ reward: post })).toEqual(learn({}));
   expect(learn({ reward: 'h - 0.1*abs(tau)' })).not.toEqual(learn({}));
   expect(() => learn({ reward: 'E + w3' })).toThrow(
