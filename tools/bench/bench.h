@@ -40,7 +40,6 @@ inline constexpr int kBenchActions = 9;
 
 // Cases of each part.
 BenchCases GradientCases(const BenchOptions& options);
-BenchCases ActCases(const BenchOptions& options);
 BenchCases EnvCases(const BenchOptions& options);
 
 }  // namespace upswing

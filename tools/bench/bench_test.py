@@ -14,7 +14,6 @@ from testing import ProgramTest  # noqa: E402
 GRADIENT = [f"gradient/{network}/{width}-{width}/batch:{batch}/threads:1"
             for network in ("plain", "dueling") for width in (64, 128, 256)
             for batch in (32, 64, 128, 256)]
-ACT = [f"act/256-256/batch:{batch}" for batch in (1, 8, 100)]
 ENV = [f"env/{engine}/envs:{envs}/threads:1" for engine in ("mujoco", "closed-form")
        for envs in (8, 128, 1024)]
 
@@ -30,11 +29,11 @@ class BenchTest(ProgramTest):
 
     def test_every_case(self):
         context, cases = self.bench("--threads", 1)
-        self.assertEqual(list(cases), [*GRADIENT, *ACT, *ENV])
+        self.assertEqual(list(cases), [*GRADIENT, *ENV])
         for name, entry in cases.items():
             with self.subTest(name):
                 self.assertGreater(entry["items_per_second"], 0)
-                self.assertEqual("gflops" in entry, name in {*GRADIENT, *ACT})
+                self.assertEqual("gflops" in entry, name in GRADIENT)
                 # The margin is generous, because other load may have disturbed the measurement of
                 # the peak.
                 self.assertLess(entry.get("gflops", 0), 3 * float(context["peak_gflops/threads:1"]))
@@ -42,10 +41,11 @@ class BenchTest(ProgramTest):
         self.assertTrue(context["cpu_model"])
 
     def test_chosen_cases(self):
-        _, cases = self.bench("gradient/plain", "act", "--hidden", "24,16", "--batch", 8,
-                              "--threads", "2,1,2")
+        _, cases = self.bench("gradient/plain", "env/mujoco/envs:8/", "--hidden", "24,16",
+                              "--batch", 8, "--threads", "2,1,2")
         names = [f"gradient/plain/24-16/batch:8/threads:{threads}" for threads in (1, 2)]
-        self.assertEqual(list(cases), [*names, *ACT])
+        env = [f"env/mujoco/envs:8/threads:{threads}" for threads in (1, 2)]
+        self.assertEqual(list(cases), [*names, *env])
         # Two forward passes, the gradients of weights, and the gradients of inputs without the
         # observations.
         layers = [8 * 24, 24 * 16, 16 * 9]
@@ -61,18 +61,18 @@ class BenchTest(ProgramTest):
         self.assertAlmostEqual(entry["gflops"] / entry["items_per_second"] * 1e9, flops, delta=1)
 
     def test_repetitions(self):
-        table = self.succeed("bench", "act/256-256/batch:8", "--seconds", "0.001",
+        table = self.succeed("bench", ENV[0], "--seconds", "0.001",
                              "--repetitions", 3)
         self.assertEqual(table.count("_median"), 1)
 
     def test_vector_instructions(self):
-        context, cases = self.bench("act", "--simd", "portable")
-        self.assertEqual(list(cases), ACT)
+        context, cases = self.bench(ENV[0], "--simd", "portable")
+        self.assertEqual(list(cases), ENV[:1])
         self.assertEqual(context["simd_path"], "portable")
 
     def test_bad_input(self):
         for arguments, words in (
-                (["kernel/"], ["kernel/", "gradient, act"]), (["train"], ["train"]),
+                (["kernel/"], ["kernel/", "gradient or env"]), (["train"], ["train"]),
                 (["--threads", "0"], ["--threads"]), (["--threads", ""], ["--threads"]),
                 (["--seconds", "0"], ["--seconds"]), (["--seconds", "nan"], ["--seconds"]),
                 (["--repetitions", "1.5"], ["--repetitions"]), (["--simd", "mmx"], ["mmx"]),

@@ -1,5 +1,5 @@
-// Cases of `upswing bench` for a policy and its learning: gradient, act. The agent has no
-// extensions, so that it is comparable with other libraries.
+// Cases of `upswing bench gradient`. The agent has no extensions, so that it is comparable with
+// other libraries.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -8,7 +8,6 @@
 
 #include "base/rng.h"
 #include "base/thread_pool.h"
-#include "nn/network_policy.h"
 #include "pendulum/pendulum_env.h"
 #include "rl/dqn.h"
 #include "rl/replay.h"
@@ -83,35 +82,6 @@ BenchCase GradientCase(const DqnConfig& config, const std::shared_ptr<Replay>& r
           }};
 }
 
-BenchCase ActCase(int batch) {
-  constexpr int kHidden = 256, kStream = 128;
-  const NetworkShape shape{
-      kObservationSize, {kHidden, kHidden}, kBenchActions, false, Activation::kRelu, kStream};
-  // Acting skips the value stream: half of the streams' hidden layer, and the value layer.
-  const double multiply_adds = Network(shape).multiply_adds() - kStream * (kHidden + 1);
-  return {
-      .name = fmt::format("act/{0}-{0}/batch:{1}", kHidden, batch),
-      .count = static_cast<double>(batch),
-      .flops = 2.0 * multiply_adds * batch,
-      .prepare = [=]() -> BenchWork {
-        Rng rng(1, "benchmark");
-        NetworkPolicyParts parts{ActionRule::kLevels, shape};
-        const Network network(shape);
-        parts.parameters.resize(network.num_parameters());
-        network.Initialize(rng, parts.parameters);
-        parts.torques = TorqueLevels(Plant().torque_limit, kBenchActions);
-        const auto policy = std::make_shared<NetworkPolicy>(std::move(parts), PolicyInfo());
-        const auto n = static_cast<size_t>(batch);
-        const auto obs = std::make_shared<AlignedVector<float>>(n * kObservationSize);
-        for (float& x : *obs) x = static_cast<float>(rng.Uniform(-1, 1));
-        const auto torque = std::make_shared<std::vector<double>>(n);
-        const std::shared_ptr<Policy::Memory> memory = policy->Start(batch);
-        return [=] {
-          policy->Act({obs->data(), batch, kObservationSize}, {torque->data(), batch, 1}, *memory);
-        };
-      }};
-}
-
 }  // namespace
 
 BenchCases GradientCases(const BenchOptions& options) {
@@ -133,10 +103,6 @@ BenchCases GradientCases(const BenchOptions& options) {
     }
   }
   return cases;
-}
-
-BenchCases ActCases(const BenchOptions& /*options*/) {
-  return {ActCase(1), ActCase(8), ActCase(100)};
 }
 
 }  // namespace upswing

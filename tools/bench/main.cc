@@ -65,7 +65,7 @@ void Measure(benchmark::State& state, const BenchCase& c) {
 /// The cases whose names begin as wanted. Throws BadInput if there is none for a name.
 BenchCases WantedCases(const BenchOptions& options) {
   BenchCases all;
-  for (const auto part : {GradientCases, ActCases, EnvCases}) {
+  for (const auto part : {GradientCases, EnvCases}) {
     std::ranges::move(part(options), std::back_inserter(all));
   }
   const auto begins = [](const BenchCase& c, const std::string& name) {
@@ -74,7 +74,7 @@ BenchCases WantedCases(const BenchOptions& options) {
   for (const std::string& name : options.names) {
     if (std::ranges::any_of(all, [&](const BenchCase& c) { return begins(c, name); })) continue;
     throw BadInput(
-        Concat("bench: expected beginnings of names of cases, such as gradient, act or env, got \"",
+        Concat("bench: expected beginnings of names of cases, such as gradient or env, got \"",
                name, "\""));
   }
   std::erase_if(all, [&](const BenchCase& c) {
@@ -154,7 +154,6 @@ void AddBench(CommandLine& line) {
   line.Footer(
       "Cases:\n"
       "  gradient  updates of DQN: sample a minibatch and learn from it\n"
-      "  act       actions of a policy\n"
       "  env       environment steps: physics, observation, reward, reset\n"
       "\nGFLOP/s counts only the necessary multiplications and additions. The peak is measured\n"
       "first: multiply-adds in registers on the same number of threads. CPU time is the sum\n"
