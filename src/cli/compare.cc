@@ -98,7 +98,7 @@ void AddCompare(CommandLine& line) {
   line.Require("runs");
   AddControllers(line, a.controllers);
   line.Text("--out", a.out, "FOLDER",
-            "new folder for summary.csv, runs.csv, policies.csv, curves.svg and curves.png "
+            "new folder for summary.csv, runs.csv, curves.svg and curves.png "
             "(curves-2, … for further tasks)");
   line.Flag("--unfinished", a.runs.unfinished,
             "compare unfinished runs too, up to their last evaluation");

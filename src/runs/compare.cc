@@ -75,29 +75,6 @@ std::string RunsCsv(const std::vector<RunGroup>& groups) {
   return csv.text();
 }
 
-std::string PoliciesCsv(const std::vector<JudgedPolicy>& policies) {
-  CsvTable csv;
-  for (const JudgedPolicy& policy : policies) {
-    const Evaluation& e = policy.figures;
-    const auto if_upright = [&](double x) { return e.successes > 0 ? FormatNumber(x) : ""; };
-    csv.Add("policy", policy.name);
-    csv.Add("task", policy.task + 1);
-    csv.Add("runs", policy.runs);
-    csv.Add("episodes", e.episodes);
-    csv.Add("success_rate", e.success_rate());
-    csv.Add("success_low", e.success_interval.low);
-    csv.Add("success_high", e.success_interval.high);
-    csv.Add("swing_up_seconds_median", if_upright(e.swing_up_seconds.median));
-    csv.Add("return", e.reward_sum.mean);
-    csv.Add("return_deviation", e.reward_sum.deviation);
-    csv.Add("rms_torque", e.rms_torque.mean);
-    csv.Add("torque_variation", e.torque_variation.mean);
-    csv.Add("torque_variation_upright", if_upright(e.goal_variation.mean));
-    csv.EndRow();
-  }
-  return csv.text();
-}
-
 /// The episodes of the final evaluations of runs that are evaluated on one task, the double
 /// pendulum.
 std::vector<PendulumEnvConfig> FinalEvaluations(const Comparison& comparison, int task) {
@@ -253,7 +230,6 @@ std::vector<std::string> WriteComparison(const Comparison& comparison, const fs:
   };
   write("summary.csv", SummaryCsv(comparison.groups));
   write("runs.csv", RunsCsv(comparison.groups));
-  if (!comparison.policies.empty()) write("policies.csv", PoliciesCsv(comparison.policies));
   for (int task = 0; task < NumTasks(comparison); ++task) {
     std::vector<RunGroup> groups;
     std::ranges::copy_if(comparison.groups, std::back_inserter(groups),

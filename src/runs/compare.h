@@ -66,10 +66,9 @@ Comparison Compare(const CompareRequest& request);
 void AddPolicies(const std::vector<LoadedPolicy>& policies, bool redesign, ThreadPool& pool,
                  const Progress& progress, Comparison& comparison);
 
-/// Writes summary.csv (a row for each group), runs.csv (a row for each run), policies.csv (a row
-/// for each policy and task, if there are any), and each task's learning curves as
-/// CurvesName(task).svg and .png, if possible. Replaces existing files. Returns the files. Throws
-/// Failure if it cannot write.
+/// Writes summary.csv (a row for each group), runs.csv (a row for each run), and each task's
+/// learning curves as CurvesName(task).svg and .png, if possible. Replaces existing files. Returns
+/// the files. Throws Failure if it cannot write.
 std::vector<std::string> WriteComparison(const Comparison& comparison,
                                          const std::filesystem::path& folder);
 
