@@ -7,7 +7,7 @@
 
 #include "base/rng.h"
 #include "control/linearize.h"
-#include "control/riccati.h"
+#include "control/testing.h"
 #include "extras/realaigym/rules.h"
 #include "pendulum/closed_form.h"
 #include "runs/plant_file.h"
@@ -82,9 +82,7 @@ TEST(BoardPlant, LinearModelAndRegulatorAreTheBenchmarks) {
   EXPECT_NEAR(model.B[2], 27.179932885, 1e-8);
   EXPECT_NEAR(model.B[3], -44.272653678, 1e-8);
   const Eigen::RowVector4d K =
-      SolveContinuousLqr(model, Eigen::Vector4d(0.97, 0.93, 0.39, 0.26).asDiagonal(), 0.11)
-          .value()
-          .K;
+      ContinuousLqr(model, Eigen::Vector4d(0.97, 0.93, 0.39, 0.26).asDiagonal(), 0.11).K;
   const Eigen::RowVector4d expected{-74.06251872, -71.588802601, -17.239516925, -12.792756538};
   EXPECT_LT((K - expected).cwiseAbs().maxCoeff(), 1e-7);
 }

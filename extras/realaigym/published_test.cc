@@ -15,7 +15,7 @@
 #include "base/csv.h"
 #include "base/thread_pool.h"
 #include "control/linearize.h"
-#include "control/riccati.h"
+#include "control/testing.h"
 #include "extras/realaigym/hardware.h"
 #include "extras/realaigym/simulation.h"
 
@@ -138,9 +138,8 @@ class PublishedTvlqr {
 
 /// The regulator of the benchmark's baselines.
 Lqr BaselineLqr() {
-  return SolveContinuousLqr(LinearizeUpright(ManipulatorOf(BoardPlant()), 1),
-                            Eigen::Vector4d(0.97, 0.93, 0.39, 0.26).asDiagonal(), 0.11)
-      .value();
+  return ContinuousLqr(LinearizeUpright(ManipulatorOf(BoardPlant()), 1),
+                       Eigen::Vector4d(0.97, 0.93, 0.39, 0.26).asDiagonal(), 0.11);
 }
 
 PublishedTvlqr::Plan::Plan() : trajectory(ReadTrajectory()), upright(BaselineLqr()) {

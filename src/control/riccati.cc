@@ -66,23 +66,6 @@ std::optional<Lqr> SolveDiscreteLqr(const LinearModel& model, const Matrix4d& Q,
   return Lqr{K, *P};
 }
 
-std::optional<Lqr> SolveContinuousLqr(const LinearModel& model, const Matrix4d& Q, double R) {
-  const auto& [A, B] = model;
-  const Matrix4d I = Matrix4d::Identity(), G = B * B.transpose() / R;
-  const double gamma = A.norm();  // larger than all eigenvalues of A
-  const Matrix4d inverse = Solve(A - gamma * I, I);
-  const Matrix4d W = (A - gamma * I).transpose() + Q * inverse * G;
-  const Matrix4d W_inverse = Solve(W, I);
-  const auto P =
-      Doubled(I + 2 * gamma * W_inverse.transpose(), Symmetric(2 * gamma * inverse * G * W_inverse),
-              Symmetric(2 * gamma * W_inverse * Q * inverse));
-  if (!P) return std::nullopt;
-  const Matrix4d residual = A.transpose() * *P + *P * A - *P * G * *P + Q;
-  const double size = (*P * A).norm() + Q.norm();
-  if (!(residual.norm() <= kLargestResidual * size)) return std::nullopt;
-  return Lqr{B.transpose() * *P / R, *P};
-}
-
 double SpectralRadius(const Matrix4d& A) {
   // Gelfand's formula, ‖Aⁿ‖^(1/n) with n = 2^k. Each squaring divides the power by its norm and
   // sums the norms' logarithms.

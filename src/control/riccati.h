@@ -36,13 +36,6 @@ struct Lqr {
 /// Q gives no cost to a mode that has to be stabilised.
 std::optional<Lqr> SolveDiscreteLqr(const LinearModel& model, const Eigen::Matrix4d& Q, double R);
 
-/// Minimises ∫ x' Q x + R u² dt of ẋ = A x + B u:
-///   A' P + P A - P B R⁻¹ B' P + Q = 0
-/// Method: a Cayley transform, then doubling as in SolveDiscreteLqr. Chu, Fan, Lin, "A
-/// structure-preserving doubling algorithm for continuous-time algebraic Riccati equations", Linear
-/// Algebra and its Applications 396 (2005). Returns nothing if there is no solution.
-std::optional<Lqr> SolveContinuousLqr(const LinearModel& model, const Eigen::Matrix4d& Q, double R);
-
 /// Largest |eigenvalue|: x⁺ = A x decays if it is below 1. NaN if A is not finite.
 double SpectralRadius(const Eigen::Matrix4d& A);
 

@@ -64,33 +64,6 @@ TEST(Riccati, OneStateByHand) {
   EXPECT_NEAR(lqr->P(0, 0), 2 + std::sqrt(5), 1e-14);
 }
 
-TEST(Riccati, ContinuousSolutionIsThatOfTheStableSubspace) {
-  // P = Y X⁻¹ from the stable eigenvectors [X; Y] of the Hamiltonian matrix: Laub, "A Schur method
-  // for solving algebraic Riccati equations" (1979), with eigenvectors instead of Schur vectors.
-  Rng rng(1, "systems");
-  for (int trial = 0; trial < 100; ++trial) {
-    const LinearModel model{3 * Drawn(rng),
-                            {rng.Normal(), rng.Normal(), rng.Normal(), rng.Normal()}};
-    const Matrix4d L = Drawn(rng), Q = L * L.transpose() + 0.1 * Matrix4d::Identity();
-    const double R = std::exp(rng.Uniform(-2, 2));
-    Eigen::Matrix<double, 8, 8> H;
-    H << model.A, -model.B * model.B.transpose() / R, -Q, -model.A.transpose();
-    const EigenSolver solver(H);
-    Eigen::Matrix<std::complex<double>, 8, 4> stable;
-    Eigen::Index found = 0;
-    for (Eigen::Index i = 0; i < 8; ++i) {
-      if (solver.eigenvalues()[i].real() < 0) stable.col(found++) = solver.eigenvectors().col(i);
-    }
-    ASSERT_EQ(found, 4);
-    const Eigen::Matrix4cd X = stable.topRows<4>(), Y = stable.bottomRows<4>();
-    const Matrix4d P = (Y * X.inverse()).real();
-    const auto lqr = SolveContinuousLqr(model, Q, R);
-    ASSERT_TRUE(lqr.has_value());
-    EXPECT_LT((lqr->P - P).norm(), 1e-7 * P.norm()) << trial;
-    EXPECT_LT((lqr->K - model.B.transpose() * P / R).norm(), 1e-7 * lqr->K.norm()) << trial;
-  }
-}
-
 TEST(Riccati, NoSolutionWhereAGrowingModeCannotBeReached) {
   const Matrix4d Q = Matrix4d::Identity();
   EXPECT_FALSE(SolveDiscreteLqr(Two(1.1, 0, 0.3, 0.5, 0, 1), Q, 1).has_value());
@@ -110,7 +83,6 @@ TEST(Riccati, NoSolutionForNumbersThatAreNotFinite) {
   for (const double x :
        {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
     EXPECT_FALSE(SolveDiscreteLqr(Two(x, 0, 0, 0, 1, 0), Q, 1));
-    EXPECT_FALSE(SolveContinuousLqr(Two(x, 0, 0, 0, 1, 0), Q, 1));
   }
 }
 

@@ -21,6 +21,23 @@ namespace upswing {
 using EigenSolver = Eigen::EigenSolver<Eigen::MatrixXd>;
 using SymmetricEigenSolver = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>;
 
+/// Minimises ∫ x' Q x + R u² dt of ẋ = A x + B u: P = Y X⁻¹ from the stable eigenvectors [X; Y] of
+/// the Hamiltonian matrix (Laub, "A Schur method for solving algebraic Riccati equations", 1979,
+/// with eigenvectors instead of Schur vectors).
+inline Lqr ContinuousLqr(const LinearModel& model, const Eigen::Matrix4d& Q, double R) {
+  Eigen::Matrix<double, 8, 8> H;
+  H << model.A, -model.B * model.B.transpose() / R, -Q, -model.A.transpose();
+  const EigenSolver solver(H);
+  Eigen::Matrix<std::complex<double>, 8, 4> stable;
+  Eigen::Index found = 0;
+  for (Eigen::Index i = 0; i < 8 && found < 4; ++i) {
+    if (solver.eigenvalues()[i].real() < 0) stable.col(found++) = solver.eigenvectors().col(i);
+  }
+  const Eigen::Matrix4cd X = stable.topRows<4>(), Y = stable.bottomRows<4>();
+  const Eigen::Matrix4d P = (Y * X.inverse()).real();
+  return {model.B.transpose() * P / R, P};
+}
+
 /// A random plant within 50% of the standard plant's parameters, with the motor at joint 1.
 inline Plant DrawPlant(Rng& rng) {
   Plant plant;
