@@ -224,7 +224,7 @@ class PanelScript {
     }
     for (size_t i = 0; i < panel_.lines.size(); ++i) {
       const Line& line = panel_.lines[i];
-      if (line.low.empty() || line.points) continue;
+      if (line.low.empty()) continue;
       layers.push_back(Concat("$L", i, " using 1:3:4 with filledcurves fs transparent solid 0.2 ",
                               "noborder lc rgb '", Color(i), "' notitle"));
     }
@@ -251,11 +251,6 @@ class PanelScript {
       const std::string end = Number(*line.dotted_from);
       layers.push_back(Concat("$L", i, " using ($1<=", end, "?$1:NaN):2", style, dash, title));
       layers.push_back(Concat("$L", i, " using ($1>=", end, "?$1:NaN):2", style, 3, " notitle"));
-      return;
-    }
-    if (!line.low.empty()) {
-      layers.push_back(Concat("$L", i, " using 1:2:3:4 with yerrorbars", type, Size(0.7), " lw 1.5",
-                              color, title));
       return;
     }
     // Give markers on a heat map a white rim, which separates them from every colour.

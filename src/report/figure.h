@@ -14,7 +14,7 @@ enum class Marker { kDot, kSquare, kCross };
 struct Line {
   std::string name;               // name in the legend; empty: no entry
   std::vector<double> x, y;       // (n)
-  std::vector<double> low, high;  // (n) band around the line, or error bars of points; empty: none
+  std::vector<double> low, high;  // (n) band around the line; empty: none
   bool points = false;            // whether to draw markers in place of a line
   Marker marker = Marker::kDot;
   std::optional<double> dotted_from = {};  // x from which the line is dotted
