@@ -72,7 +72,8 @@ class ReadersTest(ProgramTest):
 
     def assert_scalars_are_the_tables(self):
         scalars = self.scalars()
-        for prefix, table in (("train/", "metrics.csv"), ("evaluation/", "evals.csv")):
+        for prefix, table in (("train/", "metrics.csv"), ("episode/", "episodes.csv"),
+                              ("evaluation/", "evals.csv")):
             rows = read_csv(self.folder / "run" / table)
             for column in list(rows[0])[1:]:
                 self.assertEqual(scalars.pop(prefix + column),

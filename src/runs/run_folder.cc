@@ -101,7 +101,7 @@ void RunFolder::Create(const fs::path& given,
 RunFolder::RunFolder(fs::path path, const Tensors& checkpoint)
     : path_(std::move(path)),
       metrics_{"train/", AppendFile(path_ / kMetrics), {}, {}},
-      episodes_{"", AppendFile(path_ / kEpisodes), {}, {}},
+      episodes_{"episode/", AppendFile(path_ / kEpisodes), {}, {}},
       evals_{"evaluation/", AppendFile(path_ / kEvaluations), {}, {}},
       events_(path_ / kEventsName),
       log_(path_ / kLog) {
@@ -164,7 +164,6 @@ void RunFolder::AppendRow(Table& table, const Row& row) {
   }
   table.pending += text + '\n';
 
-  if (table.tag.empty()) return;
   Row scalars(row.begin() + 1, row.end());
   for (auto& [name, value] : scalars) name.insert(0, table.tag);
   events_.Append(static_cast<int64_t>(row.front().second), scalars);

@@ -20,7 +20,7 @@ using Row = std::vector<std::pair<std::string, double>>;
 ///   metrics.csv             a row per log interval
 ///   episodes.csv            a row per training episode
 ///   evals.csv               a row per evaluation
-///   events.out.tfevents.*   metrics and evaluations for TensorBoard
+///   events.out.tfevents.*   the rows of the three tables for TensorBoard
 ///   checkpoint.safetensors  the whole state of the training
 ///   policy.safetensors      the best policy at evaluation
 ///   log.txt                 events with date and time
@@ -76,7 +76,7 @@ class RunFolder {
 
  private:
   struct Table {
-    std::string tag;  // prefix of its columns in TensorBoard; empty: not in TensorBoard
+    std::string tag;  // prefix of its columns in TensorBoard
     AppendFile file;
     std::vector<std::string> columns;  // column names of the first line; empty: no line yet
     std::string pending;               // rows that are not in the file yet
