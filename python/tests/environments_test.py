@@ -147,6 +147,16 @@ class Environments(unittest.TestCase):
             _, reward, _, _, info = env.step(env.action_space.sample())
             self.assertAlmostEqual(reward, sum(info["reward_terms"].values()), delta=1e-12)
 
+    def test_the_reward_is_an_expression(self):
+        env = gym.make(ID, reward="up: h; 2*tau")
+        env.reset(seed=2)
+        _, reward, _, _, info = env.step(np.array([1.5]))
+        self.assertEqual(list(info["reward_terms"]), ["up", "term2"])
+        self.assertEqual(info["reward_terms"]["term2"], 3)
+        self.assertEqual(reward, sum(info["reward_terms"].values()))
+        with self.assertRaisesRegex(ValueError, "did you mean w1"):
+            gym.make(ID, reward="w3")
+
     def test_an_episode_is_truncated_after_its_time(self):
         env = gym.make(ID, episode_seconds=0.1, physics="closed-form")
         env.reset(seed=1)

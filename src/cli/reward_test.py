@@ -1,0 +1,58 @@
+#!/usr/bin/env python3
+"""Tests of --reward: a training by a reward of your own."""
+
+import unittest
+
+from testing import ProgramTest, read_csv, read_tensors, small
+
+REWARD = "energy: E; height: h - 0.5; term3: -0.01*tau^2 - 0.001*abs(dtau) + upright"
+
+
+class RewardTest(ProgramTest):
+    def test_terms_are_columns_and_evaluations_keep_the_posts_reward(self):
+        same = {"updates_per_step": 0, "steps": 2000, "eval_every": 1000, "episode_seconds": 1}
+        self.succeed(*small(**same, reward=REWARD))
+        rows = read_csv(self.folder / "run/episodes.csv")
+        terms = ["energy", "height", "term3"]
+        self.assertEqual(list(rows[0])[5:], terms)
+        for row in rows:
+            self.assertAlmostEqual(row["return"], sum(row[term] for term in terms), delta=1e-9)
+        # Without updates, the policy is the same.
+        self.succeed(*small(**same, out="usual"))
+        evaluations = [[{**row, "seconds": 0, "expected": 0} for row in read_csv(self.folder / run / "evals.csv")]
+                       for run in ("run", "usual")]
+        self.assertEqual(*evaluations)
+
+    def test_a_resumed_run_equals_one_that_was_never_stopped(self):
+        self.succeed(*small(steps=2000, reward=REWARD, episode_seconds=1.5))
+        self.refuse(["train", "--resume", "run", "--reward", "E", "--steps", "4000"],
+                    "reward", "E; height")
+        self.succeed("train", "--resume", "run", "--steps", "4000")
+        self.succeed(*small(steps=4000, reward=REWARD, episode_seconds=1.5, out="never-stopped"))
+        self.assert_same_run("run", "never-stopped")
+
+    def test_files_keep_the_reward(self):
+        self.succeed(*small(steps=2000, reward=REWARD))
+        metadata, _ = read_tensors(self.folder / "run/policy.safetensors")
+        self.assertIn(f'reward = "{REWARD}"\n', metadata["config"])
+        self.succeed(*small(steps=2000, out="usual"))
+        self.assertIn("reward", self.succeed("compare", "run", "usual"))
+        # A file of settings has it, too.
+        settings = (self.folder / "run/config.toml").read_text(encoding="utf-8")
+        self.write("mine.toml", settings)
+        self.succeed("train", "--config", "mine.toml", "--out", "again")
+        self.assert_same_run("run", "again")
+
+    def test_a_reward_that_is_not_finite_stops_the_training_with_its_state(self):
+        done = self.run_here(*small(reward="ok: E; bad: sqrt(0.5 - h)"))
+        self.assertEqual((done.returncode, len(done.stderr.splitlines())), (1, 1))
+        for words in ("training stopped at step",
+                      "reward: bad: expected a number within ±1e9, got nan at q1 = ", ", w2 = ",
+                      "; the checkpoint of step 0 is kept in run"):
+            self.assertIn(words, done.stderr)
+        self.refuse(small(reward="E + w3", out="other"), "reward: term1: ", "(did you mean w1?)")
+        self.assertFalse((self.folder / "other").exists())
+
+
+if __name__ == "__main__":
+    unittest.main()
