@@ -32,10 +32,16 @@ async function settle(frames: () => Promise<number>): Promise<number> {
 // A page comes to rest after a number of frames.
 test.use({ smooth: true });
 
-test('a paused page asks for no frame until something changes', async ({ page }) => {
-  await open(page, '#agent=fast&on=1');
-  await page.locator('#pause').click();
+test('a page that hangs still or is paused asks for no frame until something changes', async ({
+  page,
+}) => {
+  await open(page, '#agent=fast');
+  await page.evaluate(() => (upswing.scene.draw = () => {})); // what it draws does not matter here
   const frames = await countFrames(page);
+  await settle(frames);
+  await page.locator('#agent-on').click();
+  await expect.poll(() => page.evaluate(() => upswing.world.state.q1)).not.toBe(0);
+  await page.locator('#pause').click();
   let asked = await settle(frames);
   await page.waitForTimeout(1000);
   expect(await frames()).toBe(asked);
