@@ -2,9 +2,11 @@
 """Tests of `./upswing demo`: what it serves and refuses. tools/web_test runs this with the built
 page in UPSWING_PAGE; nothing is installed or built."""
 
+import base64
 import gzip
 import json
 import os
+import re
 import shutil
 import signal
 import socket
@@ -172,6 +174,20 @@ class DemoTest(ProgramTest):
         self.assertEqual({path.name for path in self.work.iterdir()}, set(folders))
         self.assertNotIn("\x1b", self.demo("--dist", "\x1b[2J").stdout)
 
+    def test_one_file_holds_the_page_and_the_runs(self):
+        self.succeed(*small(out="work/My Run"))
+        done = self.demo("My Run", "--file", "page.html")
+        self.assertEqual((done.returncode, done.stderr), (0, ""), done)
+        html = (self.work / "page.html").read_text(encoding="utf-8")
+        held = dict(re.findall(r'data-file="([^"]*)">([^<]*)</script>', html))
+        agents = json.loads(gzip.decompress(base64.b64decode(held["agents.json"])))
+        (mine,) = [each for each in agents["agents"] if each["id"] == "my-run"]
+        self.assertEqual(gzip.decompress(base64.b64decode(held[mine["file"]])),
+                         (self.work / "My Run/policy.safetensors").read_bytes())
+        for path in self.page.rglob("*.wasm"):
+            self.assertEqual(gzip.decompress(base64.b64decode(held[path.name])), path.read_bytes())
+        self.assertEqual(list(self.temporary.iterdir()), [])
+
     def test_bad_input_is_refused_in_one_line(self):
         (self.work / "full").mkdir()
         (self.work / "full/file").touch()
@@ -185,7 +201,9 @@ class DemoTest(ProgramTest):
                                   (["--dist", "full/file"], "full/file"),
                                   (["--dist", "no/where"], "no"),
                                   (["--dist="], "--dist"),
-                                  (["--dist", "x", "--port", "1024"], "both"),
+                                  (["--dist", "x", "--port", "1024"], "one of"),
+                                  (["--file", "x.html", "--dist", "x"], "one of"),
+                                  (["--file", "no/where.html"], "--file", "no/where.html"),
                                   (["nothing"], "nothing"),
                                   (["full"], "full"),
                                   (["lqr"], "lqr"),
@@ -205,7 +223,7 @@ class DemoTest(ProgramTest):
     def test_help(self):
         done = self.demo("--help")
         self.assertEqual((done.returncode, done.stderr), (0, ""))
-        for word in ("--port", "--dist", "Examples"):
+        for word in ("--port", "--dist", "--file", "Examples"):
             self.assertIn(word, done.stdout)
 
 

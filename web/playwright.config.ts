@@ -16,6 +16,7 @@ export default defineConfig({
   timeout: 2_400_000,
   expect: { timeout: 300_000 },
   use: {
+    serviceWorkers: 'block', // a page from before would answer
     baseURL: `http://127.0.0.1:${port}/`,
     launchOptions,
     actionTimeout: 300_000,

@@ -1,10 +1,12 @@
 import { defineConfig } from 'vitest/config';
 import { addresses } from './build/addresses.ts';
 import { mujoco } from './build/mujoco.ts';
+import { offline } from './build/offline.ts';
+import { single } from './build/single.ts';
 
 export default defineConfig({
   base: './', // served from any folder
-  plugins: [mujoco(), addresses()],
+  plugins: [mujoco(), addresses(), offline(), single()],
   optimizeDeps: { exclude: ['@mujoco/mujoco'] },
   build: {
     outDir: '../build/web',

@@ -15,6 +15,8 @@
 #include "extras/deploy/export.h"
 #include "os/command.h"
 #include "os/file.h"
+#include "os/gzip.h"
+#include "os/streams.h"
 
 namespace upswing::deploy {
 
@@ -32,7 +34,7 @@ constexpr int kPatience = 15;  // s, for a whole request, and for a part of an a
 struct DemoArguments {
   std::vector<std::string> policies;
   int64_t port = 0;  // 0: not given
-  std::string dist;
+  std::string dist, file;
 };
 
 /// The folder of the built page: UPSWING_PAGE, else that of an installed program. Throws Failure.
@@ -77,10 +79,13 @@ fs::path DistFolder(std::string dist) {
   return dist;
 }
 
-/// Mistakes in --port and --dist are reported before any file is read.
+/// Mistakes in --port, --dist and --file are reported before any file is read.
 void CheckPlace(const DemoArguments& a) {
+  if ((a.port != 0) + !a.dist.empty() + !a.file.empty() > 1) {
+    throw BadInput("demo: expected one of --port, --dist and --file, got two or more");
+  }
+  if (!a.file.empty()) CheckWritable("--file", a.file);
   if (a.dist.empty()) return;
-  if (a.port != 0) throw BadInput("demo: expected --port or --dist, got both");
   const fs::path dist = DistFolder(a.dist);
   CheckFree(dist, "choose another --dist");
   const fs::path parent = dist.has_parent_path() ? dist.parent_path() : ".";
@@ -108,20 +113,67 @@ int WriteDist(const DemoArguments& a, const fs::path& page) {
   return 0;
 }
 
-/// Serves the page until a signal ends it. With policies, their files and those of the page's own
-/// agents are in a temporary folder, because the page may be read-only.
+/// The page's folder of agents. With policies, their files and those of the page's own agents are
+/// in the new folder `temporary`, because the page may be read-only.
+fs::path AgentsFolder(const DemoArguments& a, const fs::path& page,
+                      std::optional<Making>& temporary) {
+  if (a.policies.empty()) return page / kAgents;
+  temporary.emplace(fs::temp_directory_path() / "upswing-demo", Making::Kind::kFolder);
+  fs::path agents = temporary->path() / kAgents;
+  fs::create_directory(agents);
+  if (fs::is_directory(page / kAgents)) CopyContent(page / kAgents, agents);
+  AddAgents(a, agents);
+  return agents;
+}
+
+std::string Base64(std::string_view bytes) {
+  constexpr std::string_view kLetters =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  for (size_t at = 0; at < bytes.size(); at += 3) {
+    uint32_t group = 0;
+    for (size_t k = at; k < at + 3; ++k) {
+      group = group << 8 | (k < bytes.size() ? static_cast<uint8_t>(bytes[k]) : 0);
+    }
+    for (const int shift : {18, 12, 6, 0}) text += kLetters[group >> shift & 63];
+  }
+  const size_t spare = (3 - bytes.size() % 3) % 3;
+  return text.replace(text.size() - spare, spare, spare, '=');
+}
+
+/// Writes the page with its agents as one file, as web/src/page/fetch.ts reads it.
+int WriteSingle(const DemoArguments& a, const fs::path& page) {
+  constexpr std::string_view kPlace = "<!-- files -->";
+  std::string html = ReadOwnFile(page / "single.html");
+  const size_t place = html.rfind(kPlace);
+  if (place == std::string::npos) {
+    throw Failure(Concat(page.string(), ": expected \"", kPlace, "\" in single.html, found none"));
+  }
+  std::optional<Making> temporary;
+  std::string files;
+  for (const fs::path& folder : {page / "assets", AgentsFolder(a, page, temporary)}) {
+    for (const auto& entry : fs::directory_iterator(folder)) {
+      const fs::path& file = entry.path();
+      const std::string type = file.extension().string();
+      if (type != ".wasm" && type != ".json" && type != ".safetensors") continue;
+      files += Concat("<script type=\"text/plain\" data-file=\"", file.filename().string(), "\">",
+                      Base64(Gzip(ReadOwnFile(file))), "</script>\n");
+    }
+  }
+  WriteOutput(a.file, html.replace(place, kPlace.size(), files));
+  if (IsStandardStream(a.file)) return 0;
+  fmt::print("{} ({:.1f} MB): the page, which a browser opens without a server\n",
+             Printable(a.file), static_cast<double>(html.size()) / 1e6);
+  return 0;
+}
+
+/// Serves the page until a signal ends it.
 int ServePage(const DemoArguments& a, const fs::path& page) {
   std::string job = Concat(kPatience, '\n', a.port == 0 ? kUsualPort : a.port, '\n',
                            a.port == 0 ? kLastPort : a.port, '\n', fs::absolute(page).string());
   std::optional<Making> temporary;
-  if (!a.policies.empty()) {
-    temporary.emplace(fs::temp_directory_path() / "upswing-demo", Making::Kind::kFolder);
-    const fs::path agents = temporary->path() / kAgents;
-    fs::create_directory(agents);
-    if (fs::is_directory(page / kAgents)) CopyContent(page / kAgents, agents);
-    AddAgents(a, agents);
-    job += '\n' + agents.string();
-  }
+  const fs::path agents = AgentsFolder(a, page, temporary);
+  if (temporary) job += '\n' + agents.string();
   PythonChild server("demo", DemoServer(), job);
   while (const auto port = server.Next()) {
     fmt::print("The page is at http://localhost:{}/ (stop with Ctrl-C).\n", *port);
@@ -134,6 +186,7 @@ int ServePage(const DemoArguments& a, const fs::path& page) {
 int RunDemo(const DemoArguments& a) {
   const fs::path page = PageFolder();
   InstallSignalHandlers("");
+  if (!a.file.empty()) return WriteSingle(a, page);
   return a.dist.empty() ? ServePage(a, page) : WriteDist(a, page);
 }
 
@@ -150,6 +203,9 @@ void AddDemo(CommandLine& line) {
   line.Text("--dist", a.dist, "FOLDER",
             "new or empty folder to write the page into, for any web server, instead of serving",
             "a folder");
+  line.Text(
+      "--file", a.file, "FILE.html",
+      "HTML file to write the page into, which a browser opens without a server or a network");
   line.Check([&a] { CheckPlace(a); });
   line.Footer(
       "The server listens on this machine only. It runs in Python: `python3`, or the one that\n"
@@ -157,7 +213,8 @@ void AddDemo(CommandLine& line) {
       "Examples:\n"
       "  ./upswing demo\n"
       "  ./upswing demo runs/d3qn-seed1\n"
-      "  ./upswing demo --dist site && python3 -m http.server -d site\n");
+      "  ./upswing demo --dist site && python3 -m http.server -d site\n"
+      "  ./upswing demo --file upswing.html\n");
 }
 
 }  // namespace upswing::deploy

@@ -48,9 +48,16 @@ const page = await start().catch((error: unknown) => {
 });
 element('loading').hidden = true;
 
+/// Keeps the page for visits without a network; not the one of `./upswing demo`.
+function keepForLater(): void {
+  if (!location.protocol.startsWith('http') || location.hostname === 'localhost') return;
+  void navigator.serviceWorker?.register('./sw.js').catch(() => {}); // some browsers keep nothing
+}
+
 // MuJoCo is larger than everything else, so the pendulum does not wait for it.
 try {
   if (page) page.continueIn(await fetchMujoco());
+  keepForLater();
 } catch (error) {
   const instead = 'Upswing’s own equations of motion move the pendulum instead.';
   warn(`MuJoCo could not start: ${reasonOf(error)}. ${instead}`);

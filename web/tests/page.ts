@@ -21,7 +21,7 @@ function complaintsOf(context: BrowserContext): string[] {
   context.on('console', (message) => {
     const text = message.text();
     // Only tests read canvases back.
-    if (text.includes('willReadFrequently')) return;
+    if (/willReadFrequently|blocked by Playwright/.test(text)) return;
     if (['error', 'warning'].includes(message.type())) complaints.push(text);
   });
   context.on('weberror', (error) => complaints.push(String(error.error())));
@@ -53,7 +53,10 @@ export const test = base.extend<Options & { stage: Page }, { kept: Kept }>({
   },
   kept: [
     async ({ browser }, use, { project }) => {
-      const context = await browser.newContext({ baseURL: project.use.baseURL });
+      const context = await browser.newContext({
+        baseURL: project.use.baseURL,
+        serviceWorkers: 'block',
+      });
       await context.addInitScript(drawSeldom);
       await use({ page: await context.newPage(), complaints: complaintsOf(context) });
       await context.close();
