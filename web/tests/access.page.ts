@@ -58,6 +58,14 @@ test('axe finds no problem in any step of the tour or in everything, in any them
   await expect(page.locator('#learn-updates')).not.toHaveText('0');
   await page.locator('#learn-start').click();
   await expectNone(page, 'learn');
+  await open(page, '#write=cmV0dXJu');
+  await page.evaluate(() => {
+    for (const details of document.querySelectorAll('details')) details.open = true;
+    document.getElementById('write-table')!.hidden = false;
+  });
+  await page.locator('#write-run').click();
+  await expect(page.locator('#write-problem')).not.toBeEmpty();
+  await expectNone(page, 'write', '#write-panel');
   await page.getByRole('link', { name: 'Everything', exact: true }).click();
   await page.evaluate(async () => {
     for (const details of document.querySelectorAll('details')) details.open = true;

@@ -26,10 +26,11 @@ export function listenToFilms(
   scenes: () => readonly Scene[],
   title: () => readonly [string, string],
 ): void {
-  for (const button of document.querySelectorAll<HTMLButtonElement>('button.film')) {
-    button.hidden = filmType === undefined;
-    button.addEventListener('click', () => void press(button, () => film(scenes(), title)));
-  }
+  document.documentElement.toggleAttribute('data-films', filmType !== undefined);
+  addEventListener('click', ({ target }) => {
+    const button = (target as Element).closest<HTMLButtonElement>('button.film');
+    if (button) void press(button, () => film(scenes(), title));
+  });
 }
 
 async function press(button: HTMLButtonElement, work: () => Promise<void>): Promise<void> {

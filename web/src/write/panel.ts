@@ -1,7 +1,7 @@
 import { coreModule } from '../core';
 import type { Agent } from '../page/agents';
 import { addressOf } from '../page/address';
-import { send } from '../page/clipboard';
+import { nameSendButtons, send } from '../page/clipboard';
 import type { Clock } from '../page/clock';
 import { button, element, write } from '../page/dom';
 import { recall, remember } from '../page/storage';
@@ -15,6 +15,7 @@ import type { Problem } from './sandbox';
 import { EPISODES } from './score';
 import type { Score } from './score';
 import type { Contender, Result, Task } from './worker';
+import MARKUP from './panel.html?raw';
 import HINT from './hint.txt?raw';
 import START from './start.txt?raw';
 import './write.css';
@@ -36,6 +37,10 @@ export interface WritePage {
   /// Hangs the pendulum.
   reset(): void;
 }
+
+// Markup of its own keeps the page's first load small.
+element('write-panel').innerHTML = MARKUP;
+nameSendButtons();
 
 export class WritePanel {
   private readonly page: WritePage;
