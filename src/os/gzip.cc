@@ -67,6 +67,25 @@ std::string Gunzip(std::string_view bytes, const std::string& where, size_t most
   }
 }
 
+std::string Gzip(std::string_view text) {
+  constexpr int kGzipHeader = 16, kMemory = 9;  // the most memory, 256 KB
+  z_stream stream{};
+  if (deflateInit2(&stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, MAX_WBITS + kGzipHeader, kMemory,
+                   Z_DEFAULT_STRATEGY) != Z_OK) {
+    throw Failure("zlib does not work");
+  }
+  std::string bytes(deflateBound(&stream, text.size()), '\0');
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(text.data()));
+  stream.avail_in = static_cast<uInt>(text.size());
+  stream.next_out = reinterpret_cast<Bytef*>(bytes.data());
+  stream.avail_out = static_cast<uInt>(bytes.size());
+  const int status = deflate(&stream, Z_FINISH);
+  bytes.resize(stream.total_out);
+  deflateEnd(&stream);
+  if (status != Z_STREAM_END) throw Failure("zlib cannot compress");
+  return bytes;
+}
+
 uint32_t Crc32(std::span<const std::byte> bytes) {
   const auto* data = reinterpret_cast<const Bytef*>(bytes.data());
   return static_cast<uint32_t>(crc32_z(0, data, bytes.size()));

@@ -19,6 +19,9 @@ bool IsGzip(std::string_view bytes);
 std::string Gunzip(std::string_view bytes, const std::string& where,
                    size_t most_bytes = kMostTextBytes);
 
+/// Compresses a text as a gzip file.
+std::string Gzip(std::string_view text);
+
 /// CRC-32 of IEEE 802.3, as PNG files and most microcontrollers compute it.
 uint32_t Crc32(std::span<const std::byte> bytes);
 

@@ -1,28 +1,12 @@
 #include "os/gzip.h"
 
 #include <gtest/gtest.h>
-#include <zlib.h>
 
 #include "base/error.h"
 #include "base/text.h"
 
 namespace upswing {
 namespace {
-
-/// A text as a gzip file.
-std::string Gzip(std::string text) {
-  z_stream stream{};
-  deflateInit2(&stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, MAX_WBITS + 16, 9, Z_DEFAULT_STRATEGY);
-  std::string bytes(deflateBound(&stream, text.size()), '\0');
-  stream.next_in = reinterpret_cast<Bytef*>(text.data());
-  stream.avail_in = static_cast<uInt>(text.size());
-  stream.next_out = reinterpret_cast<Bytef*>(bytes.data());
-  stream.avail_out = static_cast<uInt>(bytes.size());
-  EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
-  bytes.resize(stream.total_out);
-  deflateEnd(&stream);
-  return bytes;
-}
 
 /// A text larger than the inflater's buffer.
 std::string LongText() {
