@@ -220,6 +220,10 @@ class DemoTest(ProgramTest):
         self.environment["UPSWING_PAGE"] = str(self.folder / "none")
         self.assert_one_line(self.demo(), 1, "UPSWING_PAGE", "./upswing demo builds it")
 
+    def test_a_missing_python_is_named(self):
+        self.environment["UPSWING_PYTHON"] = "/none"
+        self.assert_one_line(self.demo(), 1, "demo: cannot run /none", "UPSWING_PYTHON")
+
     def test_help(self):
         done = self.demo("--help")
         self.assertEqual((done.returncode, done.stderr), (0, ""))
