@@ -1,12 +1,11 @@
-// Writes the corpus inputs that the program itself creates. Run it after a change of the file
-// formats:
+// Writes the corpus inputs that trainings create. Run it after a change of the file formats:
 //   fuzz_seeds tools/fuzz/corpus
+// The small policies of other kinds there stay as they are: files of other writers do not change.
 #include <cstdio>
 #include <filesystem>
 
 #include "agents/loaded_policy.h"
 #include "base/error.h"
-#include "nn/network_policy.h"
 #include "runs/tensor_file.h"
 #include "runs/this_host.h"
 #include "tools/fuzz/tiny_training.h"
@@ -43,34 +42,6 @@ void MakeSeeds(const fs::path& corpus) {
         corpus / "policy/accepted" / ((actor ? kind : "dueling-" + kind) + ".safetensors");
     SaveTensors(training.agent().ExportPolicy(info)->ToTensors(), file);
   }
-  // A minimal example of the other kind of network.
-  const Plant plant;
-  const PolicyInfo all = InfoOf(Config());
-  PolicyInfo info;
-  info.plant = all.plant;
-  info.control_period = all.control_period;
-  info.observation = all.observation;
-  for (const ActionRule rule : {ActionRule::kClippedGaussian, ActionRule::kCategorical}) {
-    const bool categorical = rule == ActionRule::kCategorical;
-    NetworkPolicyParts parts{rule};
-    parts.shape = {kObservationSize, {2}, categorical ? 3 : 2, false, Activation::kTanh};
-    parts.parameters.assign(categorical ? 27 : 24, 0.25F);
-    parts.action_limit = {plant.torque_limit};
-    if (categorical) parts.torques = {-1, 0, 1};
-    parts.critic = {kObservationSize, {2}, 1, false, Activation::kTanh};
-    parts.critic_parameters.assign(21, 0.5F);
-    SaveTensors(NetworkPolicy(parts, info).ToTensors(),
-                corpus / "policy/accepted" /
-                    (categorical ? "categorical.safetensors" : "clipped-gaussian.safetensors"));
-  }
-  NetworkPolicyParts parts{ActionRule::kLevels, {kObservationSize, {1}, 2}};
-  parts.parameters.assign(Network(parts.shape).num_parameters(), 0.25F);
-  parts.torques = {-1, 1};
-  const NetworkPolicy policy(parts, info);
-  SaveTensors(policy.ToTensors(), corpus / "policy/accepted/plain-of-another-writer.safetensors");
-  Tensors narrow = policy.Rounded().ToTensors();
-  narrow.Narrow();
-  SaveTensors(narrow, corpus / "policy/accepted/bfloat16.safetensors");
 }
 
 }  // namespace
