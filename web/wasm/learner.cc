@@ -59,6 +59,7 @@ json Learner::Report() {
               {"finished", training_.trainer().finished()},
               {"bestStep", s.best_step},
               {"bestSuccess", s.best_success_rate},
+              {"terms", training_.env().spec().term_names},
               {"episodes", std::move(episodes_)},
               {"evaluations", std::move(evaluations_)}};
   episodes_ = evaluations_ = json::array();
@@ -90,7 +91,8 @@ std::vector<std::byte> Learner::Poses() const {
 }
 
 void Learner::OnEpisode(const TrainState& state, const FinishedEpisode& episode) {
-  episodes_.push_back({{"step", state.steps}, {"return", episode.reward_sum}});
+  episodes_.push_back(
+      {{"step", state.steps}, {"return", episode.reward_sum}, {"terms", episode.terms}});
 }
 
 void Learner::OnEvaluation(const TrainState& state, const Evaluation& evaluation) {

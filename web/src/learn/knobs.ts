@@ -39,7 +39,7 @@ export class Knobs {
   /// The settings that a visitor can change for one of the `LEARNERS`.
   settingsOf(agent: string): readonly Setting[] {
     const settings = agentSettings(core(), agent);
-    return KNOBS[agent]!.map((name) => settings.get(name)!);
+    return [...KNOBS[agent]!, 'reward'].flatMap((name) => settings.get(name) ?? []);
   }
 
   /// Sets some of the shown settings; the others get the agent's own values.
@@ -55,7 +55,8 @@ export class Knobs {
 
   /// Shows the settings of a named agent at its own values.
   show(agent: string): void {
-    this.inputs = this.settingsOf(agent).map((setting) => ({ setting, input: inputOf(setting) }));
+    const numbers = this.settingsOf(agent).filter(({ name }) => name !== 'reward');
+    this.inputs = numbers.map((setting) => ({ setting, input: inputOf(setting) }));
     this.place.replaceChildren(
       ...this.inputs.map(({ input, setting }) => {
         const label = document.createElement('label');

@@ -12,9 +12,11 @@ import type { Checkpoint, Course, Recording } from './course';
 import { Filmstrip } from './filmstrip';
 import { Knobs, LEARNERS } from './knobs';
 import './learn.css';
+import type { LearnSettings } from './learner';
 import { Lesson } from './lesson';
 import { nameOf as contenderOf, RACE_SEEDS } from './race';
 import { RacePanel } from './race_panel';
+import { RewardPanel } from './reward';
 import { decodeRecipe, encodeRecipe, LARGEST_SEED } from './recipe';
 import { Scrubber } from './scrubber';
 import type { LearnStage } from './scrubber';
@@ -68,6 +70,7 @@ export class LearnPanel {
   private readonly strip: Filmstrip;
   private readonly race: RacePanel;
   private readonly lesson = new Lesson();
+  private readonly reward = new RewardPanel(() => this.start());
   private readonly slow = element<HTMLInputElement>('learn-slow');
   private rival: string | undefined; // of the race that is shown
   private sessions: Session[] = [];
@@ -120,6 +123,8 @@ export class LearnPanel {
       this.choose(this.courses[Number((event.target as HTMLInputElement).value)]!);
     });
     this.knobs.show(this.agent.value);
+    const known = this.knobs.settingsOf(this.agent.value);
+    element('reward-details').hidden = !known.some(({ name }) => name === 'reward');
     onThemeChange(() => {
       this.chart.canvas.forgetColors();
       this.draw();
@@ -137,7 +142,7 @@ export class LearnPanel {
     const largest = LARGEST_SEED - (count - 1);
     const first = Math.min(Math.max(Math.round(Number(this.seed.value)) || 0, 0), largest);
     this.seed.value = String(first);
-    const own = { agent: this.agent.value, settings: this.knobs.changed };
+    const own = { agent: this.agent.value, settings: this.settings };
     this.sessions = [own, ...(rival ? [rival] : [])].flatMap(({ agent, settings }, side) => {
       const contender = rival ? { name: contenderOf(agent, settings), side } : null;
       return Array.from({ length: count }, (_, i) => {
@@ -150,9 +155,15 @@ export class LearnPanel {
     this.choose(this.sessions[0]!);
   }
 
+  /// The changed settings.
+  private get settings(): LearnSettings {
+    const reward = this.reward.changed;
+    return { ...this.knobs.changed, ...(reward ? { reward } : {}) };
+  }
+
   /// Offers a bet on a race of the chosen settings, if a rival is chosen.
   private offerRace(): void {
-    this.race.offer(this.agent.value, this.knobs.changed);
+    this.race.offer(this.agent.value, this.settings);
     this.four.disabled = this.race.rival !== null;
   }
 
@@ -179,6 +190,7 @@ export class LearnPanel {
       this.agent.value = recipe.agent;
       this.knobs.show(recipe.agent);
       this.knobs.set(recipe.settings);
+      this.reward.set(recipe.settings.reward);
       this.seed.value = String(recipe.seed);
       this.race.choose(recipe.rival);
       this.offerRace();
@@ -193,7 +205,7 @@ export class LearnPanel {
     if (session) return encodeRecipe(rival ? { ...this.sessions[0]!, rival } : session);
     if (!race.rival) return 'learn';
     const [agent, seed] = [this.agent.value, Number(this.seed.value)];
-    return encodeRecipe({ agent, seed, settings: this.knobs.changed, rival: race.rival.id });
+    return encodeRecipe({ agent, seed, settings: this.settings, rival: race.rival.id });
   }
 
   /// Ends all trainings.
@@ -422,6 +434,7 @@ export class LearnPanel {
         onStage ? scrubber.step : null,
       );
     this.race.show(sides);
+    this.reward.show(session);
     this.lesson.show(session, page.world.policy?.rewardScale ?? 1);
     element('learn-figure').toggleAttribute('data-race', sides !== null);
     this.strip.show(session?.state === 'finished' ? session : null);
@@ -526,8 +539,8 @@ function milestone(session: Session): string {
   if (most) return `It passes most of its tests: ${Math.round(100 * most.success)} of 100.`;
   const first = evaluations.find(({ success }) => success > 0);
   if (first) return `It passes its first tests: ${Math.round(100 * first.success)} of 100.`;
-  // With other reward weights, returns prove nothing.
-  if (Object.keys(settings).some((name) => name.endsWith('_weight'))) return 'Learning …';
+  // With another reward, returns prove nothing.
+  if (Object.keys(settings).some((name) => /reward|_weight$/.test(name))) return 'Learning …';
   for (const [proof, long] of PROOFS) {
     const trial = episodes.findIndex(({ reward }) => reward > proof);
     if (trial >= 0) return `Upright ${long}: trial ${trial + 1}.`;

@@ -33,7 +33,9 @@ export function nameOf(agent: string, settings: LearnSettings): string {
   const same = own.find((rival) => sameSettings(rival.settings, settings));
   if (same) return same.name;
   const whole = own.find((rival) => Object.keys(rival.settings).length === 0)!;
-  const changes = Object.entries(settings).map(([name, value]) => `${name} ${value}`);
+  const changes = Object.entries(settings).map(([name, value]) =>
+    name === 'reward' ? 'own reward' : `${name} ${value}`,
+  );
   return `${whole.name} (${changes.join(', ').replaceAll('_', ' ')})`;
 }
 

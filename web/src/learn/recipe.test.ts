@@ -11,7 +11,11 @@ const setting = (
   ...{ name, value, low, high },
   ...{ whole: false, unit: '', help: '' },
 });
-const SETTINGS = [setting('gamma', '0.99', 0, 1), setting('double', 'true', null, null)];
+const SETTINGS = [
+  setting('gamma', '0.99', 0, 1),
+  setting('double', 'true', null, null),
+  setting('reward', '', null, null),
+];
 const decode = (hash: string) => decodeRecipe(hash, ['fast', 'sac-fast'], () => SETTINGS);
 
 test('a recipe survives its address', () => {
@@ -24,6 +28,17 @@ test('a race survives its address', () => {
   const recipe = { agent: 'fast', seed: 1, settings: {}, rival: 'dqn' };
   expect(encodeRecipe(recipe)).toBe('learn=fast&seed=1&rival=dqn');
   expect(decode(`#${encodeRecipe(recipe)}`)).toEqual({ recipe, problems: [] });
+});
+
+test('a reward survives its address', () => {
+  const reward = 'energy: E; up: 5*inverted && h > 0.5 ? 1 : 0';
+  const recipe = { agent: 'fast', seed: 1, settings: { reward } };
+  expect(decode(`#${encodeRecipe(recipe)}`)).toEqual({ recipe, problems: [] });
+  for (const wrong of ['', 'x'.repeat(1001), 'E\n', 'π']) {
+    const { recipe, problems } = decode(`#learn=fast&reward=${encodeURIComponent(wrong)}`);
+    expect(recipe).toEqual({ agent: 'fast', seed: 1, settings: {} });
+    expect(problems).toEqual(['reward: expected 1 to 1000 characters of an expression']);
+  }
 });
 
 test('an address with only the view is no recipe', () => {

@@ -57,6 +57,8 @@ export function decodeRecipe(
   return { recipe: { agent, seed, settings, ...(rival ? { rival } : {}) }, problems };
 }
 
+const LONGEST_REWARD = 1000; // characters, as in the program
+
 const SEED = { name: 'seed', value: '1', low: 0, high: LARGEST_SEED, whole: true };
 
 /// Why a setting refuses a value; empty if it accepts it.
@@ -65,6 +67,10 @@ function problemOf(
   text: string,
 ): string {
   const { name, value, low, high, whole } = setting;
+  if (name === 'reward') {
+    const fits = text.length <= LONGEST_REWARD && /^[ -~]+$/.test(text);
+    return fits ? '' : `reward: expected 1 to ${LONGEST_REWARD} characters of an expression`;
+  }
   if (isSwitch(value)) {
     return isSwitch(text) ? '' : `${name}: expected true or false, got ${quoted(text)}`;
   }

@@ -19,6 +19,8 @@ export class Session implements Course {
   last: Report | null = null;
   readonly episodes: Episode[] = [];
   readonly evaluations: Test[] = [];
+  /// The reward's terms: each one's mean per step, for each report with trials.
+  terms: { name: string; means: number[] }[] = [];
   example: UpdateExample | null = null; // of the last update
   slow: boolean; // whether its start is still slow
   checkpoints: Checkpoint[] = [];
@@ -128,6 +130,7 @@ export class Session implements Course {
     this.policy = policy;
     for (const { step, return: sum } of report.episodes)
       this.episodes.push({ step, reward: sum / TRIAL_STEPS });
+    this.sumTerms(report);
     this.evaluations.push(...report.evaluations);
     if (best) this.best = best;
     const { steps: step, episodeCount: trials, updates } = report;
@@ -140,6 +143,15 @@ export class Session implements Course {
       this.state = 'learning';
     }
     this.onNews();
+  }
+
+  private sumTerms({ terms = [], episodes }: Report): void {
+    if (this.terms.length === 0) this.terms = terms.map((name) => ({ name, means: [] }));
+    if (episodes.length === 0) return;
+    this.terms.forEach(({ means }, k) => {
+      const sum = episodes.reduce((all, episode) => all + episode.terms![k]!, 0);
+      means.push(sum / episodes.length / TRIAL_STEPS);
+    });
   }
 
   /// Keeps the same checkpoints of a seed each time.
