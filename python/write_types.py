@@ -49,7 +49,7 @@ def typed_dict(name, what, options, aliases):
         lines += [f"    {option['name']}: {python_type(option)}", f'    """{about(option)}"""']
     for alias in aliases:
         members = [known[member] for member in alias["members"] if member in known]
-        if members:
+        if members and not keyword.iskeyword(alias["name"]):
             lines += [f"    {alias['name']}: {python_type(members[0])}",
                       f'    """{alias["help"]}"""']
     return lines

@@ -42,6 +42,11 @@ void Config::Describe(Options& o) {
   o.AddChoice(&algorithm, "algorithm", AlgorithmNames(),
               "learning algorithm; each has its own settings")
       .implied = true;
+  o.Add(&start_policy, "start_policy",
+        "policy whose weights the training starts with: a file, a run folder or a shipped policy, "
+        "with the network of the agent (dqn and sac)")
+      .implied = true;
+  o.Alias("from", {"start_policy"});
   train.Describe(o);
   o.Section("task");
   o.Add(&environment, "environment",

@@ -34,7 +34,8 @@ struct Config {
   std::string algorithm;       // one of AlgorithmNames
   std::string model;           // path of an MJCF file; empty: the built-in model
   TrainConfig train;
-  std::string environment;  // description of a foreign task's environment; empty: double pendulum
+  std::string start_policy;  // PATH#CHECKSUM of the policy to start from (BuildConfig); or empty
+  std::string environment;   // description of a foreign task's environment; empty: double pendulum
   double episode_seconds = 4, random_start_share = 0.9, random_start_velocity = 5;
   int64_t memory = 0;
   bool identify = false;

@@ -41,6 +41,9 @@ void CheckSettings(Config& config, const std::string& where) {
   try {
     config.learner().Check(config.train.envs);
     (void)config.randomization.MakePosterior();  // throws if there is none to draw from
+    if (!config.start_policy.empty() && config.algorithm == "ppo") {
+      throw BadInput("start_policy: expected an agent of dqn or sac, got one of ppo");
+    }
     if (!config.reward.expression.empty()) (void)OwnReward(config.reward.expression);
   } catch (const Error& error) {
     throw BadInput(Concat(where, where.empty() ? "" : ": ", error.what()));

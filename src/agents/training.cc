@@ -92,6 +92,17 @@ Training::Training(Config config, const Host& host)
       evaluator_(std::make_unique<TrainingEvaluator>(config_, host, pool_)),
       trainer_(config_.train, *agent_, *env_, *evaluator_, InfoOf(config_)) {}
 
+void Training::StartFrom(const Policy& policy, const std::string& where) {
+  const auto* network = dynamic_cast<const NetworkPolicy*>(&policy);
+  const std::string got =
+      network ? Concat(NameOf(network->parts().rule), " ", network->parts().shape.Text())
+              : policy.kind();
+  if (network && agent_->StartFrom(network->parts())) return;
+  const std::unique_ptr<NetworkPolicy> own = agent_->ExportPolicy({});
+  throw BadInput(Concat(where, ": expected a policy with the network of the agent, ",
+                        NameOf(own->parts().rule), " ", own->parts().shape.Text(), ", got ", got));
+}
+
 std::unique_ptr<Policy> Training::policy() const {
   PolicyInfo info = InfoOf(config_);
   info.step = state().steps;

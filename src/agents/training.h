@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "agents/config.h"
@@ -38,6 +39,9 @@ class Training {
   /// Adds an observer; see Trainer::AddObserver.
   void AddObserver(TrainObserver& observer) { trainer_.AddObserver(observer); }
 
+  /// Replaces the agent's initial weights by those of a policy. Call it before the first Step.
+  /// Throws BadInput that begins with `where` unless its network is that of the agent.
+  void StartFrom(const Policy& policy, const std::string& where);
   /// Makes one step of all environments; see Trainer::Step.
   bool Step() { return trainer_.Step(); }
   const Trainer& trainer() const { return trainer_; }

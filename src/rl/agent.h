@@ -58,6 +58,11 @@ class Agent {
   /// its values.
   virtual std::unique_ptr<NetworkPolicy> ExportPolicy(PolicyInfo info) const = 0;
 
+  /// Takes the weights of a policy in place of the initial ones, for the target and the average,
+  /// too; critics and optimisers stay. Returns whether its network is that of the agent, or else
+  /// changes nothing. PPO takes none: its policies' weights contain the normaliser of inputs.
+  virtual bool StartFrom(const NetworkPolicyParts& /*policy*/) { return false; }
+
   /// Ends all running episodes by a truncation at the observations (N × D) that followed the last
   /// Act.
   virtual void Truncate(Matrix<const float> obs) = 0;

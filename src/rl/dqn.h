@@ -48,6 +48,9 @@ class Dqn : public OffPolicyAgent {
   std::optional<UpdateExample> LastUpdate() const override;
   Metrics TakeMetrics() override;
   std::unique_ptr<NetworkPolicy> ExportPolicy(PolicyInfo info) const override;
+  bool StartFrom(const NetworkPolicyParts& policy) override {
+    return online_.StartFrom(policy, ActionRule::kLevels, {theta_target_, theta_policy_});
+  }
   void State(const Archive& archive) override;
 
  private:

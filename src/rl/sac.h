@@ -49,6 +49,9 @@ class Sac : public OffPolicyAgent {
   void Learn() override;
   Metrics TakeMetrics() override;
   std::unique_ptr<NetworkPolicy> ExportPolicy(PolicyInfo info) const override;
+  bool StartFrom(const NetworkPolicyParts& policy) override {
+    return actor_.StartFrom(policy, ActionRule::kSquashedGaussian, {theta_policy_});
+  }
   void State(const Archive& archive) override;
 
   double alpha() const;

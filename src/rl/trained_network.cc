@@ -1,5 +1,6 @@
 #include "rl/trained_network.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 
@@ -35,6 +36,14 @@ double TrainedNetwork::Step(Matrix<const float> x, double learning_rate, double 
   moved_ = true;
   adam_.Step({learning_rate, norm, max_norm, tau}, gradient_, theta_, target, pool);
   return norm;
+}
+
+bool TrainedNetwork::StartFrom(const NetworkPolicyParts& policy, ActionRule rule,
+                               std::initializer_list<std::span<float>> averages) {
+  if (policy.rule != rule || policy.shape != network_.shape()) return false;
+  std::ranges::copy(policy.parameters, mutable_theta().begin());
+  for (const std::span<float> average : averages) std::ranges::copy(theta_, average.begin());
+  return true;
 }
 
 void TrainedNetwork::State(const Archive& archive) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <initializer_list>
 #include <span>
 #include <vector>
 
@@ -9,6 +10,7 @@
 #include "base/thread_pool.h"
 #include "nn/adam.h"
 #include "nn/network.h"
+#include "nn/network_policy.h"
 #include "rl/slices.h"
 
 namespace upswing {
@@ -28,6 +30,9 @@ class TrainedNetwork {
     moved_ = true;
     return theta_;
   }
+  /// Sets θ and the averages of it, if `policy` has this network.
+  bool StartFrom(const NetworkPolicyParts& policy, ActionRule rule,
+                 std::initializer_list<std::span<float>> averages);
   /// The features (B × H) of the last Forward.
   std::span<float> features() { return network_.Features(activations_); }
 

@@ -8,8 +8,10 @@
 #include "base/text.h"
 #include "mujoco/mjcf_check.h"
 #include "mujoco/model.h"
+#include "nn/network_policy.h"
 #include "os/file.h"
 #include "os/streams.h"
+#include "runs/find_policy.h"
 #include "runs/plant_file.h"
 #include "runs/run_folder.h"
 
@@ -34,14 +36,41 @@ Config ParseInFolder(const fs::path& file, const std::string& text,
   });
 }
 
+/// The path in a setting PATH or PATH#CHECKSUM.
+std::string PathOfStart(const std::string& setting) {
+  const size_t mark = setting.rfind('#');
+  constexpr size_t kDigits = 16;
+  return setting.size() - mark == 1 + kDigits ? setting.substr(0, mark) : setting;
+}
+
 }  // namespace
+
+std::shared_ptr<const Policy> StartPolicy(Config& config) {
+  if (config.start_policy.empty()) return nullptr;
+  const std::string path = PathOfStart(config.start_policy);
+  auto policy = LoadPolicy(path).policy;
+  Checksum sum;
+  if (const auto* network = dynamic_cast<const NetworkPolicy*>(policy.get())) {
+    sum.Update(std::as_bytes(std::span(network->parts().parameters)));
+  }
+  const std::string found = Concat(path, "#", sum.Hex());
+  if (config.start_policy != path && config.start_policy != found) {
+    throw BadInput(Concat("start_policy: expected ", config.start_policy, ", got ", found,
+                          ": the policy has changed"));
+  }
+  config.start_policy = found;
+  return policy;
+}
 
 Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
   const std::string text = file.empty() ? "" : ReadInput(file.string());
   const std::string where = file.empty() ? "" : InputName(file.string());
-  return ParseConfig(text, where, WithPlantFile(flags), [&](const std::string& path, bool in_file) {
-    return ReadModel(in_file ? (file.parent_path() / path).string() : path);
-  });
+  Config config =
+      ParseConfig(text, where, WithPlantFile(flags), [&](const std::string& path, bool in_file) {
+        return ReadModel(in_file ? (file.parent_path() / path).string() : path);
+      });
+  (void)StartPolicy(config);  // adds the checksum
+  return config;
 }
 
 Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,10 @@ namespace upswing {
 /// A flag called `plant` names a plant file (runs/plant_file.h), which is a layer between the
 /// configuration file and the other flags.
 Config BuildConfig(const std::filesystem::path& file, const std::vector<FlagValue>& flags);
+
+/// Loads the policy of the setting start_policy, if there is one, and adds the checksum of its
+/// weights to the setting. Throws BadInput, also if the setting has another checksum.
+std::shared_ptr<const Policy> StartPolicy(Config& config);
 
 /// Reads the settings of a run folder and applies the flags. Also throws BadInput if the run's file
 /// lacks a setting. Such a run is from another version, and today's default may differ from the

@@ -48,9 +48,11 @@ TrainingRun::TrainingRun(fs::path path, const Config& config, ForeignMaker make_
 std::unique_ptr<TrainingRun> TrainingRun::Make(const fs::path& out, Config config,
                                                ForeignMaker make_foreign) {
   NameModelCopy(config);
+  const std::shared_ptr<const Policy> start = StartPolicy(config);
   const fs::path usual = Concat("runs/", config.agent, "-seed", config.train.seed);
   const fs::path path = out.empty() ? FreePath(usual) : out;
   std::unique_ptr<TrainingRun> run(new TrainingRun(path, config, std::move(make_foreign)));
+  if (start) run->training_.StartFrom(*start, Concat("--from ", config.start_policy));
   const Config& made = run->training_.config();
   std::vector<std::pair<std::string, std::string>> files{
       {RunFolder::kConfig, ConfigToml(made, false)}};

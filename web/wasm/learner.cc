@@ -16,7 +16,9 @@ Config InClosedForm(std::vector<FlagValue> flags) {
   // A page has no MuJoCo for training and evaluation.
   flags.push_back({"physics", kClosedForm.name});
   flags.push_back({"eval_physics", kClosedForm.name});
-  return ConfigOf(flags);
+  const Config config = ConfigOf(flags);
+  if (config.start_policy.empty()) return config;
+  throw BadInput(Concat("start_policy: expected none in the page, got ", config.start_policy));
 }
 
 Host ThisPage() {
