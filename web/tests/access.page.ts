@@ -43,7 +43,7 @@ test('axe finds no problem in any step of the tour or in everything, in any them
   page,
 }) => {
   await open(page, '#tour=3'); // which shows the curve
-  // What is drawn does not matter here.
+  // Drawings do not matter here.
   await page.evaluate(() => (upswing.scene.draw = upswing.twin.scene.draw = () => {}));
   await page.evaluate(axe);
   // All steps below each other, as without scripts.

@@ -36,7 +36,7 @@ test('a page that hangs still or is paused asks for no frame until something cha
   page,
 }) => {
   await open(page, '#agent=fast');
-  await page.evaluate(() => (upswing.scene.draw = () => {})); // what it draws does not matter here
+  await page.evaluate(() => (upswing.scene.draw = () => {})); // drawings do not matter here
   const frames = await countFrames(page);
   await settle(frames);
   await page.locator('#agent-on').click();
