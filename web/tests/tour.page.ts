@@ -443,29 +443,34 @@ test('at any size, pendulum, words, control and buttons are on one screen', asyn
     if (step > 1) await page.locator('#tour-next').click();
     for (const [width, height] of SIZES) {
       await page.setViewportSize({ width, height });
-      const seen = await page.evaluate(async (bars) => {
-        scrollTo({ top: 0, behavior: 'instant' });
-        const one = (selector: string) =>
-          [...document.querySelectorAll(selector)].filter((found) => found.checkVisibility());
-        const now = '.step:not([inert])';
-        const groups = [
-          ...[one('#scene'), one(`#tour-next, ${now} #tour-end`), one(`${now} h2`)],
-          one(`${now} fieldset, [data-step="map"] #map`),
-          ...(bars ? [one('#q')] : []),
-        ];
-        const shares = new Promise<number[]>((resolve) => {
-          const observer = new IntersectionObserver((entries) => {
-            observer.disconnect();
-            resolve(entries.map(({ intersectionRatio }) => intersectionRatio));
+      const bars = step === VALUES ? ['#q'] : [];
+      const tall = height >= 640 ? { [VALUES]: ['#neurons'], [LEARN]: ['#learn-curve'] }[step] : [];
+      const seen = await page.evaluate(
+        async (others) => {
+          scrollTo({ top: 0, behavior: 'instant' });
+          const one = (selector: string) =>
+            [...document.querySelectorAll(selector)].filter((found) => found.checkVisibility());
+          const now = '.step:not([inert])';
+          const groups = [
+            ...[one('#scene'), one(`#tour-next, ${now} #tour-end`), one(`${now} h2`)],
+            one(`${now} fieldset, [data-step="map"] #map`),
+            ...others.map(one),
+          ];
+          const shares = new Promise<number[]>((resolve) => {
+            const observer = new IntersectionObserver((entries) => {
+              observer.disconnect();
+              resolve(entries.map(({ intersectionRatio }) => intersectionRatio));
+            });
+            for (const element of groups.flat()) observer.observe(element);
           });
-          for (const element of groups.flat()) observer.observe(element);
-        });
-        return {
-          counts: groups.map(({ length }) => length),
-          least: Math.min(...(await shares)),
-          scrolls: document.documentElement.scrollWidth > innerWidth,
-        };
-      }, step === VALUES);
+          return {
+            counts: groups.map(({ length }) => length),
+            least: Math.min(...(await shares)),
+            scrolls: document.documentElement.scrollWidth > innerWidth,
+          };
+        },
+        [...bars, ...(tall ?? [])],
+      );
       expect(seen, `step ${step}, ${width} × ${height}`).toEqual({
         counts: seen.counts.map(() => 1),
         least: 1,

@@ -11,6 +11,7 @@ import { element } from './dom';
 
 const CELLS = 72; // along a side
 const MILLISECONDS = 3; // per frame
+const FIRST = 24; // the same while there is no map yet
 const FRAMES = 3; // drawn at each third frame, computed at the others
 const WAY = 4; // s of the trajectory to draw
 const MARKS = 24; // steps of the mark along a side
@@ -128,7 +129,7 @@ export class MapPanel {
       this.busy = false;
       return;
     }
-    const begunIn = map.work(world, MILLISECONDS);
+    const begunIn = map.work(world, map.cells ? MILLISECONDS : FIRST);
     if (!begunIn) return;
     this.key = keyOf(begunIn);
     const [low, high] = (this.range = this.rangeOf(map.cells!, world));

@@ -7,6 +7,7 @@ const SHORT = ['cos₁', 'sin₁', 'ω₁', 'cos₂', 'sin₂', 'ω₂', 'E', 'h
 const ROOM = 46; // px, for a whole name
 const NAMES = 16; // px, above the inputs
 const GAP = 4; // px, between rows
+const LINE = 11; // px, lowest row with its own name
 const EASE = 0.3; // share of the way to a new brightness, at each drawing
 const FADE = 0.98; // factor of a row's reference brightness per drawing
 
@@ -38,9 +39,12 @@ export class NeuronChart {
     layers.forEach((layer, i) => {
       const y = named + i * (height + GAP);
       const name = i === 0 ? `${layer.length} inputs` : `${layer.length} neurons`;
-      canvas.text(name, LEFT - 8, y + height / 2, 'right');
+      if (height >= LINE || i === 0) canvas.text(name, LEFT - 8, y + height / 2, 'right');
       this.drawRow(layer, this.rows[i]!, y, height);
     });
+    if (height >= LINE) return;
+    const middle = (named + height + canvas.height) / 2;
+    canvas.text('neurons', LEFT - 8, middle, 'right');
   }
 
   /// Each name above its input.
