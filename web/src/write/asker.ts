@@ -5,6 +5,7 @@ import type { World } from '../world';
 export const STRANGE = 'it sent something other than a torque';
 const TICK = 250; // ms
 const LIMIT = 12; // ticks until an answer counts as an endless loop
+const START_LIMIT = 120; // the same for the first one, because the thread has to load
 
 /// Values that are not a torque.
 const KINDS: readonly unknown[] = [
@@ -25,6 +26,7 @@ export class Asker {
   private readonly onRefusal: (refusal: Refusal) => void;
   private answer: ((torques: Float64Array) => void) | null = null;
   private expected = 0; // torques of the next answer
+  private ready = false; // whether the other thread has started
   private ticks = 0; // since the question
   private readonly timer: ReturnType<typeof setInterval>;
 
@@ -35,10 +37,10 @@ export class Asker {
     port.onmessage = ({ data }) => this.hear(data);
     // Ticks instead of one long wait: a thread that is busy itself does not count.
     this.timer = setInterval(() => {
-      if (this.answer && ++this.ticks > LIMIT) {
-        const limit = (LIMIT * TICK) / 1000;
-        this.refuse(`no torque after ${limit} s: is there a loop without an end?`);
-      }
+      const limit = this.ready ? LIMIT : START_LIMIT;
+      if (!this.answer || ++this.ticks <= limit) return;
+      const seconds = (limit * TICK) / 1000;
+      this.refuse(`no torque after ${seconds} s: is there a loop without an end?`);
     }, TICK);
   }
 
@@ -63,6 +65,11 @@ export class Asker {
   }
 
   private hear(data: unknown): void {
+    if (data === 'ready' && !this.ready) {
+      this.ready = true;
+      this.ticks = 0;
+      return;
+    }
     const { answer } = this;
     const isTorques = data instanceof Float64Array && data.length === this.expected;
     if (answer && isTorques && !data.some(Number.isNaN)) {

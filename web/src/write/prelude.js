@@ -20,6 +20,7 @@
   const { Float64Array } = globalThis;
   addEventListener('message', ({ ports: [port] }) => {
     const send = port.postMessage.bind(port);
+    send('ready');
     // Rows of q1, q2, w1, w2, t; answers a torque for each.
     port.onmessage = ({ data }) => {
       const torques = new Float64Array(data.length / 5);
