@@ -74,7 +74,7 @@ export class Sandbox {
     }
     const rows = this.text.split('\n').length;
     const own = row - ROWS_BEFORE;
-    const text = problem.replace(/^Uncaught /, '');
+    const text = problem.replace(/^(uncaught exception: |Uncaught )/, '');
     if (own > rows) this.fail({ text: `${text}: is a bracket still open?`, row: rows });
     else this.fail({ text, row: own >= 1 ? own : null });
   };
