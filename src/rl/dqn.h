@@ -5,7 +5,6 @@
 #include <span>
 #include <vector>
 
-#include "base/thread_pool.h"
 #include "rl/dqn_config.h"
 #include "rl/off_policy.h"
 #include "rl/trained_network.h"
@@ -48,9 +47,7 @@ class Dqn : public OffPolicyAgent {
   std::optional<UpdateExample> LastUpdate() const override;
   Metrics TakeMetrics() override;
   std::unique_ptr<NetworkPolicy> ExportPolicy(PolicyInfo info) const override;
-  bool StartFrom(const NetworkPolicyParts& policy) override {
-    return online_.StartFrom(policy, ActionRule::kLevels, {theta_target_, theta_policy_});
-  }
+  bool StartFrom(const NetworkPolicyParts& policy) override;
   void State(const Archive& archive) override;
 
  private:

@@ -71,6 +71,10 @@ std::unique_ptr<NetworkPolicy> Dqn::ExportPolicy(PolicyInfo info) const {
   return std::make_unique<NetworkPolicy>(std::move(parts), std::move(info));
 }
 
+bool Dqn::StartFrom(const NetworkPolicyParts& policy) {
+  return online_.StartFrom(policy, ActionRule::kLevels, {theta_target_, theta_policy_});
+}
+
 void Dqn::State(const Archive& archive) {
   online_.State(archive);
   archive.Array("theta_target", std::span(theta_target_));
