@@ -28,26 +28,24 @@ export function inline(
     return file!.type === 'chunk' ? file!.code : String(file!.source);
   };
   const main = output.find((file) => file.type === 'chunk' && file.isEntry) as Rolldown.OutputChunk;
+  const worker = output.find(({ fileName }) => /worker-[^/]*\.js$/.test(fileName))!;
   const data = (name: string) =>
     `data:${TYPES[name.split('.').at(-1)!]};base64,${readFileSync(join(pictures, name)).toString('base64')}`;
   const drawn = (code: string) =>
     code.replace(/(?:\.\.?)?\/((?:fonts\/)?[\w-]+\.(?:svg|woff2))/g, (_, name: string) =>
       data(name),
     );
+  const source = 'code' in worker ? worker.code : String(worker.source);
   let places = 0;
   const code = script(
-    main.code.replace(
-      /new Worker\([^{}]*(worker-[\w-]+\.js)[^{}]*\{type:`module`\}\)/g,
-      (_, name) => {
-        ++places;
-        // Pages from a file may not start a worker that is a module.
-        const blob = `new Blob([${JSON.stringify(text(name as string))}],{type:"text/javascript"})`;
-        return `new Worker(URL.createObjectURL(${blob}))`;
-      },
-    ),
+    main.code.replace(/new Worker\([^{}]*worker-[^{}]*\{type:`module`\}\)/g, () => {
+      ++places;
+      // Pages from a file may not start a worker that is a module.
+      const blob = `new Blob([${JSON.stringify(source)}],{type:"text/javascript"})`;
+      return `new Worker(URL.createObjectURL(${blob}))`;
+    }),
   );
-  const workers = output.filter(({ fileName }) => /worker-[\w-]+\.js$/.test(fileName)).length;
-  if (places !== workers) throw new Error(`expected ${workers} workers, got ${places}`);
+  if (places !== 1) throw new Error(`expected one worker, got ${places}`);
   const style = drawn(text('.css'));
   const watch = script(readFileSync(join(pictures, 'watch.js'), 'utf8'));
   const policy =
@@ -59,8 +57,6 @@ export function inline(
       .replace(POLICY, policy)
       .replace(/<link[^>]*rel="(?:preload|modulepreload|manifest)"[^>]*>\s*/g, '')
       .replace(/<meta[^>]*"(?:og|twitter):[^>]*>\s*/g, '')
-      // A page from a file has no sandbox for controllers.
-      .replace(/<(li|p)><a href="#write">[^<]*<\/a><\/\1>\s*/g, '')
       .replace('./fonts/OFL.txt', 'https://openfontlicense.org'),
   )
     .replace(/<link[^>]*rel="stylesheet"[^>]*>/, () => `<style>${style}</style>`)

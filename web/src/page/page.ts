@@ -159,9 +159,6 @@ export class Page {
 
   /// Opens the editor of a controller. Returns the problems of the address.
   private async openWriting(hash: string): Promise<readonly string[]> {
-    if (location.protocol === 'file:') {
-      return ['the editor of a controller needs the page from a web server'];
-    }
     try {
       const { WritePanel } = await import('../write/panel');
       this.write ??= new WritePanel(this);
