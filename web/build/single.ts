@@ -28,28 +28,38 @@ export function inline(
     return file!.type === 'chunk' ? file!.code : String(file!.source);
   };
   const main = output.find((file) => file.type === 'chunk' && file.isEntry) as Rolldown.OutputChunk;
-  const worker = output.find(({ fileName }) => /worker-[^/]*\.js$/.test(fileName))!;
+  const workers = new Map(
+    output
+      .filter(({ fileName }) => /worker-[^/]*\.js$/.test(fileName))
+      .map((file) => [
+        file.fileName.split('/').at(-1)!,
+        file.type === 'chunk' ? file.code : String(file.source),
+      ]),
+  );
   const data = (name: string) =>
     `data:${TYPES[name.split('.').at(-1)!]};base64,${readFileSync(join(pictures, name)).toString('base64')}`;
   const drawn = (code: string) =>
     code.replace(/(?:\.\.?)?\/((?:fonts\/)?[\w-]+\.(?:svg|woff2))/g, (_, name: string) =>
       data(name),
     );
-  const source = 'code' in worker ? worker.code : String(worker.source);
   let places = 0;
+  const start = /new Worker\([^{}]*(worker-[\w-]+\.js)[^{}]*\{type:`module`\}\)/g;
   const code = script(
-    main.code.replace(/new Worker\([^{}]*worker-[^{}]*\{type:`module`\}\)/g, () => {
+    main.code.replace(start, (_, name: string) => {
       ++places;
+      const source = workers.get(name);
       // Pages from a file may not start a worker that is a module.
       const blob = `new Blob([${JSON.stringify(source)}],{type:"text/javascript"})`;
       return `new Worker(URL.createObjectURL(${blob}))`;
     }),
   );
-  if (places !== 1) throw new Error(`expected one worker, got ${places}`);
+  if (places !== workers.size) throw new Error(`expected ${workers.size} workers, got ${places}`);
   const style = drawn(text('.css'));
+  const sandbox = readFileSync(join(pictures, 'sandbox.html'), 'utf8');
+  const [, sandboxed] = /<script>(.*?)<\/script>/s.exec(sandbox)!;
   const watch = script(readFileSync(join(pictures, 'watch.js'), 'utf8'));
   const policy =
-    `default-src 'none'; script-src ${hashOf(code)} ${hashOf(watch)} 'wasm-unsafe-eval'; ` +
+    `default-src 'none'; script-src ${hashOf(code)} ${hashOf(watch)} ${hashOf(sandboxed!)} 'wasm-unsafe-eval'; ` +
     `style-src ${hashOf(style)}; img-src data:; font-src data:; worker-src blob:; ` +
     `base-uri 'none'; form-action 'none'`;
   return drawn(
@@ -62,7 +72,10 @@ export function inline(
     .replace(/<link[^>]*rel="stylesheet"[^>]*>/, () => `<style>${style}</style>`)
     .replace(/<script[^>]*watch\.js[^>]*><\/script>/, () => `<script>${watch}</script>`)
     .replace(/<script type="module"[^>]*><\/script>\s*/, '')
-    .replace('</body>', () => `<!-- files --><script type="module">${code}</script>\n</body>`);
+    .replace('</body>', () => {
+      const frame = `<template id="sandbox">${sandbox}</template>`;
+      return `${frame}<!-- files --><script type="module">${code}</script>\n</body>`;
+    });
 }
 
 export function single(): Plugin {

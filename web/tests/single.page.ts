@@ -42,6 +42,12 @@ test('one file holds the page: without a server or a network it balances, and it
   await page.getByRole('button', { name: 'How the default agent learned' }).click();
   await page.locator('#learn-scrub').fill('0');
   await expect(page.locator('#learn-where')).toHaveText('on the stage: after 0 steps');
+  // A visitor's controller has its sandbox, too.
+  await page.evaluate(() => (location.hash = '#write'));
+  await page.locator('#write-run').click();
+  await expect.poll(() => page.evaluate(() => Math.abs(upswing.world.byHand))).toBe(5);
+  await page.locator('#write-score').click();
+  await expect(page.locator('#write-own')).toContainText('Yours');
   expect(asked.filter((one) => !['file:', 'blob:', 'data:'].includes(one))).toEqual([]);
 });
 

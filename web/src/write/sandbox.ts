@@ -34,7 +34,9 @@ export class Sandbox {
     frame.hidden = true;
     frame.title = 'Sandbox';
     frame.sandbox.add('allow-scripts');
-    frame.src = 'sandbox.html';
+    const here = document.querySelector<HTMLTemplateElement>('template#sandbox'); // build/single.ts
+    if (here) frame.srcdoc = here.innerHTML;
+    else frame.src = 'sandbox.html';
     document.body.append(frame);
     const offline = 'the device is offline, and the sandbox for it has not been loaded yet';
     const missing = 'the sandbox for it could not be loaded';
