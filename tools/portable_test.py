@@ -21,7 +21,7 @@ PROGRAM = UPSWING.parent / "portable_test"
 ALLOWED = {
     "start, exceptions and allocation of a compiled C++ program":
         r"_ITM_\w+|__gmon_start__|__libc_start_main|__cxa_\w+|__gxx_personality_v0|_Unwind_Resume|"
-        r"(typeinfo|vtable|VTT) for (std|__cxxabiv1)::.*|operator (new|delete)\b.*|"
+        r"(typeinfo|vtable|VTT) for (std|__cxxabiv1)::.*|__dynamic_cast|operator (new|delete)\b.*|"
         r"__stack_chk_fail|__errno_location|__tls_get_addr|__libc_single_threaded",
     "the C++ library: containers, text in memory, exceptions, threads, the steady clock":
         r"std::.*",
