@@ -310,12 +310,12 @@ class EvalTest(ProgramTest):
         table = self.succeed("eval", self.policy, "--episodes", 20, "--plant", "realaigym-twin",
                              "--randomize-posterior", "--episodes-csv", "drawn.csv")
         self.assertIn("randomize_posterior true\n", table)
-        # Every episode has a centre of mass of its own, within five deviations of 15 mm.
+        # Every episode has a centre of mass of its own, within five deviations of 2 mm.
         with open(self.folder / "drawn.csv", encoding="utf-8") as file:
             centers = {float(row["center1"]) for row in csv.DictReader(file)}
         self.assertEqual(len(centers), 20)
         for center in centers:
-            self.assertAlmostEqual(center, usual["plant"]["center1"], delta=0.075)
+            self.assertAlmostEqual(center, usual["plant"]["center1"], delta=0.0104)
         for plant in ((), ("--plant", "realaigym")):
             self.refuse(["eval", self.policy, *plant, "--randomize-posterior"],
                         "randomize_posterior: expected --plant with a twin that has a covariance")
