@@ -209,6 +209,25 @@ TEST(MachineCheck, UnitsAndSignOfTorques) {
       "suspect mN·m");
 }
 
+TEST(MachineCheck, AmperesCommandsWithinOneAndSwappedTorques) {
+  OnlyFinding(Times(&MachineLog::measured, 0, 0.57), "suspect one of them in amperes",
+              Severity::kWarning);
+  OnlyFinding(
+      [](MachineLog& log) {
+        log.measured.clear();
+        for (Joints& u : log.commanded) u[0] = std::clamp(u[0], -1.0, 1.0);
+      },
+      "ends at 1 exactly", Severity::kWarning);
+  MachineLog log = GoodLog();
+  std::swap(log.commanded, log.measured);
+  Findings found = Check(log);
+  std::erase_if(found, [](const Finding& f) { return f.severity != Severity::kFault; });
+  ASSERT_EQ(found.size(), 2U);
+  for (const Finding& f : found) {
+    EXPECT_EQ(f.text, "commanded follows measured after 2 rows: suspect swapped columns");
+  }
+}
+
 TEST(MachineCheck, VelocitiesThatAreDifferences) {
   MachineLog log = GoodLog();
   for (int k = 1; k < log.rows(); ++k) {

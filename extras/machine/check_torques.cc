@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
+#include "base/text.h"
 #include "extras/machine/check.h"
 #include "extras/machine/pairs.h"
 
@@ -21,31 +23,34 @@ struct Response {
 constexpr double kMostPairs = 1e5;  // rows of a fit; more would only take longer
 
 /// Command of joint `from`, delayed and lagged, against the measured torque of joint `to`.
-Response Respond(Pieces pieces, int from, int to, int rows, double lag) {
+/// `is_swapped`: the measured torque as the command.
+Response Respond(Pieces pieces, int from, int to, int rows, double lag, bool is_swapped) {
   Response response{rows, lag, {}};
   for (const MachineLog& piece : pieces) {
+    const auto& [in, out] = is_swapped ? std::tie(piece.measured, piece.commanded)
+                                       : std::tie(piece.commanded, piece.measured);
     double torque = 0;
     for (int k = rows; k < piece.rows() && response.pairs.n < kMostPairs; ++k) {
       const int sent = k - rows;
-      double command = piece.commanded[sent][from];
+      double command = in[sent][from];
       if (!piece.push.empty()) command += piece.push[sent][from];
       const double seconds = k > rows ? piece.time[k] - piece.time[k - 1] : 1e9;
       torque += (lag > 0 ? 1 - std::exp(-seconds / lag) : 1) * (command - torque);
-      response.pairs.Add(torque, piece.measured[k][to]);
+      response.pairs.Add(torque, out[k][to]);
     }
   }
   return response;
 }
 
 /// The responses with the best fit of each delay.
-std::vector<Response> ResponsesOf(Pieces pieces, int from, int to) {
+std::vector<Response> ResponsesOf(Pieces pieces, int from, int to, bool is_swapped = false) {
   const double cycle = UsualCycle(pieces);
   const int most = std::clamp(static_cast<int>(std::ceil(0.05 / std::max(cycle, 1e-4))), 3, 25);
   std::vector<Response> responses;
   for (int rows = 0; rows <= most; ++rows) {
-    Response best = Respond(pieces, from, to, rows, 0);
+    Response best = Respond(pieces, from, to, rows, 0, is_swapped);
     for (const double lag : {.001, .002, .003, .004, .005, .006, .008, .01, .012, .016, .02}) {
-      const Response next = Respond(pieces, from, to, rows, lag);
+      const Response next = Respond(pieces, from, to, rows, lag, is_swapped);
       if (next.pairs.correlation() > best.pairs.correlation()) best = next;
     }
     responses.push_back(best);
@@ -129,6 +134,14 @@ void CheckTorque(Pieces pieces, int joint, Findings& findings) {
                              2 - joint));
     }
   }
+  const Response back = BestOf(ResponsesOf(pieces, joint, joint, /*is_swapped=*/true));
+  constexpr double kWorse = 1.3;  // residual
+  if (best.rows == 0 && back.rows > 0 && best.residual() > kWorse * back.residual() &&
+      back.pairs.correlation() > kFollows) {
+    return add(Severity::kFault,
+               fmt::format("commanded follows measured after {}: suspect swapped columns",
+                           Counted(back.rows, "row")));
+  }
   const bool is_commanded = std::ranges::any_of(
       pieces, [&](const MachineLog& piece) { return HasTorque(piece.commanded, joint); });
   if (r < kFollows && !is_commanded) return;  // pushed by hand
@@ -141,31 +154,42 @@ void CheckTorque(Pieces pieces, int joint, Findings& findings) {
                fmt::format("measured torque does not follow the command (correlation {:.2f})", r));
   }
   if (CheckTorqueGain(best, joint, findings)) return;
-  add(Severity::kNote, fmt::format("measured follows commanded after {} and a lag of {:.0f} ms, "
-                                   "gain {:.2f}, correlation {:.3f}",
-                                   DelayText(responses, best), 1e3 * best.lag, gain, r));
+  constexpr double kProportional = 0.95, kLow = 0.6, kHigh = 1.6;  // correlation, gains
+  const bool is_odd = r > kProportional && (gain < kLow || gain > kHigh);
+  add(is_odd ? Severity::kWarning : Severity::kNote,
+      fmt::format("measured follows commanded after {} and a lag of {:.0f} ms, gain {:.2f}, "
+                  "correlation {:.3f}{}",
+                  DelayText(responses, best), 1e3 * best.lag, gain, r,
+                  is_odd ? ": suspect one of them in amperes or another unit (key factor)" : ""));
 }
 
-/// Reports torques that no pendulum of this kind has.
+/// Reports torques that no pendulum of this kind has, and commands that end at 1 exactly.
 void CheckTorqueSize(Pieces pieces, int joint, Findings& findings) {
   const bool known = std::ranges::any_of(findings, [&](const Finding& finding) {
     return finding.aspect == Aspect::kTorque && finding.joint == joint + 1 &&
            finding.severity == Severity::kFault;
   });
   double largest = 0;
+  int ones = 0;
   for (const MachineLog& piece : pieces) {
     for (const auto* torques : {&piece.commanded, &piece.measured}) {
-      for (const Joints& u : *torques) largest = std::max(largest, std::abs(u[joint]));
+      for (const Joints& u : *torques) {
+        largest = std::max(largest, std::abs(u[joint]));
+        ones += torques == &piece.commanded && std::abs(u[joint]) == 1 ? 1 : 0;
+      }
     }
   }
   constexpr double kLarge = 100;  // N·m
-  if (known || largest <= kLarge) return;
-  findings.push_back({Aspect::kTorque,
-                      joint + 1,
-                      Severity::kFault,
-                      fmt::format("up to {:.4g} N·m: suspect mN·m", largest),
-                      {},
-                      {{"largest", largest}}});
+  constexpr int kOften = 3;
+  const auto add = [&](Severity severity, const std::string& text) {
+    findings.push_back({Aspect::kTorque, joint + 1, severity, text, {}, {{"largest", largest}}});
+  };
+  if (!known && largest > kLarge) {
+    add(Severity::kFault, fmt::format("up to {:.4g} N·m: suspect mN·m", largest));
+  } else if (!known && largest == 1 && ones >= kOften) {
+    add(Severity::kWarning,
+        "ends at 1 exactly: suspect a command between -1 and 1, whose factor is the torque limit");
+  }
 }
 
 }  // namespace

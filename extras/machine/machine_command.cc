@@ -297,7 +297,12 @@ int RunIdentify(const MachineArguments& a) {
   CheckWritable("--out", a.out);
   const Twin first = adapts ? ReadTwin(a.twin, "machine adapt") : ReadTwin(a.plant, "--plant");
   const std::vector<Twin> others = ReadOthers(a);
-  const std::vector<MachineLog> logs = ReadCheckedLogs(a.logs, a.columns, SayError);
+  bool is_faulty = false;
+  const std::vector<MachineLog> logs =
+      ReadCheckedLogs(a.logs, a.columns, [&](const std::string& fault) {
+        SayError(fault);
+        is_faulty = true;
+      });
   IdentifyConfig config;
   config.folds = adapts ? 0 : static_cast<int>(a.folds);
   config.fit.adapts = adapts;
@@ -320,18 +325,21 @@ int RunIdentify(const MachineArguments& a) {
   AddOthers(others, a, logs, predictors);
   const auto rows = CompareErrors(logs, predictors, kHorizons, &pool);
   WarnOfTwin(twin, rows);
+  if (is_faulty) {
+    SayError(Concat(Printable(a.out), ": not to be trusted, because its logs have faults"));
+  }
   if (!a.figure.empty()) DrawErrors(logs, predictors, a.figure, &pool);
   if (a.as_json) {
     nlohmann::ordered_json json = IdentificationJson(found, a.out);
     json["errors"] = ErrorsJson(rows, predictors, CommandedIn(logs));
     fmt::print("{}\n", PrintableJson(json));
-    return 0;
+    return is_faulty ? 1 : 0;
   }
   PrintIdentification(found, logs.size());
   PrintErrors(rows, predictors, CommandedIn(logs));
   fmt::print("written {}\n", Printable(a.out));
   if (!a.figure.empty()) fmt::print("written {}\n", Printable(a.figure));
-  return 0;
+  return is_faulty ? 1 : 0;
 }
 
 /// Checks the files to write before any work.
@@ -399,7 +407,8 @@ void AddIdentify(CommandLine& line) {
       "Fits masses, centres, inertias, friction, delay and lag to windows of the logs. Each\n"
       "window has a free start state. The commanded torques drive the model; the reported\n"
       "ones are a second measurement. Cross-validation chooses the model. The twin's\n"
-      "covariance includes the differences between sessions.\n\n"
+      "covariance includes the differences between sessions.\n"
+      "Exit code: 0, or 1 if the twin's logs have faults; see machine check.\n\n"
       "Examples:\n"
       "  ./upswing machine identify logs/*.csv --plant realaigym-c1 --out twin.toml\n"
       "  ./upswing machine identify run1.csv run2.csv --plant arm.toml --out arm-twin.toml \\\n"
@@ -415,7 +424,8 @@ void AddAdapt(CommandLine& line) {
   AddPredictions(line, a);
   line.Footer(
       "Fits the twin of today to 10 to 30 s of today's logs. The covariance of TWIN says how\n"
-      "much each value may change. A plant file has none: all values may change widely.\n\n"
+      "much each value may change. A plant file has none: all values may change widely.\n"
+      "Exit code: 0, or 1 if the twin's logs have faults; see machine check.\n\n"
       "Examples:\n"
       "  ./upswing machine adapt twin.toml first.csv --out today.toml\n"
       "  ./upswing machine adapt realaigym-c1 run1.csv run2.csv --out today.toml\n"

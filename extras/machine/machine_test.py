@@ -228,6 +228,11 @@ class Machine(ProgramTest):
         self.assertEqual(done.returncode, 0)
         self.assertRegex(done.stderr, r"\Aupswing: warning: log.csv: velocity 2: .*opposite sign"
                                       r"; machine check lists all faults\n\Z")
+        # A twin of such logs is written, and marked.
+        done = self.run_here("machine", "adapt", "plant.toml", "log.csv", "--out", "today.toml")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("upswing: today.toml: not to be trusted, because its logs have faults\n",
+                      done.stderr)
 
     def test_a_table_of_measured_and_predicted_angles(self):
         self.write("plant.toml", "[plant]\nmass1 = 0.5\n")
