@@ -13,12 +13,13 @@ namespace {
 
 struct Path {
   int64_t target;  // Highway's bit for the target
-  std::string name;
+  std::string_view name;
 };
 
 /// All paths that a compiler can produce, best first.
-const Path kPaths[] = {
-    {HWY_AVX3, "avx512"}, {HWY_AVX2, "avx2"}, {HWY_NEON, "neon"}, {HWY_WASM, "wasm128"}};
+constexpr Path kPaths[] = {{HWY_AVX3, "avx512"},     {HWY_AVX2, "avx2"},
+                           {HWY_NEON, "neon"},       {HWY_WASM, "wasm128"},
+                           {HWY_EMU128, "portable"}, {HWY_SCALAR, "portable"}};
 static_assert((HWY_DISABLED_TARGETS & (HWY_AVX3 | HWY_AVX2 | HWY_NEON | HWY_WASM)) == 0);
 
 /// The compiled paths that this processor supports, best first. The last path is the compiler's
@@ -46,7 +47,7 @@ std::string SimdPath() {
   const int64_t usable = hwy::SupportedTargets();
   const auto used =
       std::ranges::find_if(Paths(), [&](const Path& path) { return (usable & path.target) != 0; });
-  return used == Paths().end() ? Paths().back().name : used->name;
+  return std::string(used == Paths().end() ? Paths().back().name : used->name);
 }
 
 void UseSimdPath(std::string_view path) {
@@ -56,6 +57,11 @@ void UseSimdPath(std::string_view path) {
                           " on this processor, got '", path, "'"));
   }
   hwy::SetSupportedTargetsForTest(found->target);
+}
+
+bool UseBestSimdPath() {
+  hwy::SetSupportedTargetsForTest(Paths().front().target);
+  return true;
 }
 
 }  // namespace upswing

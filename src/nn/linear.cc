@@ -7,6 +7,7 @@
 #include <numbers>
 #include <type_traits>
 
+#include "base/simd.h"
 #include "nn/product.h"
 
 #undef HWY_TARGET_INCLUDE

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "base/simd.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "nn/product.cc"
 #include <hwy/foreach_target.h>  // includes this file once per target

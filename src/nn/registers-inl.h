@@ -78,18 +78,19 @@ HWY_INLINE void ForVectors(size_t n, const F& f) {
   if (i < n) f(i, n - i, std::true_type());
 }
 
-/// Numbers that are summed side by side. With fused multiply-adds, every target sums in the order
-/// of a register of 16 numbers, so that all of them give the same bits. Without, each target has
-/// other bits anyway, and sums in the order of its own registers.
+/// Numbers that are summed side by side. Targets sum in the order of a register of 16 numbers, so
+/// that those with fused multiply-adds give the same bits, and those without them, too. Only the
+/// page, and its trainings, have the order of their own registers.
 constexpr size_t kLanes = HWY_LANES(Real);
-constexpr size_t kSummed = HWY_NATIVE_FMA ? 16 : kLanes;
+constexpr size_t kSummed = HWY_TARGET == HWY_WASM ? kLanes : 16;
 constexpr size_t kParts = kSummed / kLanes;  // registers that hold them
 
-/// Sum of the numbers of a register. With fused multiply-adds, its halves are added until one
-/// number remains.
+/// Sum of the numbers of a register: its halves are added until one number remains.
 template <class D>
 HWY_INLINE Real SumOfRegister(D d, hn::Vec<D> x) {
-#if HWY_NATIVE_FMA
+#if HWY_TARGET == HWY_SCALAR
+  return (void)d, hn::GetLane(x);
+#else
   if constexpr (hn::MaxLanes(d) * sizeof(Real) > 16) {
     const hn::Half<D> half;
     return SumOfRegister(half, hn::Add(hn::LowerHalf(half, x), hn::UpperHalf(half, x)));
@@ -99,8 +100,6 @@ HWY_INLINE Real SumOfRegister(D d, hn::Vec<D> x) {
   } else {
     return hn::GetLane(hn::Add(x, hn::Shuffle01(x)));
   }
-#else
-  return hn::GetLane(hn::SumOfLanes(d, x));
 #endif
 }
 

@@ -7,6 +7,8 @@
 #include <array>
 #include <numbers>
 
+#include "base/simd.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "pendulum/closed_form.cc"
 #include <hwy/foreach_target.h>
