@@ -15,6 +15,7 @@ void AddTrain(CommandLine& line);
 void AddBounds(CommandLine& line);
 void AddEval(CommandLine& line);
 void AddSimulate(CommandLine& line);
+void AddGrade(CommandLine& line);
 void AddMap(CommandLine& line);
 void AddPlot(CommandLine& line);
 void AddView(CommandLine& line);

@@ -9,6 +9,7 @@ constexpr Command kCommands[] = {
     {"eval", AddEval},
     {"bounds", AddBounds},
     {"simulate", AddSimulate},
+    {"grade", AddGrade},
     {"map", AddMap},
     {"plot", AddPlot},
     {"view", AddView},

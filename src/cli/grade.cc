@@ -1,0 +1,96 @@
+// The command `grade`: a leaderboard of the policies of a class.
+#include "judge/grade.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <functional>
+
+#include "base/error.h"
+#include "base/format.h"
+#include "base/text.h"
+#include "base/thread_pool.h"
+#include "cli/commands.h"
+#include "cli/progress.h"
+#include "os/file.h"
+#include "os/host.h"
+
+namespace upswing {
+namespace {
+
+struct GradeArguments {
+  std::string folder, out;
+  GradeConfig config;
+  int64_t threads = 0;
+};
+
+void PrintGrades(const std::vector<Grade>& grades, const GradeConfig& config) {
+  constexpr const char* kRow = "{:>4}  {:<24}  {:>9}  {:>9}  {:>9}  {:>9}  {:>9}\n";
+  const std::string box = config.plants > 0 ? "±25%" : "";
+  fmt::print(kRow, "", "", "success", "return", box, "Δτ N·m/s", "energy J");
+  const auto share = [](const Evaluation& e) {
+    return e.episodes == 0 ? "" : fmt::format("{:.1f}%", 100 * e.success_rate());
+  };
+  size_t rank = 0;
+  for (const Grade& grade : grades) {
+    if (!grade.refused.empty()) {
+      fmt::print("      {}  refused: {}\n", Printable(grade.name), OneLine(grade.refused));
+      continue;
+    }
+    const Evaluation& e = grade.nominal;
+    fmt::print(kRow, ++rank, Shortened(Printable(grade.name), 24), share(e),
+               fmt::format("{:.2f}", e.reward_sum.mean), share(grade.random),
+               fmt::format("{:.2f}", e.torque_variation.mean), fmt::format("{:.2f}", e.work.mean));
+  }
+}
+
+int RunGrade(const GradeArguments& a) {
+  namespace fs = std::filesystem;
+  if (!a.out.empty()) CheckFree(a.out);
+  ThreadPool pool(ResolveThreads(a.threads), a.threads == 0);
+  const std::vector<Grade> grades = [&] {
+    EpisodeProgress progress(false);
+    return GradeFolder(a.folder, a.config, pool, std::ref(progress));
+  }();
+  PrintGrades(grades, a.config);
+  if (!a.out.empty()) {
+    const fs::path table = fs::path(a.out) / "table.csv", page = fs::path(a.out) / "index.html";
+    MakeNewFolder(a.out);
+    WriteFileAtomically(table, GradesCsv(grades));
+    WriteFileAtomically(page, GradesPage(grades, a.config));
+    fmt::print("written: {}, {}\n", Printable(table.string()), Printable(page.string()));
+  }
+  return std::ranges::all_of(grades, &std::string::empty, &Grade::refused) ? 0 : 1;
+}
+
+}  // namespace
+
+void AddGrade(CommandLine& line) {
+  GradeArguments& a = line.Runs<const GradeArguments&>(RunGrade);
+  line.Text("folder", a.folder, "FOLDER",
+            "folder with NAME.safetensors or NAME/policy.safetensors of each student or team");
+  line.Require("folder");
+  Options own;
+  a.config.Describe(own);
+  line.Arguments(own);
+  line.Text("--out", a.out, "FOLDER",
+            "new folder for table.csv and index.html, a page with the leaderboard and the moving "
+            "pendulums that needs no network");
+  AddThreads(line, a.threads);
+  line.Footer(
+      "All policies have the same start states and the same random plants. They are sorted\n"
+      "by success on the nominal plant, then by return. Δτ is smoothness, the change of the\n"
+      "torque per second: less is smoother. Energy is what the motor puts in and takes out\n"
+      "in an episode. `eval` explains success and return, and has more figures.\n\n"
+      "The same files give the same table on every machine. Therefore physics is the closed\n"
+      "form, and kernels use no fused multiply-adds: figures may differ from those of `eval`\n"
+      "in the last digits.\n\n"
+      "A link, another file, a policy of another task or model, and a file above 8 MiB are\n"
+      "refused, each with a line. Exit code: 0 if all are graded, 1 if some are refused.\n\n"
+      "Examples:\n"
+      "  ./upswing grade class\n"
+      "  ./upswing grade class --out class-table\n"
+      "  ./upswing grade class --episodes 1000 --plants 1000 --seed 7\n");
+}
+
+}  // namespace upswing
