@@ -22,7 +22,7 @@ copyright = "the Upswing developers"
 version = release = re.search(r"project\(upswing VERSION (\S+)",
                               (root / "CMakeLists.txt").read_text(encoding="utf-8"))[1]
 extensions = ["myst_parser", "breathe", "sphinx.ext.autodoc", "sphinx.ext.napoleon",
-              "sphinx.ext.mathjax"]
+              "sphinx.ext.mathjax", "sphinx_copybutton"]
 
 myst_enable_extensions = ["dollarmath", "deflist"]
 myst_heading_anchors = 4
@@ -49,8 +49,8 @@ mathjax_path = "tex-svg-full.js"
 html_static_path = ["_static", str(Path(package) / "static/mathjax" / mathjax_path)]
 html_css_files = ["style.css"]
 html_favicon = "_static/icon.svg"
-html_show_sourcelink = False
-html_copy_source = False
+html_search_scorer = str(root / "docs/_static/scorer.js")
+html_show_sourcelink = html_copy_source = True  # "view": the page's Markdown, also without a network
 html_show_sphinx = False
 FACE = {"font-stack": "'Hanken Grotesk', system-ui, sans-serif"}
 html_theme_options = {  # the page's face and colours (web/src/style)
@@ -63,6 +63,11 @@ html_theme_options = {  # the page's face and colours (web/src/style)
         "color-background-primary": "#0b1020", "color-background-secondary": "#151c30",
         "color-foreground-primary": "#ecf0f9", "color-brand-primary": "#35d0bd",
         "color-brand-content": "#82abff", "color-brand-visited": "#82abff"}}
+# "edit", if the address of the repository is known (as in the page, web/build/addresses.ts).
+source = os.environ.get("UPSWING_SOURCE", "").rstrip("/")
+if re.match("https://git(hub|lab).com/", source):
+    html_theme_options |= {"source_repository": source, "source_branch": "main",
+                           "source_directory": "docs"}
 templates_path = ["_templates"]
 html_sidebars = {"**": ["sidebar/brand.html", "page-link.html", "sidebar/search.html",
                         "sidebar/scroll-start.html", "sidebar/navigation.html",
@@ -71,6 +76,13 @@ html_sidebars = {"**": ["sidebar/brand.html", "page-link.html", "sidebar/search.
 
 def setup(app):
     app.connect("doctree-read", simplify, priority=0)  # before Sphinx collects the contents
+    app.connect("html-page-context", hide_source)
+
+
+def hide_source(app, page, template, context, doctree):
+    """Leaves out "view" and "edit" of pages that are not written by hand."""
+    if not (root / f"docs/{page}.md").exists():
+        context["page_source_suffix"] = None
 
 
 def simplify(app, doctree):

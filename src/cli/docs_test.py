@@ -338,6 +338,10 @@ class Site(ProgramTest):
                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8")
         self.assertEqual((done.returncode, done.stdout), (0, ""))
         self.assertTrue((site / "searchindex.js").exists())
+        self.assertIn("kind === 'object'", (site / "_static/language_data.js").read_text("utf-8"))
+        answers = (site / "answers.html").read_text(encoding="utf-8")
+        self.assertIn("_sources/answers.md.txt", answers)
+        self.assertIn("copybutton.js", answers)
         for page in site.rglob("*.html"):
             text = page.read_text(encoding="utf-8")
             loaded = re.findall(r'<(?:script|link|img)\b[^>]*?(?:src|href)="([^"]+)"', text)
