@@ -77,17 +77,6 @@ std::string Reflowed(const std::string& text) {
   return result;
 }
 
-/// The text of examples, with the command that starts an installed program.
-std::string WithLaunchCommand(std::string text) {
-  constexpr std::string_view kInRepository = "./upswing ";
-  const std::string command = Concat(LaunchCommand(), " ");
-  for (size_t at = 0; (at = text.find(kInRepository, at)) != std::string::npos;
-       at += command.size()) {
-    text.replace(at, kInRepository.size(), command);
-  }
-  return text;
-}
-
 /// Formats --help within HelpColumns(), without the `{false}` that CLI11 adds to a flag's --no-
 /// form.
 class HelpFormatter : public CLI::Formatter {
@@ -109,15 +98,14 @@ class HelpFormatter : public CLI::Formatter {
   /// Leaves out settings and notes, as -h does.
   void Shorten() { is_short_ = true; }
 
+  /// The footer, with the command that starts an installed program in its examples.
   std::string make_footer(const CLI::App* app) const override {
-    return Reflowed(WithLaunchCommand(CLI::Formatter::make_footer(app)));
+    return Reflowed(
+        Replaced(CLI::Formatter::make_footer(app), "./upswing ", Concat(LaunchCommand(), " ")));
   }
 
   std::string make_option_name(const CLI::Option* option, bool is_positional) const override {
-    std::string name = CLI::Formatter::make_option_name(option, is_positional);
-    constexpr std::string_view kNoise = "{false}";
-    const size_t at = name.find(kNoise);
-    return at == std::string::npos ? name : name.erase(at, kNoise.size());
+    return Replaced(CLI::Formatter::make_option_name(option, is_positional), "{false}", "");
   }
 
   std::string make_option_desc(const CLI::Option* option) const override {
