@@ -120,7 +120,7 @@ nb::tuple MapHandle(const PolicyHandle& policy, const SettingTexts& settings,
     const std::filesystem::path folder =
         out.empty() ? std::filesystem::path() : MapFolder(a, policy.loaded(), map);
     ThreadPool pool(ResolveThreads(threads), threads == 0);
-    FillMap(a, policy.loaded(), pool, std::ref(python_progress), map);
+    FillMap(policy.loaded(), pool, std::ref(python_progress), map);
     if (!out.empty()) {
       MakeNewFolder(folder);
       WriteMaps(maps, folder);

@@ -195,7 +195,6 @@ class Maps(unittest.TestCase):
                 "x and --y: expected two different": {"x": "mass=1:2", "y": "mass1=1:2"},
                 "mass2: expected a quantity that is on no axis": {"mass2": 1},
                 "gravity: expected a number": {"gravity": -1},
-                "check: expected a number in [0, 1]": {"check": 2},
                 "episodes: expected": {"episodes": 0}}.items():
             with self.assertRaises(upswing.InputError) as caught:
                 upswing.map("lqr", **arguments)

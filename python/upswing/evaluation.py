@@ -171,7 +171,6 @@ def map(  # pylint: disable=redefined-builtin
     episodes: int | None = None,
     seed: int = 0,
     physics: str | None = None,
-    check: float = 0.02,
     plant: PathLike | None = None,
     unknown_plant: bool = False,
     threads: int = 0,
@@ -192,7 +191,6 @@ def map(  # pylint: disable=redefined-builtin
         seed: seed of starts and noise
         physics: "closed-form" or "mujoco" (default closed-form; mujoco for a policy with its own
             model)
-        check: share of cells to repeat in MuJoCo
         plant: plant file or shipped plant, as for `evaluate`
         unknown_plant: scale observed energy and height by the training's plant, not the cell's
         threads: number of threads (0: one per processor, at most 8)
@@ -203,7 +201,7 @@ def map(  # pylint: disable=redefined-builtin
 
     >>> result = upswing.map("runs/d3qn-seed1", x="q1=-180:180:73", y="q2=-180:180:73")
     """
-    arguments = {"seed": seed, "threads": threads, "check": check}
+    arguments = {"seed": seed, "threads": threads}
     if physics is not None:
         arguments["physics"] = physics
     if episodes is not None:

@@ -116,7 +116,6 @@ class NumberTest(ProgramTest):
             (["eval", "x", "--seed", "-1"],
              '--seed: expected an integer in [0, 9000000000000000], got "-1"'),
             (["map", "x", "--threads", "1.5"], '--threads: expected an integer in [0, 256]'),
-            (["map", "x", "--check", "2"], '--check: expected a number in [0, 1], got "2"'),
             (["plot", "x", "--seconds", "nan"],
              '--seconds: expected a multiple of 0.02 in [0.1, 1000], got "nan"'),
             (["bench", "--threads", "1,x"],

@@ -36,21 +36,6 @@ std::string RangeText(const MapAxis& axis) {
                      axis.unit);
 }
 
-std::string CheckText(const MapResult& map) {
-  const MapAgreement a = map.agreement();
-  std::string text =
-      fmt::format("{} of {} cells repeated in MuJoCo: {} with equal successes",
-                  FormatCount(a.cells), FormatCount(map.config.cells()),
-                  a.same_successes == a.cells ? "all" : FormatCount(a.same_successes));
-  if (a.same_successes < a.cells) {
-    text += fmt::format(", the others differ by up to {:.0f}%", 100 * a.largest_success_difference);
-  }
-  if (a.both_succeed == 0) return text + ", no successes to compare";
-  if (a.largest_swing_up_difference == 0) return text + ", equal swing-up times";
-  return text +
-         fmt::format(", swing-up times differ by up to {:.2f} s", a.largest_swing_up_difference);
-}
-
 /// Prints the map's figures on standard output.
 void PrintMapTable(const MapResult& map) {
   const MapConfig& config = map.config;
@@ -74,7 +59,6 @@ void PrintMapTable(const MapResult& map) {
   fmt::print("  rate       {} episodes in {}: {} per second\n", FormatCount(map.episodes()),
              FormatDuration(map.seconds),
              FormatCount(static_cast<double>(map.episodes()) / map.seconds));
-  if (!map.checked.empty()) fmt::print("  check      {}\n", CheckText(map));
   fmt::print("  written    {}\n", Printable(Join(map.files, ", ")));
 }
 
@@ -97,7 +81,7 @@ int RunMapCommand(const MapCommand& a) {
   ThreadPool pool(ResolveThreads(a.threads));
   for (size_t i = 0; i < maps.size(); ++i) {
     EpisodeProgress progress(a.as_json);
-    FillMap(a, policies[i], pool, std::ref(progress), maps[i]);
+    FillMap(policies[i], pool, std::ref(progress), maps[i]);
   }
   MakeNewFolder(folder);
   WriteMaps(maps, folder);
@@ -125,6 +109,7 @@ void AddMap(CommandLine& line) {
   Options own;
   a.Describe(own);
   line.Arguments(own);
+  line.Removed("--check", "--physics mujoco makes a map in MuJoCo");
   AddPlant(line, a.trial.plant);
   AddSet(line, a.trial.set, "value of a quantity on neither axis, such as gravity=9.7");
   AddPhysics(line, a.trial.physics);

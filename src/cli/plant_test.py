@@ -77,7 +77,7 @@ class PlantTest(ProgramTest):
             self.succeed("eval", "lqr", "--made-for", "mass1=0.6", "--made-for", "realaigym", *known))
 
     def test_maps_and_bounds(self):
-        grid = ("--x", "center2=0.1:0.2:2", "--y", "inertia1=0.01:0.03:2", "--episodes", 1, "--check", 1)
+        grid = ("--x", "center2=0.1:0.2:2", "--y", "inertia1=0.01:0.03:2", "--episodes", 1)
         mapped = json.loads(self.succeed("map", "lqr", "--plant", "m.toml", *grid, "--out", "map",
                                          "--json", "--set", "mass2=1.2"))
         self.assertLessEqual({"armature": 0.002, "mass1": 0.8, "mass2": 1.2}.items(),

@@ -298,8 +298,8 @@ class PolicyRolloutTest(ProgramTest):
                  for more in ((), light)]
         self.assertEqual(first[0]["torque"], first[1]["torque"])
         for words in (("eval", "--episodes", 2, *light), ("eval", "--episodes", 2, "--unknown-plant"),
-                      ("map", "--x", "mass1=-10%:10%:2", "--y", "mass2=-10%:10%:2", "--check", 0,
-                       "--episodes", 1, "--out", "map"),
+                      ("map", "--x", "mass1=-10%:10%:2", "--y", "mass2=-10%:10%:2", "--episodes", 1,
+                       "--out", "map"),
                       ("info",)):
             with self.subTest(words[0]):
                 self.succeed(words[0], "identifying", *words[1:])

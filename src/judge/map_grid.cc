@@ -6,7 +6,6 @@
 #include <limits>
 #include <mutex>
 #include <numbers>
-#include <numeric>
 
 #include "base/error.h"
 #include "base/text.h"
@@ -19,12 +18,6 @@ constexpr int64_t kDefaultCells = 31;  // odd: the middle of ±50% is a cell
 constexpr int64_t kMostCells = 1000;
 // Episodes that step together: whole vectors, with network and activations in the L2 cache.
 constexpr int kTaskEpisodes = 64;
-
-/// Consecutive episodes of the map that run together, from one or more cells.
-struct EpisodeRange {
-  int64_t first;
-  int count;
-};
 
 /// Swing-up time (s) of an episode that succeeds.
 using EpisodeResult = std::optional<double>;
@@ -62,23 +55,24 @@ int64_t ParseCells(std::string_view text, const std::string& where) {
   return *cells;
 }
 
-std::vector<EpisodeResult> RunRange(const MapConfig& config, const Policy& policy,
-                                    const EpisodeRange& range) {
+/// Runs `count` consecutive episodes of the map together, from one or more cells.
+std::vector<EpisodeResult> RunRange(const MapConfig& config, const Policy& policy, int64_t first,
+                                    int count) {
   PendulumEnvConfig env_config = config.env;
-  env_config.num_envs = range.count;
+  env_config.num_envs = count;
   env_config.stream = "map";
-  env_config.first_index = static_cast<uint64_t>(range.first);
+  env_config.first_index = static_cast<uint64_t>(first);
   env_config.plants.clear();
   env_config.disturbances.clear();
   std::vector<PendulumState> starts;
-  for (int i = 0; i < range.count; ++i) {
-    const MapPoint point = config.PointOf((range.first + i) / config.episodes);
+  for (int i = 0; i < count; ++i) {
+    const MapPoint point = config.PointOf((first + i) / config.episodes);
     env_config.plants.push_back(point.plant);
     env_config.disturbances.push_back(point.disturbance);
     starts.push_back(point.start());
   }
   PendulumEnv env(env_config);
-  for (int i = 0; config.start_given && i < range.count; ++i) {
+  for (int i = 0; config.start_given && i < count; ++i) {
     env.SetState(i, starts[static_cast<size_t>(i)]);
   }
 
@@ -87,24 +81,6 @@ std::vector<EpisodeResult> RunRange(const MapConfig& config, const Policy& polic
     results.push_back(episode.success ? episode.swing_up_seconds : std::nullopt);
   }
   return results;
-}
-
-/// Splits the episodes of the cells into ranges; neighbouring cells may share a range.
-std::vector<EpisodeRange> RangesOf(std::span<const int64_t> cells, int64_t episodes) {
-  std::vector<EpisodeRange> ranges;
-  for (const int64_t cell : cells) {
-    int64_t first = cell * episodes;
-    const int64_t end = first + episodes;
-    while (first < end) {
-      const bool goes_on = !ranges.empty() && ranges.back().count < kTaskEpisodes &&
-                           ranges.back().first + ranges.back().count == first;
-      if (!goes_on) ranges.push_back({first, 0});
-      const int64_t count = std::min<int64_t>(end - first, kTaskEpisodes - ranges.back().count);
-      ranges.back().count += static_cast<int>(count);
-      first += count;
-    }
-  }
-  return ranges;
 }
 
 MapCell CellOf(std::span<const EpisodeResult> episodes) {
@@ -206,52 +182,34 @@ MapPoint MapConfig::PointOf(int64_t cell) const {
   return result;
 }
 
-std::vector<MapCell> RunMap(const MapConfig& config, const Policy& policy,
-                            std::span<const int64_t> cells, ThreadPool& pool,
+std::vector<MapCell> RunMap(const MapConfig& config, const Policy& policy, ThreadPool& pool,
                             const Progress& progress) {
-  const std::vector<EpisodeRange> ranges = RangesOf(cells, config.episodes);
-  std::vector<std::vector<EpisodeResult>> results(ranges.size());
+  const int64_t total = config.cells() * config.episodes;
+  std::vector<EpisodeResult> episodes(static_cast<size_t>(total));
   std::mutex mutex;
-  double done = 0;
-  const double total = static_cast<double>(cells.size()) * config.episodes;
+  int64_t done = 0;
   std::atomic<bool> failed = false;  // stops the other ranges
-  pool.ParallelFor(static_cast<int>(ranges.size()), [&](int range) {
+  const int64_t ranges = (total + kTaskEpisodes - 1) / kTaskEpisodes;
+  pool.ParallelFor(static_cast<int>(ranges), [&](int range) {
     if (failed) return;
-    const auto i = static_cast<size_t>(range);
+    const int64_t first = int64_t{range} * kTaskEpisodes;
+    const int count = static_cast<int>(std::min<int64_t>(total - first, kTaskEpisodes));
     try {
-      results[i] = RunRange(config, policy, ranges[i]);
+      std::ranges::copy(RunRange(config, policy, first, count), episodes.begin() + first);
       const std::lock_guard lock(mutex);
-      done += ranges[i].count;
-      if (progress) progress(done, total);
+      done += count;
+      if (progress) progress(static_cast<double>(done), static_cast<double>(total));
     } catch (...) {
       failed = true;
       throw;
     }
   });
-
-  // The ranges follow the order of the cells.
-  std::vector<EpisodeResult> episodes;
-  for (const auto& part : results) episodes.insert(episodes.end(), part.begin(), part.end());
   std::vector<MapCell> map;
   const auto count = static_cast<size_t>(config.episodes);
-  for (size_t i = 0; i < cells.size(); ++i) {
-    map.push_back(CellOf(std::span(episodes).subspan(i * count, count)));
+  for (size_t first = 0; first < episodes.size(); first += count) {
+    map.push_back(CellOf(std::span(episodes).subspan(first, count)));
   }
   return map;
-}
-
-std::vector<int64_t> DrawCells(const MapConfig& config, double share) {
-  if (share == 0) return {};
-  std::vector<int64_t> cells(static_cast<size_t>(config.cells()));
-  std::iota(cells.begin(), cells.end(), int64_t{0});
-  const auto wanted = static_cast<size_t>(
-      std::max<int64_t>(1, std::llround(share * static_cast<double>(config.cells()))));
-  // The first part of a Fisher-Yates shuffle.
-  Rng rng(config.env.seed, "map: cells to check");
-  for (size_t i = 0; i < wanted; ++i) std::swap(cells[i], cells[i + rng.Below(cells.size() - i)]);
-  cells.resize(wanted);
-  std::ranges::sort(cells);
-  return cells;
 }
 
 }  // namespace upswing

@@ -51,7 +51,7 @@ struct MapConfig {
   MapAxis x, y;              // (nx), (ny)
   bool start_given = false;  // start at `point`'s start; else hanging with the usual noise
   int episodes = 1;          // per cell
-  PendulumEnvConfig env;     // other conditions; its seed also draws the cells to check
+  PendulumEnvConfig env;     // other conditions
 
   int64_t cells() const { return static_cast<int64_t>(x.values.size() * y.values.size()); }
   /// The conditions of cell `i`; cells are counted along x first.
@@ -64,13 +64,9 @@ struct MapCell {
   double swing_up_seconds = 0;  // median over successful episodes; NaN if there are none
 };
 
-/// Results of the listed cells, in the order of the list. The pool shares the work without changing
-/// a bit. A cell's result does not depend on the other cells. `progress` counts episodes.
-std::vector<MapCell> RunMap(const MapConfig& config, const Policy& policy,
-                            std::span<const int64_t> cells, ThreadPool& pool,
+/// Results of all cells. The pool shares the work without changing a bit. `progress` counts
+/// episodes.
+std::vector<MapCell> RunMap(const MapConfig& config, const Policy& policy, ThreadPool& pool,
                             const Progress& progress);
-
-/// Draws `share` of the cells by the seed, at least one if the share is not 0, in ascending order.
-std::vector<int64_t> DrawCells(const MapConfig& config, double share);
 
 }  // namespace upswing

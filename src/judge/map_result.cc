@@ -21,9 +21,6 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-/// A number as a table cell; empty if it is not finite.
-std::string Known(double number) { return std::isfinite(number) ? FormatNumber(number) : ""; }
-
 double RateOf(const MapResult& map, const MapCell& cell) {
   return static_cast<double>(cell.successes) / map.config.episodes;
 }
@@ -134,17 +131,6 @@ ordered_json JsonOf(const MapResult& map) {
     j["success_rate"][i / columns].push_back(RateOf(map, map.cells[i]));
     j["swing_up_seconds"][i / columns].push_back(map.cells[i].swing_up_seconds);
   }
-  j["check"] = nullptr;
-  if (!map.checked.empty()) {
-    const MapAgreement a = map.agreement();
-    j["check"] = {
-        {"cells", a.cells},
-        {"same_successes", a.same_successes},
-        {"largest_success_difference", a.largest_success_difference},
-        {"both_succeed", a.both_succeed},
-        {"largest_swing_up_difference",
-         a.both_succeed > 0 ? ordered_json(a.largest_swing_up_difference) : ordered_json()}};
-  }
   j["seconds"] = map.seconds;
   j["episodes_per_second"] = static_cast<double>(map.episodes()) / map.seconds;
   j["files"] = map.files;
@@ -182,40 +168,18 @@ std::string MapResult::success_interval() const {
                      100 * interval.low);
 }
 
-MapAgreement MapResult::agreement() const {
-  MapAgreement result;
-  result.cells = std::ssize(checked);
-  for (size_t i = 0; i < checked.size(); ++i) {
-    const MapCell &a = cells[static_cast<size_t>(checked[i])], &b = in_mujoco[i];
-    const auto successes = static_cast<double>(std::abs(a.successes - b.successes));
-    result.same_successes += successes == 0 ? 1 : 0;
-    result.largest_success_difference =
-        std::max(result.largest_success_difference, successes / config.episodes);
-    const double seconds = std::abs(a.swing_up_seconds - b.swing_up_seconds);
-    if (!std::isfinite(seconds)) continue;
-    ++result.both_succeed;
-    result.largest_swing_up_difference = std::max(result.largest_swing_up_difference, seconds);
-  }
-  return result;
-}
-
 std::string MapCsv(const MapResult& map) {
   const MapAxis &x = map.config.x, &y = map.config.y;
   CsvTable csv;
-  size_t next_checked = 0;
   for (size_t i = 0; i < map.cells.size(); ++i) {
     const MapCell& cell = map.cells[i];
-    const bool checked =
-        next_checked < map.checked.size() && map.checked[next_checked] == static_cast<int64_t>(i);
-    const MapCell* again = checked ? &map.in_mujoco[next_checked++] : nullptr;
     csv.Add(x.name, x.values[i % x.values.size()]);
     csv.Add(y.name, y.values[i / x.values.size()]);
     csv.Add("episodes", map.config.episodes);
     csv.Add("successes", cell.successes);
     csv.Add("success_rate", RateOf(map, cell));
-    csv.Add("swing_up_seconds", Known(cell.swing_up_seconds));
-    csv.Add("mujoco_successes", again ? Concat(again->successes) : "");
-    csv.Add("mujoco_swing_up_seconds", again ? Known(again->swing_up_seconds) : "");
+    const bool known = cell.successes > 0;
+    csv.Add("swing_up_seconds", known ? FormatNumber(cell.swing_up_seconds) : "");
     csv.EndRow();
   }
   return csv.text();

@@ -10,14 +10,6 @@
 
 namespace upswing {
 
-/// Agreement of the engines on the cells that were repeated in MuJoCo.
-struct MapAgreement {
-  int64_t cells = 0, same_successes = 0;   // all repeated cells; those with equal successes
-  double largest_success_difference = 0;   // of the success rates
-  int64_t both_succeed = 0;                // cells where both have successes
-  double largest_swing_up_difference = 0;  // of the cells' median times, s
-};
-
 /// A finished map.
 struct MapResult {
   MapConfig config;
@@ -26,23 +18,19 @@ struct MapResult {
   std::string changes;             // differences from the training, without the axes; empty: none
   std::string dot;                 // label of the training's point; empty: it is not on the map
   std::vector<MapCell> cells;      // (ny × nx)
-  std::vector<int64_t> checked;    // cells repeated in MuJoCo, ascending
-  std::vector<MapCell> in_mujoco;  // results of the repeated cells
-  double seconds = 0;              // wall time of the map without the checks
+  double seconds = 0;              // wall time
   std::vector<std::string> files;  // written files
 
   int64_t episodes() const { return config.cells() * config.episodes; }
   double mean_success() const;     // success rate over all episodes
   double always_success() const;   // share of cells in which every episode succeeds
   double median_swing_up() const;  // median of the cells' medians, s; NaN if there are none
-  MapAgreement agreement() const;
   /// The success rate implied by a cell without a failure, as text: `10 of 10: 95% interval 72.2%
   /// to 100%`.
   std::string success_interval() const;
 };
 
-/// The map as CSV, one row for each cell, x first. MuJoCo's columns are empty if the cell was not
-/// repeated.
+/// The map as CSV, one row for each cell, x first.
 std::string MapCsv(const MapResult& map);
 
 /// Throws BadInput unless all maps have the same axes.

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <numeric>
 
 #include "agents/config.h"
 #include "base/error.h"
@@ -132,7 +131,6 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
 void MapArguments::Describe(Options& o) {
   o.Add(&episodes, "episodes", {1, 100000}, "", "number of episodes per cell").usual =
       "10; 1 if the start is given";
-  o.Add(&check, "check", kUnit, "", "share of cells to repeat in MuJoCo");
 }
 
 MapResult PlanMap(const MapArguments& a, const LoadedPolicy& loaded) {
@@ -151,18 +149,11 @@ fs::path MapFolder(const MapArguments& a, const LoadedPolicy& loaded, const MapR
   return FigureFolder(a.out, loaded, Concat("map-", map.config.x.name, "-", map.config.y.name));
 }
 
-void FillMap(const MapArguments& a, const LoadedPolicy& loaded, ThreadPool& pool,
-             const Progress& progress, MapResult& map) {
-  std::vector<int64_t> all(static_cast<size_t>(map.config.cells()));
-  std::iota(all.begin(), all.end(), int64_t{0});
+void FillMap(const LoadedPolicy& loaded, ThreadPool& pool, const Progress& progress,
+             MapResult& map) {
   const auto begin = Clock::now();
-  map.cells = RunMap(map.config, *loaded.policy, all, pool, progress);
+  map.cells = RunMap(map.config, *loaded.policy, pool, progress);
   map.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
-  if (map.config.env.engine == &kMuJoCo) return;
-  map.checked = DrawCells(map.config, a.check);
-  MapConfig mujoco = map.config;
-  mujoco.env.engine = &kMuJoCo;
-  map.in_mujoco = RunMap(mujoco, *loaded.policy, map.checked, pool, progress);
 }
 
 }  // namespace upswing

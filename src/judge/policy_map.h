@@ -16,7 +16,6 @@ struct MapArguments {
   std::string x = "mass2=-50%:+50%", y = "length2=-50%:+50%", out;
   TrialArguments trial;  // its `set` may also name noise, delay and the start
   int64_t episodes = 0;  // per cell; 0: the usual number
-  double check = 0.02;   // share of the cells to repeat in MuJoCo
 
   /// No physics: the closed form, or MuJoCo for a policy that has its own model.
   MapArguments() { trial.physics.clear(); }
@@ -33,8 +32,8 @@ MapResult PlanMap(const MapArguments& a, const LoadedPolicy& loaded);
 std::filesystem::path MapFolder(const MapArguments& a, const LoadedPolicy& loaded,
                                 const MapResult& map);
 
-/// Runs all cells, and repeats the share of cells to check in MuJoCo. `progress` counts episodes.
-void FillMap(const MapArguments& a, const LoadedPolicy& loaded, ThreadPool& pool,
-             const Progress& progress, MapResult& map);
+/// Runs all cells. `progress` counts episodes.
+void FillMap(const LoadedPolicy& loaded, ThreadPool& pool, const Progress& progress,
+             MapResult& map);
 
 }  // namespace upswing

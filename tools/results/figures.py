@@ -562,8 +562,8 @@ def measure(program):
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
         run("map", *(agents / f"{name}.safetensors" for name in ("d3qn", "d3qn-adaptive")), "--x", "mass1=-40%:+40%:21",
-            "--y", "mass2=-40%:+40%:21", "--episodes", 5, "--check", 0, "--out", out / "maps")
-        run("map", "lqr", "--x", "q1=150:210:121", "--y", "q2=-30:30:121", "--check", 0, "--out", out / "lqr")
+            "--y", "mass2=-40%:+40%:21", "--episodes", 5, "--out", out / "maps")
+        run("map", "lqr", "--x", "q1=150:210:121", "--y", "q2=-30:30:121", "--out", out / "lqr")
         keep_maps(out / "maps", write)
         keep_lqr(out / "lqr", write)
 
