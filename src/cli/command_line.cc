@@ -402,7 +402,7 @@ std::string_view CalledCommand(int argc, const char* const* argv) {
 namespace {
 
 /// Throws BadInput if a file to write is another file of the command line, to read or to write.
-void ExpectOtherOutputs(std::span<const char* const> words) {
+void ExpectOtherOutputs(const CLI::App& program) {
   namespace fs = std::filesystem;
   constexpr std::array kOutputs{"--out", "--csv",    "--figure",       "--onnx",
                                 "--c",   "--record", "--episodes-csv", "--log"};
@@ -411,16 +411,14 @@ void ExpectOtherOutputs(std::span<const char* const> words) {
     bool is_output;
   };
   std::vector<Named> files;
-  for (size_t i = 1; i < words.size(); ++i) {
-    const std::string_view word = words[i];
-    const size_t equals = word.starts_with("--") ? word.find('=') : word.npos;
-    const bool joined = equals != word.npos;
-    const std::string flag(joined ? word.substr(0, equals)
-                           : std::string_view(words[i - 1]).starts_with("--") ? words[i - 1]
-                                                                              : "");
-    if (!joined && word.starts_with("--")) continue;
-    files.push_back({flag, std::string(joined ? word.substr(equals + 1) : word),
-                     std::ranges::find(kOutputs, flag) != kOutputs.end()});
+  for (const CLI::App* app = &program; app != nullptr;) {
+    for (const CLI::Option* option : app->get_options()) {
+      const std::string flag = option->get_lnames().empty() ? "" : "--" + option->get_lnames()[0];
+      const bool is_output = std::ranges::find(kOutputs, flag) != kOutputs.end();
+      for (const std::string& path : option->results()) files.push_back({flag, path, is_output});
+    }
+    const auto chosen = app->get_subcommands();
+    app = chosen.empty() ? nullptr : chosen.front();
   }
   const auto same = [](const Named& output, const Named& other) {
     std::error_code error;
@@ -475,8 +473,8 @@ int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> 
     ShortenHelp(program);
   }
   try {
-    ExpectOtherOutputs(std::span(argv, static_cast<size_t>(argc)));
     program.parse(argc, argv);
+    ExpectOtherOutputs(program);
   } catch (const CLI::Success& request) {  // --help and --version
     if (const std::string unknown = ExplainUnknown(program); !unknown.empty()) {
       throw BadInput(unknown);

@@ -191,23 +191,6 @@ void DescribeRecording(const ViewArguments& a, const fs::path& path, nlohmann::j
   job["frames"] = single ? 1 : static_cast<int64_t>(seconds * fps / a.speed + 1e-9) + 1;
 }
 
-/// Shows how many pictures are drawn.
-class PictureProgress {
- public:
-  explicit PictureProgress(const nlohmann::json& job)
-      : pictures_(job["frames"]), stride_(job["stride"]) {}
-
-  /// `steps`: see Show. A GIF goes through its pictures twice.
-  void operator()(double steps) {
-    if (steps <= 0) line_.emplace(false, "pictures");
-    if (pictures_ > 1 && steps > 0 && line_) (*line_)(steps / stride_, pictures_);
-  }
-
- private:
-  double pictures_, stride_;
-  std::optional<EpisodeProgress> line_;
-};
-
 int RunView(const ViewArguments& a) {
   nlohmann::json job;
   SetSize(a.size, job);
@@ -227,11 +210,13 @@ int RunView(const ViewArguments& a) {
   InstallSignalHandlers("");
   PythonChild drawer("view", ViewProgram(),
                      job.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
-  std::optional<PictureProgress> progress;
-  if (making) progress.emplace(job);
+  std::optional<EpisodeProgress> progress;  // of the pictures; a GIF goes through them twice
   while (const auto request = drawer.Next()) {
     drawer.Answer(show.Answer(*request));
-    if (progress) (*progress)(show.steps());
+    if (!making || job["frames"] == 1) continue;
+    if (show.steps() <= 0) progress.emplace(false, "pictures");
+    if (progress && show.steps() > 0)
+      (*progress)(show.steps() / job["stride"].get<double>(), job["frames"]);
   }
   progress.reset();
   const int code = drawer.Finish();

@@ -64,16 +64,14 @@ std::vector<EpisodeResult> RunRange(const MapConfig& config, const Policy& polic
   env_config.first_index = static_cast<uint64_t>(first);
   env_config.plants.clear();
   env_config.disturbances.clear();
-  std::vector<PendulumState> starts;
   for (int i = 0; i < count; ++i) {
     const MapPoint point = config.PointOf((first + i) / config.episodes);
     env_config.plants.push_back(point.plant);
     env_config.disturbances.push_back(point.disturbance);
-    starts.push_back(point.start());
   }
   PendulumEnv env(env_config);
   for (int i = 0; config.start_given && i < count; ++i) {
-    env.SetState(i, starts[static_cast<size_t>(i)]);
+    env.SetState(i, config.PointOf((first + i) / config.episodes).start());
   }
 
   std::vector<EpisodeResult> results;
