@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Finds the worst habits of English by patterns: in README.md and docs/, in the code's comments, help
-lines, messages and names of tests, and in the texts of the page.
+"""Finds the worst habits of English by patterns: in README.md, docs/ and notebooks, in the code's
+comments, help lines, messages and names of tests, and in the texts of the page.
 
   prose.py [FILE...]    lists what it finds, and ends with 1 if anything is found
 """
 
 import inspect
+import json
 import re
 import sys
 from pathlib import Path
@@ -68,6 +69,10 @@ def sources():
         files += sorted((ROOT / folder).rglob("*"))
     return [path for path in files if language(path) and path.is_file()
             and not {"testdata", "corpus", "__pycache__"} & set(path.parts)]
+
+
+def notebooks():
+    return sorted((ROOT / "examples/notebooks").glob("*.ipynb"))
 
 
 def paragraphs(markdown):
@@ -158,11 +163,14 @@ def faults_of(path):
     """(sentence, fault) for each fault of a page or a source file."""
     if path.suffix == ".md":
         return list(faults(path.read_text(encoding="utf-8")))
+    if path.suffix == ".ipynb":
+        return [fault for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]
+                if cell["cell_type"] == "markdown" for fault in faults("".join(cell["source"]))]
     return [fault for text in texts(path) for fault in faults(text)]
 
 
 def main(names):
-    paths = [Path(name) for name in names] or pages() + sources()
+    paths = [Path(name) for name in names] or pages() + notebooks() + sources()
     found = [f"{path}: {fault}: {sentence}\n" for path in paths
              for sentence, fault in faults_of(path)]
     print("".join(found), end="")

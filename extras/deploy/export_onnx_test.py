@@ -12,10 +12,10 @@ import unittest
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "src/cli"))
-import readers_environment  # noqa: E402
+import test_environment  # noqa: E402
 from testing import ROOT, UPSWING, ProgramTest, probe, read_tensors, small  # noqa: E402
 
-readers_environment.enter(__file__)
+test_environment.enter(__file__, "readers")
 
 # pylint: disable=wrong-import-position
 import numpy as np

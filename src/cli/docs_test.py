@@ -201,7 +201,7 @@ class Documents(ProgramTest):
         self.assertEqual(results.rendered(shown.replace("|---", "|----", 1)), shown)
 
     def test_plain_english(self):
-        for path in PAGES + prose.sources():
+        for path in PAGES + prose.notebooks() + prose.sources():
             for sentence, fault in prose.faults_of(path):
                 with self.subTest(file=path.name, fault=fault):
                     self.fail(sentence)

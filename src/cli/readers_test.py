@@ -2,16 +2,16 @@
 """Checks that independent readers agree with the program's files: TensorBoard's reader of event
 files, the safetensors package, and the network's forward pass in numpy.
 
-The packages are in a separate virtual environment (readers_environment.py).
+The packages are in a separate virtual environment (test_environment.py).
 """
 
 import json
 import unittest
 
-import readers_environment
+import test_environment
 from testing import ROOT, ProgramTest, read_csv, read_tensors, small
 
-readers_environment.enter(__file__)
+test_environment.enter(__file__, "readers")
 
 # pylint: disable=wrong-import-position
 import numpy as np
