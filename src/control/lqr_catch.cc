@@ -1,5 +1,6 @@
 #include "control/lqr_catch.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -57,8 +58,8 @@ bool AllSettle(const Lqr& lqr, double level, const std::vector<Eigen::Vector4d>&
 }  // namespace
 
 double RegionOfAttraction(const Lqr& lqr, const Plant& plant) {
-  const auto [V, values] = SymmetricModesOf(lqr.P);
-  const Eigen::Matrix4d shape = V * values.cwiseSqrt().cwiseInverse().asDiagonal() * V.transpose();
+  const Eigen::Matrix4d shape =
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(lqr.P).operatorInverseSqrt();
   std::vector<Eigen::Vector4d> directions = Directions();
   for (Eigen::Vector4d& d : directions) d = shape * d;
 

@@ -1,10 +1,9 @@
 #include "control/reward_cost.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-
-#include "control/riccati.h"
 
 namespace upswing {
 
@@ -47,8 +46,9 @@ CostExpansion RewardCost::ExpandRunning(const StateVector& x, double u) const {
                                 (2 * e * e);
     }
   }
-  const auto [V, values] = SymmetricModesOf(l.xx);
-  l.xx = V * values.cwiseMax(0).asDiagonal() * V.transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> modes(l.xx);
+  const Eigen::Matrix4d& V = modes.eigenvectors();
+  l.xx = V * modes.eigenvalues().cwiseMax(0).asDiagonal() * V.transpose();
   l.uu = 2 * weights_.weight[4] * (0.01 + 0.04 * Inversion(x));
   l.u = l.uu * u;
   return l;

@@ -36,16 +36,8 @@ struct Lqr {
 /// Q gives no cost to a mode that has to be stabilised.
 std::optional<Lqr> SolveDiscreteLqr(const LinearModel& model, const Eigen::Matrix4d& Q, double R);
 
-/// Largest |eigenvalue|: x⁺ = A x decays if it is below 1. NaN if A is not finite.
-double SpectralRadius(const Eigen::Matrix4d& A);
-
-/// The modes of a symmetric matrix S = V diag(values) V', V orthogonal.
-struct SymmetricModes {
-  Eigen::Matrix4d V;
-  Eigen::Vector4d values;
-};
-/// Modes of S by cyclic Jacobi rotations: Golub, Van Loan, "Matrix Computations" (2013), section
-/// 8.5.
-SymmetricModes SymmetricModesOf(Eigen::Matrix4d S);
+/// Largest |eigenvalue| of a finite square matrix: x⁺ = A x decays if it is below 1. The size is
+/// dynamic, because a fixed size takes twice as long to compile.
+double SpectralRadius(const Eigen::MatrixXd& A);
 
 }  // namespace upswing

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "base/rng.h"
 #include "control/testing.h"
 
 namespace upswing {
@@ -13,14 +12,6 @@ namespace {
 
 using Eigen::Matrix4d;
 using Eigen::Vector4d;
-
-Matrix4d Drawn(Rng& rng) {
-  Matrix4d A;
-  for (int i = 0; i < 4; ++i) {
-    for (int j = 0; j < 4; ++j) A(i, j) = rng.Normal();
-  }
-  return A;
-}
 
 /// A system with two states, padded with two zero states.
 LinearModel Two(double a11, double a12, double a21, double a22, double b1, double b2) {
@@ -83,30 +74,6 @@ TEST(Riccati, NoSolutionForNumbersThatAreNotFinite) {
   for (const double x :
        {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
     EXPECT_FALSE(SolveDiscreteLqr(Two(x, 0, 0, 0, 1, 0), Q, 1));
-  }
-}
-
-TEST(Riccati, SpectralRadiusIsTheLargestEigenvalue) {
-  Rng rng(2, "matrices");
-  for (int trial = 0; trial < 200; ++trial) {
-    const Matrix4d A = std::exp(rng.Uniform(-5, 5)) * Drawn(rng);
-    const double expected = EigenSolver(A, false).eigenvalues().cwiseAbs().maxCoeff();
-    EXPECT_NEAR(SpectralRadius(A), expected, 1e-11 * expected);
-  }
-  Matrix4d nilpotent = Matrix4d::Zero();
-  nilpotent(0, 1) = nilpotent(1, 2) = nilpotent(2, 3) = 5;
-  EXPECT_EQ(SpectralRadius(nilpotent), 0);
-}
-
-TEST(Riccati, SymmetricModesAreTheEigenvectors) {
-  Rng rng(3, "matrices");
-  for (int trial = 0; trial < 200; ++trial) {
-    const Matrix4d L = Drawn(rng),
-                   S = trial % 2 == 0 ? Matrix4d(L + L.transpose()) : Matrix4d(L * L.transpose());
-    const auto [V, values] = SymmetricModesOf(S);
-    EXPECT_LT((V * values.asDiagonal() * V.transpose() - S).norm(), 1e-13 * S.norm());
-    EXPECT_LT((V * V.transpose() - Matrix4d::Identity()).norm(), 1e-14);
-    EXPECT_NEAR(values.minCoeff(), SymmetricEigenSolver(S).eigenvalues()[0], 1e-13 * S.norm());
   }
 }
 
