@@ -76,8 +76,7 @@ double LeastBangBangSeconds(const Plant& plant, int last_step) {
     }
     for (Branch& b : branches) {
       for (int k = 0; k < kGrid; ++k) model.Step({&b.x, 1}, {&b.u, 1});
-      if (Inverted({b.x[0], b.x[1], b.x[2], b.x[3]}) &&
-          upright.Holds(UprightDeviation(b.x), model)) {
+      if (Inverted({b.x[0], b.x[1], b.x[2], b.x[3]}) && upright.Holds(UprightDeviation(b.x))) {
         return (t + kGrid) * kControlPeriod;
       }
     }

@@ -5,15 +5,6 @@
 
 namespace upswing {
 
-/// The swing-up's memory, and a plant to look ahead with.
-struct HybridPolicy::Parts : Memory {
-  Parts(std::unique_ptr<Memory> memory, const Plant& plant)
-      : swing_up(std::move(memory)), model(plant) {}
-
-  std::unique_ptr<Memory> swing_up;
-  PendulumModel model;
-};
-
 HybridPolicy::HybridPolicy(const std::string& kind, const Options& settings, const LqrConfig& lqr,
                            std::shared_ptr<const Policy> swing_up, const Plant& plant)
     : ComputedPolicy(kind, settings, plant), swing_up_(std::move(swing_up)), upright_(lqr, plant) {
@@ -30,17 +21,14 @@ std::string HybridPolicy::description() const {
 }
 
 std::unique_ptr<Policy::Memory> HybridPolicy::Start(int num_envs) const {
-  return std::make_unique<Parts>(swing_up_->Start(num_envs), plant());
+  return swing_up_->Start(num_envs);
 }
 
 void HybridPolicy::Act(Matrix<const float> obs, Matrix<double> action, Memory& memory) const {
-  auto& parts = static_cast<Parts&>(memory);
-  swing_up_->Act(obs, action, *parts.swing_up);
+  swing_up_->Act(obs, action, memory);
   for (int i = 0; i < obs.rows(); ++i) {
     const StateVector deviation = UprightDeviation(obs.row(i));
-    if (upright_.Holds(deviation, parts.model)) {
-      action(i, 0) = Limited(upright_.lqr().Torque(deviation));
-    }
+    if (upright_.Holds(deviation)) action(i, 0) = Limited(upright_.lqr().Torque(deviation));
   }
 }
 

@@ -22,8 +22,6 @@ class HybridPolicy : public ComputedPolicy {
   int obs_size() const override { return swing_up_->obs_size(); }
 
  private:
-  struct Parts;
-
   std::shared_ptr<const Policy> swing_up_;
   LqrCatch upright_;
 };

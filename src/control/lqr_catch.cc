@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include "base/error.h"
@@ -91,7 +92,7 @@ LqrCatch::LqrCatch(const LqrConfig& config, const Plant& plant)
     : lqr_(SolveLqr(config, plant)),
       region_(RegionOfAttraction(lqr_, plant)),
       steps_(SettleSteps(lqr_, plant) / 2),
-      limit_(plant.torque_limit) {
+      plant_(plant) {
   if (region_ > 0) return;
   const bool dry = plant.coulomb1 > 0 || plant.coulomb2 > 0;
   throw BadInput(Concat("lqr: found no region of attraction: with these weights ",
@@ -99,15 +100,17 @@ LqrCatch::LqrCatch(const LqrConfig& config, const Plant& plant)
                         "LQR catches the pendulum only very close to upright, if at all"));
 }
 
-bool LqrCatch::Holds(const StateVector& deviation, PendulumModel& model) const {
+bool LqrCatch::Holds(const StateVector& deviation) const {
+  std::optional<PendulumModel> model;  // far from upright and in the region, none is needed
   StateVector x = FromUpright(deviation);
   for (int step = 0; step < steps_; ++step) {
     const StateVector d = UprightDeviation(x);
     const auto [lean1, lean2] = Lean(StateOf(x));
     if (std::abs(lean1) > kLargestLean || std::abs(lean2) > kLargestLean) return false;
     if (lqr_.Cost(d) <= region_) return true;
-    const double u = lqr_.Torque(d, limit_);
-    model.Step({&x, 1}, {&u, 1});
+    const double u = lqr_.Torque(d, plant_.torque_limit);
+    if (!model) model.emplace(plant_);
+    model->Step({&x, 1}, {&u, 1});
   }
   return false;
 }

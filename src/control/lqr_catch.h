@@ -27,16 +27,16 @@ class LqrCatch {
   /// Number of control periods within which the regulator must reach the region.
   int steps() const { return steps_; }
 
-  /// Whether the regulator brings the plant from this deviation from upright into the region.
-  /// Simulates this with `model`, a model of the same plant. The limits are half of the settling
-  /// time, at least 2.5 s, and a lean of 60° of either link.
-  bool Holds(const StateVector& deviation, PendulumModel& model) const;
+  /// Whether the regulator brings the plant from this deviation from upright into the region, in a
+  /// simulation. The limits are half of the settling time, at least 2.5 s, and a lean of 60° of
+  /// either link.
+  bool Holds(const StateVector& deviation) const;
 
  private:
   Lqr lqr_;
   double region_;
-  int steps_;     // control periods within which it must reach the region
-  double limit_;  // torque limit, N·m
+  int steps_;  // control periods within which it must reach the region
+  Plant plant_;
 };
 
 }  // namespace upswing

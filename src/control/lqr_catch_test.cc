@@ -49,13 +49,13 @@ TEST(LqrCatch, AgreesWithALongerSimulation) {
   for (int trial = 0; trial < 2000; ++trial) {
     const StateVector d(rng.Normal() * 0.15, rng.Normal() * 0.15, rng.Normal() * 0.5,
                         rng.Normal() * 0.5);
-    if (!upright.Holds(d, model)) continue;
+    if (!upright.Holds(d)) continue;
     ++held;
     EXPECT_TRUE(Caught(upright.lqr(), d, model));
   }
   EXPECT_GT(held, 50);
   EXPECT_LT(held, 1500);
-  EXPECT_FALSE(upright.Holds(StateVector(3, 0, 0, 0), model));
+  EXPECT_FALSE(upright.Holds(StateVector(3, 0, 0, 0)));
 }
 
 }  // namespace

@@ -20,35 +20,35 @@ StateVector Get(const ClosedFormBatch& batch, size_t i) {
 
 }  // namespace
 
-void PendulumModel::Reserve(ClosedFormBatch& batch, size_t n) const {
-  if (batch.padded() >= n) return;
-  batch = ClosedFormBatch(n);
-  for (size_t i = 0; i < batch.padded(); ++i) batch.SetPlant(i, plant_);
+void PendulumModel::Reserve(size_t n) {
+  if (batch_.padded() >= n) return;
+  batch_ = ClosedFormBatch(n);
+  for (size_t i = 0; i < batch_.padded(); ++i) batch_.SetPlant(i, plant_);
 }
 
 void PendulumModel::Step(std::span<StateVector> x, std::span<const double> u) {
-  Reserve(few_, x.size());
-  for (size_t i = 0; i < x.size(); ++i) Set(few_, i, x[i], u[i]);
-  Advance(few_, kPhysicsSteps, 0, x.size());  // Advance also steps the padding of the last vector
-  for (size_t i = 0; i < x.size(); ++i) x[i] = Get(few_, i);
+  Reserve(x.size());
+  for (size_t i = 0; i < x.size(); ++i) Set(batch_, i, x[i], u[i]);
+  Advance(batch_, kPhysicsSteps, 0, x.size());  // Advance also steps the padding of the last vector
+  for (size_t i = 0; i < x.size(); ++i) x[i] = Get(batch_, i);
 }
 
 void PendulumModel::Linearize(std::span<const StateVector> x, std::span<const double> u,
                               std::span<LinearModel> models) {
-  Reserve(many_, kPerturbed * x.size());
+  Reserve(kPerturbed * x.size());
   for (size_t i = 0; i < x.size(); ++i) {
-    for (size_t k = 0; k < kPerturbed; ++k) Set(many_, kPerturbed * i + k, x[i], u[i]);
-    ClosedFormBatch::Array* const varied[] = {&many_.q1, &many_.q2, &many_.w1, &many_.w2,
-                                              &many_.tau};
+    for (size_t k = 0; k < kPerturbed; ++k) Set(batch_, kPerturbed * i + k, x[i], u[i]);
+    ClosedFormBatch::Array* const varied[] = {&batch_.q1, &batch_.q2, &batch_.w1, &batch_.w2,
+                                              &batch_.tau};
     for (size_t k = 0; k < kPerturbed; ++k) {
       (*varied[k / 2])[kPerturbed * i + k] += k % 2 == 0 ? kDifference : -kDifference;
     }
   }
-  Advance(many_, kPhysicsSteps, 0, kPerturbed * x.size());
+  Advance(batch_, kPhysicsSteps, 0, kPerturbed * x.size());
   for (size_t i = 0; i < x.size(); ++i) {
     const auto derivative = [&](size_t variable) -> StateVector {
       const size_t at = kPerturbed * i + 2 * variable;
-      return (Get(many_, at) - Get(many_, at + 1)) / (2 * kDifference);
+      return (Get(batch_, at) - Get(batch_, at + 1)) / (2 * kDifference);
     };
     for (size_t k = 0; k < 4; ++k) models[i].A.col(static_cast<Eigen::Index>(k)) = derivative(k);
     models[i].B = derivative(4);

@@ -18,7 +18,7 @@ inline PendulumState StateOf(const StateVector& x) { return {x[0], x[1], x[2], x
 /// same kernels as the simulation.
 class PendulumModel {
  public:
-  explicit PendulumModel(const Plant& plant) : plant_(plant), few_(0), many_(0) {}
+  explicit PendulumModel(const Plant& plant) : plant_(plant), batch_(0) {}
 
   const Plant& plant() const { return plant_; }
 
@@ -32,10 +32,10 @@ class PendulumModel {
 
  private:
   /// Makes room for n pendulums.
-  void Reserve(ClosedFormBatch& batch, size_t n) const;
+  void Reserve(size_t n);
 
   Plant plant_;
-  ClosedFormBatch few_, many_;  // batches for Step and for Linearize
+  ClosedFormBatch batch_;
 };
 
 }  // namespace upswing

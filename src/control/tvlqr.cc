@@ -37,7 +37,7 @@ std::optional<Trajectory> GuessSwingUp(const LqrConfig& lqr, const LqrCatch& upr
   const QuadraticCost cost(price * WeightsOf(lqr), price * lqr.torque, upright.lqr().P);
   Trajectory trajectory = optimizer.Follow(cost, StateVector::Zero(), torques);
   optimizer.Improve(cost, kPlanTolerance, kPlanIterations, trajectory);
-  if (!upright.Holds(UprightDeviation(trajectory.x.back()), optimizer.model())) return {};
+  if (!upright.Holds(UprightDeviation(trajectory.x.back()))) return {};
   while (trajectory.steps() < steps) {
     StateVector x = trajectory.x.back();
     const double u = upright.lqr().Torque(UprightDeviation(x), limit);
@@ -63,7 +63,7 @@ SwingUp PlanSwingUp(const LqrConfig& lqr, const SwingUpConfig& config, const Lqr
     if (!found) continue;
     Trajectory trajectory = TrajectoryOptimizer::Priced(cost, *std::move(found));
     optimizer.Improve(cost, kPlanTolerance, kPlanIterations, trajectory);
-    const bool holds = upright.Holds(UprightDeviation(trajectory.x.back()), model);
+    const bool holds = upright.Holds(UprightDeviation(trajectory.x.back()));
     if (holds && (!best || trajectory.cost < best->cost)) best = std::move(trajectory);
   }
   if (!best) {
@@ -103,15 +103,8 @@ std::string TvlqrPolicy::description() const {
                 " s, followed by a time-varying linear-quadratic regulator");
 }
 
-/// The places of some environments, and a plant to look ahead with.
-struct TvlqrPolicy::Places : MemoryOf<Place> {
-  Places(int num_envs, const Plant& plant) : MemoryOf<Place>(num_envs, Place()), model(plant) {}
-
-  PendulumModel model;
-};
-
 std::unique_ptr<Policy::Memory> TvlqrPolicy::Start(int num_envs) const {
-  return std::make_unique<Places>(num_envs, plant());
+  return std::make_unique<MemoryOf<Place>>(num_envs, Place());
 }
 
 StateVector TvlqrPolicy::OffPlan(const StateVector& deviation, const Place& place) const {
@@ -120,10 +113,9 @@ StateVector TvlqrPolicy::OffPlan(const StateVector& deviation, const Place& plac
 }
 
 double TvlqrPolicy::Torque(const StateVector& deviation, size_t env, Memory& memory) const {
-  auto& places = static_cast<Places&>(memory);
-  Place& place = places.past[env];
+  Place& place = static_cast<MemoryOf<Place>&>(memory).past[env];
   const int T = plan_.trajectory.steps();
-  if (upright_.Holds(deviation, places.model)) {
+  if (upright_.Holds(deviation)) {
     place = {T, 1};
     return upright_.lqr().Torque(deviation);
   }
