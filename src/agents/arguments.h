@@ -4,21 +4,34 @@
 #include <string>
 
 #include "base/options.h"
+#include "base/text.h"
+#include "pendulum/physics.h"
 
 /// Arguments shared by several commands and by the Python functions of the same names. Each has its
 /// range and help in one place.
 namespace upswing {
 
 /// Argument "seed" of `what`.
-void DescribeSeed(Options& o, int64_t* seed, const std::string& what);
+inline void DescribeSeed(Options& o, int64_t* seed, const std::string& what) {
+  o.Add(seed, "seed", {0, 9e15}, "", Concat("seed of ", what));
+}
 
 /// Argument "threads", for ResolveThreads.
-void DescribeThreads(Options& o, int64_t* threads);
+inline void DescribeThreads(Options& o, int64_t* threads) {
+  o.Add(threads, "threads", {0, 256}, "", "number of threads; 0: one per processor, at most 8");
+}
 
 /// Argument "physics", for FindEngine.
-void DescribePhysics(Options& o, std::string* physics);
+inline void DescribePhysics(Options& o, std::string* physics) {
+  Option& option =
+      o.AddChoice(physics, "physics", EngineNames(),
+                  "physics engine; closed-form is faster than mujoco, with the same physics");
+  if (physics->empty()) option.usual = "closed-form; mujoco for a policy with its own model";
+}
 
 /// Argument "episodes": number of episodes of an evaluation.
-void DescribeEvalEpisodes(Options& o, int64_t* episodes);
+inline void DescribeEvalEpisodes(Options& o, int64_t* episodes) {
+  o.Add(episodes, "episodes", {1, 1000000}, "", "number of episodes");
+}
 
 }  // namespace upswing

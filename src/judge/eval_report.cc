@@ -145,7 +145,7 @@ EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& tria
   report.env = TrialEnvironments(trial, &loaded);
   report.model = InfoOfModel(report.env.mjcf, trial.model);
   report.env.num_envs = static_cast<int>(episodes);
-  report.knows_values = ValueUnitsOf(*loaded.policy).gamma > 0;
+  report.knows_values = loaded.policy->info().gamma.value_or(0) > 0;
   report.only_balances = OnlyBalances(loaded.policy->kind());
   constexpr int64_t kAtOnce = 4096;
   for (int64_t done = 0; done < episodes; done += kAtOnce) {

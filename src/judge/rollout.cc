@@ -21,7 +21,7 @@ std::vector<double> ValuesOf(const Policy& policy, Matrix<const float> obs,
                              Policy::Memory& memory) {
   std::vector<float> numbers(static_cast<size_t>(policy.num_values()));
   policy.Values(obs, Matrix<float>(numbers.data(), 1, policy.num_values()), memory);
-  const double scale = ValueUnitsOf(policy).reward_scale;
+  const double scale = policy.info().reward_scale.value_or(1);
   std::vector<double> values;
   values.reserve(numbers.size());
   for (const float value : numbers) values.push_back(value / scale);

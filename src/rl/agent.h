@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -9,8 +11,10 @@
 
 #include "base/archive.h"
 #include "base/env.h"
+#include "base/error.h"
 #include "base/matrix.h"
 #include "base/steps.h"
+#include "base/text.h"
 #include "nn/network_policy.h"
 
 namespace upswing {
@@ -72,6 +76,14 @@ class Agent {
 };
 
 /// Throws Failure unless the reward and the observation of environment `env` are finite.
-void ExpectFinite(const StepResult& result, size_t env);
+inline void ExpectFinite(const StepResult& result, size_t env) {
+  const size_t D = result.next_obs.size() / result.reward.size();
+  const auto next_obs = std::span(result.next_obs).subspan(env * D, D);
+  const bool finite = std::isfinite(result.reward[env]) &&
+                      std::ranges::all_of(next_obs, [](float x) { return std::isfinite(x); });
+  if (finite) return;
+  throw Failure(Concat("environment ", env, " gave a reward or an observation that is not a ",
+                       "finite number"));
+}
 
 }  // namespace upswing

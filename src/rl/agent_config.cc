@@ -1,7 +1,5 @@
 #include "rl/agent_config.h"
 
-#include <algorithm>
-
 #include "base/format.h"
 #include "base/text.h"
 
@@ -11,10 +9,6 @@ std::string WidthsText(const std::vector<int64_t>& widths) {
   std::vector<std::string> texts;
   for (const int64_t width : widths) texts.push_back(std::to_string(width));
   return Join(texts, "-");
-}
-
-double Widest(const std::vector<int64_t>& widths) {
-  return static_cast<double>(*std::ranges::max_element(widths));
 }
 
 void WarnOfNoRate(double begin, double end, std::vector<std::string>& warnings) {

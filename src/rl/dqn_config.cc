@@ -1,5 +1,7 @@
 #include "rl/dqn_config.h"
 
+#include <algorithm>
+
 #include "base/text.h"
 #include "rl/dqn.h"
 
@@ -42,7 +44,7 @@ AgentSize DqnConfig::Size(const EnvSpec& spec) const {
           // Arrays: online, target and kept parameters, gradient, Adam's two moments, and
           // transposed online and target weights.
           8, 5, 2.0 * D + 3, static_cast<double>(replay), static_cast<double>(batch),
-          Widest(hidden), 3 * static_cast<double>(hidden.size())};
+          static_cast<double>(std::ranges::max(hidden)), 3 * static_cast<double>(hidden.size())};
 }
 
 std::string DqnConfig::Text() const {

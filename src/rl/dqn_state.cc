@@ -2,32 +2,20 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/error.h"
-#include "base/text.h"
 #include "nn/network_policy.h"
 #include "rl/dqn.h"
 #include "rl/representation.h"
 #include "rl/torque_levels.h"
 
 namespace upswing {
-namespace {
-
-/// The actions of an agent for this task. Throws BadInput if the task has several torques.
-std::vector<double> TorquesOf(const DqnConfig& config, const EnvSpec& spec) {
-  if (spec.action_size() == 1) return ActionTable(spec, config.levels);
-  throw BadInput(
-      Concat("dqn: expected a task with one torque, got ", spec.action_size(), " in ", spec.task));
-}
-
-}  // namespace
-
 Dqn::Dqn(const DqnConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool)
-    : OffPolicyAgent(config, spec, ActionSpace::Discrete(TorquesOf(config, spec).size()), seed,
+    : OffPolicyAgent(config, spec,
+                     ActionSpace::Discrete(ActionTable(spec, config.levels, "dqn").size()), seed,
                      pool),
       config_(config),
       D_(spec.obs_size),
       B_(static_cast<int>(config.batch)),
-      torques_(TorquesOf(config, spec)),
+      torques_(ActionTable(spec, config.levels, "dqn")),
       online_(config.Shape(D_, static_cast<int>(torques_.size())), B_,
               Rng(seed, "initial parameters")),
       theta_target_(online_.theta().begin(), online_.theta().end()),

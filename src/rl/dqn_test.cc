@@ -78,9 +78,9 @@ TEST(Huber, TheGradientIsClippedAndBelongsToTheLoss) {
 TEST(Torques, AreTheChoicesOfATaskThatHasThem) {
   EnvSpec spec = ToyEnv::Spec(1);
   spec.action_limit = {4};
-  EXPECT_EQ(ActionTable(spec, 3), (std::vector<double>{-4, 0, 4}));
+  EXPECT_EQ(ActionTable(spec, 3, "dqn"), (std::vector<double>{-4, 0, 4}));
   spec.choices = {3, 4};
-  EXPECT_EQ(ActionTable(spec, 3), spec.choices);
+  EXPECT_EQ(ActionTable(spec, 3, "dqn"), spec.choices);
   // The agent's networks have an output for each choice.
   DqnConfig config;
   config.mirror = false;

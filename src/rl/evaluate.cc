@@ -26,7 +26,7 @@ class EpisodeTally {
         return_steps_(StepsIn(rule_.return_seconds, spec)),
         hold_steps_(StepsIn(rule_.hold_seconds, spec)),
         tilt_steps_(StepsIn(kSteadyTiltSeconds, spec)),
-        gamma_(ValueUnitsOf(policy).gamma),
+        gamma_(policy.info().gamma.value_or(0)),
         discount_(gamma_ > 0 ? 1 : 0),
         lean_(static_cast<size_t>(spec.bodies)),
         torques_(spec.action_limit, seconds_) {
@@ -101,13 +101,14 @@ class EpisodeTally {
 /// Sets the policy's value of each environment's current state, if the policy estimates values and
 /// their units are known.
 void EstimateValues(const Policy& policy, const VectorEnv& env, std::span<EpisodeTally> tallies) {
-  const ValueUnits units = ValueUnitsOf(policy);
-  if (units.gamma == 0 || policy.num_values() == 0) return;
+  const PolicyInfo& info = policy.info();
+  if (!info.gamma || policy.num_values() == 0) return;
   AlignedVector<float> numbers(tallies.size() * static_cast<size_t>(policy.num_values()));
   const Matrix<float> values(numbers, env.num_envs(), policy.num_values());
   policy.Values(env.obs(), values, *policy.Start(env.num_envs()));
   for (int i = 0; i < env.num_envs(); ++i) {
-    tallies[static_cast<size_t>(i)].SetValue(std::ranges::max(values.row(i)) / units.reward_scale);
+    tallies[static_cast<size_t>(i)].SetValue(std::ranges::max(values.row(i)) /
+                                             info.reward_scale.value_or(1));
   }
 }
 
@@ -224,12 +225,6 @@ void TorqueTally::Finish(bool at_goal, EvaluationEpisode& episode) const {
   if (!at_goal || !has_goal_steps()) return;
   episode.goal_variation = goal_variation_ / seconds(steps_ - goal_since_);
   episode.goal_changes = static_cast<double>(goal_changes_) / seconds(steps_ - goal_since_);
-}
-
-ValueUnits ValueUnitsOf(const Policy& policy) {
-  const PolicyInfo& info = policy.info();
-  if (!info.gamma || !info.reward_scale) return {};
-  return {*info.gamma, *info.reward_scale};
 }
 
 double ValueRatio(double value, double discounted_return) {

@@ -117,13 +117,6 @@ class TorqueTally {
   int64_t goal_changes_ = 0;
 };
 
-/// Units of values. A value estimates the sum of γᵏ · reward_scale · r, by the policy's metadata.
-struct ValueUnits {
-  double gamma = 0, reward_scale = 1;  // γ = 0: not in the metadata
-};
-/// The units of values in a policy's metadata.
-ValueUnits ValueUnitsOf(const Policy& policy);
-
 /// Ratio of the value at the start to the attained discounted return. Infinite unless the return is
 /// above 0.
 double ValueRatio(double value, double discounted_return);

@@ -8,59 +8,51 @@ namespace upswing {
 
 NStep::NStep(int num_envs, int n, double gamma, int obs_size, ActionSpace actions)
     : n_(n),
-      obs_size_(obs_size),
-      action_size_(actions.size),
       gamma_(gamma),
       actions_(actions),
       count_(num_envs),
-      obs_(count_.size() * n_ * obs_size_),
-      action_(count_.size() * n_ * action_size_),
+      obs_(count_.size() * n_ * obs_size),
+      action_(count_.size() * n_ * actions.size),
       reward_(count_.size() * n_) {}
 
 void NStep::Push(int env, const Transition& step, bool done, Replay& replay) {
-  const auto e = static_cast<size_t>(env);
-  const auto waiting_obs = std::span(obs_).subspan(e * n_ * obs_size_, n_ * obs_size_);
-  const auto waiting_action = std::span(action_).subspan(e * n_ * action_size_, n_ * action_size_);
-  const auto waiting_reward = std::span(reward_).subspan(e * n_, n_);
-
-  const auto last = static_cast<size_t>(count_[e]++);
-  std::ranges::copy(step.obs, waiting_obs.begin() + static_cast<ptrdiff_t>(last * obs_size_));
-  std::ranges::copy(step.action,
-                    waiting_action.begin() + static_cast<ptrdiff_t>(last * action_size_));
-  waiting_reward[last] = step.reward;
+  const auto last = static_cast<int>(count_[env]++);
+  std::ranges::copy(step.obs, Waiting(obs_, env).row(last).begin());
+  std::ranges::copy(step.action, Waiting(action_, env).row(last).begin());
+  Waiting(reward_, env)(last, 0) = step.reward;
   Complete(env, step.next_obs, step.discount == 0, done, replay);
 }
 
 void NStep::Complete(int env, std::span<const float> next_obs, bool terminal, bool done,
                      Replay& replay) {
-  const auto e = static_cast<size_t>(env);
-  const auto waiting_obs = std::span(obs_).subspan(e * n_ * obs_size_, n_ * obs_size_);
-  const auto waiting_action = std::span(action_).subspan(e * n_ * action_size_, n_ * action_size_);
-  const auto waiting_reward = std::span(reward_).subspan(e * n_, n_);
+  const Matrix<float> obs = Waiting(obs_, env), action = Waiting(action_, env);
+  const Matrix<double> reward = Waiting(reward_, env);
 
   // A full window adds its oldest step. The end of an episode adds all waiting steps.
-  auto k = static_cast<size_t>(count_[e]);
-  size_t first = 0;
+  auto k = static_cast<int>(count_[env]);
+  int first = 0;
   for (; k == n_ || (done && k > 0); --k, ++first) {
     double sum = 0;
-    for (size_t i = k; i-- > 0;) sum = waiting_reward[first + i] + gamma_ * sum;
+    for (int i = first + k; i-- > first;) sum = reward(i, 0) + gamma_ * sum;
     const double discount = terminal ? 0.0 : std::pow(gamma_, static_cast<double>(k));
-    replay.Add({waiting_obs.subspan(first * obs_size_, obs_size_), next_obs,
-                waiting_action.subspan(first * action_size_, action_size_), sum, discount});
+    replay.Add({obs.row(first), next_obs, action.row(first), sum, discount});
   }
 
   // Move the steps that still wait to the front.
-  count_[e] = static_cast<int64_t>(k);
+  count_[env] = k;
+  const auto to_front = [&](const auto& rows) {
+    std::ranges::copy(rows.Rows(first, n_ - first).values(), rows.data());
+  };
   if (first == 0) return;
-  std::ranges::copy(waiting_obs.subspan(first * obs_size_), waiting_obs.begin());
-  std::ranges::copy(waiting_action.subspan(first * action_size_), waiting_action.begin());
-  std::ranges::copy(waiting_reward.subspan(first), waiting_reward.begin());
+  to_front(obs);
+  to_front(action);
+  to_front(reward);
 }
 
 int64_t NStep::waiting() const { return std::accumulate(count_.begin(), count_.end(), int64_t{0}); }
 
 void NStep::State(const Archive& archive) {
-  archive.Array("count", std::span(count_), {0, static_cast<int64_t>(n_) - 1});
+  archive.Array("count", std::span(count_), {0, n_ - 1});
   archive.Array("obs", std::span(obs_));
   archive.Array("action", std::span(action_));
   actions_.Check(archive, "action", action_);

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "base/archive.h"
+#include "base/matrix.h"
 #include "rl/replay.h"
 
 namespace upswing {
@@ -33,7 +34,14 @@ class NStep {
   /// Adds every complete transition of the waiting steps to `replay`; with `done` all of them.
   void Complete(int env, std::span<const float> next_obs, bool terminal, bool done, Replay& replay);
 
-  size_t n_, obs_size_, action_size_;
+  /// The rows (n × anything) of environment `env` in an array of waiting steps.
+  template <typename T>
+  Matrix<T> Waiting(std::vector<T>& values, int env) {
+    const auto size = static_cast<int>(values.size() / count_.size());
+    return {values.data() + static_cast<size_t>(env) * size, n_, size / n_};
+  }
+
+  int n_;
   double gamma_;
   ActionSpace actions_;
   // The waiting steps of each environment, oldest first.

@@ -26,9 +26,7 @@ OffPolicyAgent::OffPolicyAgent(const OffPolicyConfig& config, const EnvSpec& spe
       replay_(config.replay, spec.obs_size, actions, config.prioritized),
       n_step_(spec.num_envs, static_cast<int>(config.n_step), config.gamma, spec.obs_size, actions),
       batch_(static_cast<int>(config.batch), spec.obs_size, actions.size) {
-  if (config.mirror && mirror_signs_.empty()) {
-    throw BadInput(Concat("mirror: expected a task with mirror symmetry, got ", spec.task));
-  }
+  CheckMirror(config.mirror, spec);
 }
 
 double OffPolicyAgent::learning_rate() const {

@@ -7,11 +7,10 @@
 #include <cmath>
 #include <numeric>
 
-#include "base/error.h"
-#include "base/text.h"
 #include "nn/orthogonal.h"
 #include "rl/action_distribution.h"
 #include "rl/advantages.h"
+#include "rl/mirror.h"
 #include "rl/torque_levels.h"
 
 namespace upswing {
@@ -24,27 +23,15 @@ constexpr double kRateStep = 1.5;      // factor by which the KL target changes 
 
 int Blocks(int num_envs) { return (num_envs + kActRows - 1) / kActRows; }
 
-/// The settings if they fit the task. Throws BadInput if they do not.
-PpoConfig Checked(const PpoConfig& config, const EnvSpec& spec) {
-  config.CheckBatch(spec.num_envs);
-  if (config.discrete() && spec.action_size() != 1) {
-    throw BadInput(Concat("actions = levels: expected a task with one torque, got ",
-                          spec.action_size(), " in ", spec.task));
-  }
-  if (config.mirror && spec.mirror_signs.empty()) {
-    throw BadInput(Concat("mirror: expected a task with mirror symmetry, got ", spec.task));
-  }
-  return config;
-}
-
 }  // namespace
 
 Ppo::Ppo(const PpoConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool)
-    : config_(Checked(config, spec)),
+    : config_(config),
       D_(spec.obs_size),
       B_(static_cast<int>(config.batch)),
       limit_(spec.action_limit),
-      torques_(config.discrete() ? ActionTable(spec, config.levels) : std::vector<double>()),
+      torques_(config.discrete() ? ActionTable(spec, config.levels, "actions = levels")
+                                 : std::vector<double>()),
       mirror_signs_(spec.mirror_signs),
       pool_(pool),
       update_threads_(&pool),
@@ -57,7 +44,9 @@ Ppo::Ppo(const PpoConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       std_(log_std_.size()),
       log_std_adam_(log_std_.size(), kAdamEpsilon),
       normalizer_(D_),
-      rollout_(config.horizon, spec.num_envs, D_, spec.action_size()),
+      rollout_(config.horizon, spec.num_envs, D_,
+               config.discrete() ? ActionSpace::Discrete(torques_.size())
+                                 : ActionSpace{spec.action_size(), kAnyNumber<float>}),
       order_(rollout_.size()),
       value_(order_.size()),
       next_value_(order_.size()),
@@ -77,8 +66,8 @@ Ppo::Ppo(const PpoConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       batch_advantage_(old_log_prob_.size()),
       batch_target_(old_log_prob_.size()),
       mirrored_(old_log_prob_.size()),
-      sums_(static_cast<size_t>(NumSlices(B_)),
-            Sums{.dlog_std = AlignedVector<float>(std_.size())}) {
+      sums_(static_cast<size_t>(NumSlices(B_))) {
+  CheckMirror(config.mirror, spec);
   for (int block = 0; block < Blocks(spec.num_envs); ++block) {
     explore_rngs_.emplace_back(seed, "exploration", static_cast<uint64_t>(block));
   }

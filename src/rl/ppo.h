@@ -27,9 +27,8 @@ namespace upswing {
 /// shuffled minibatches.
 class Ppo : public Agent {
  public:
-  /// Throws BadInput if minibatches do not divide a rollout, or if actions are levels but the task
-  /// has several torques. Also throws BadInput if the config mirrors minibatches but the task has
-  /// no mirror symmetry.
+  /// Takes settings that PpoConfig::Check accepts. Throws BadInput if actions are levels but the
+  /// task has several torques, or as CheckMirror does.
   Ppo(const PpoConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool);
 
   void Act(Matrix<const float> obs, Matrix<double> action) override;
@@ -54,7 +53,6 @@ class Ppo : public Agent {
   struct Sums {
     double policy_loss = 0, value_loss = 0, entropy = 0, kl = 0, clipped = 0, norm = 0;
     AlignedVector<float> dlog_std;  // (A) gradient with respect to ln σ
-    void Clear();
     void Add(const Sums& other);
   };
 

@@ -1,5 +1,7 @@
 #include "rl/ppo_config.h"
 
+#include <algorithm>
+
 #include "base/error.h"
 #include "base/format.h"
 #include "base/text.h"
@@ -7,6 +9,30 @@
 #include "rl/ppo.h"
 
 namespace upswing {
+namespace {
+
+/// Throws BadInput unless minibatches divide a rollout of `num_envs` environments, and the rollout
+/// has at most 10,000,000 steps.
+void CheckBatch(int64_t horizon, int64_t batch, int64_t num_envs) {
+  constexpr int64_t kMostRollout = 10'000'000;
+  const int64_t rollout = horizon * num_envs;
+  if (rollout > kMostRollout) {
+    throw BadInput(Concat("horizon: expected at most ", kMostRollout / num_envs, " steps of ",
+                          Counted(num_envs, "environment"), ", got ", horizon));
+  }
+  if (rollout % batch == 0) return;
+  int64_t below = batch, above = batch;
+  while (below > 1 && rollout % below != 0) --below;
+  while (above < rollout && rollout % above != 0) ++above;
+  const std::string fits = below < batch && above <= rollout && rollout % above == 0
+                               ? Concat(below, " or ", above)
+                               : Concat(rollout);
+  throw BadInput(Concat("batch: expected a size that divides the ", rollout,
+                        " steps of a rollout (horizon ", horizon, ", ",
+                        Counted(num_envs, "environment"), "), such as ", fits, ", got ", batch));
+}
+
+}  // namespace
 
 void PpoConfig::Describe(Options& o) {
   o.Section("network");
@@ -56,7 +82,7 @@ std::unique_ptr<Agent> PpoConfig::Make(const EnvSpec& spec, uint64_t seed, Threa
 }
 
 void PpoConfig::Check(int64_t num_envs) const {
-  CheckBatch(num_envs);
+  CheckBatch(horizon, batch, num_envs);
   const PpoConfig usual;
   if (!discrete() && levels != usual.levels) {
     throw BadInput(Concat("levels: expected none with actions = continuous, got ", levels,
@@ -81,7 +107,8 @@ AgentSize PpoConfig::Size(const EnvSpec& spec) const {
           // A step: observation and successor, action, ln π, reward, V, V', advantage, target,
           // order, ends.
           2.0 * D + A + 9, static_cast<double>(horizon * spec.num_envs), static_cast<double>(batch),
-          Widest(hidden), 2 * 3 * static_cast<double>(hidden.size()), "rollout", "--horizon"};
+          static_cast<double>(std::ranges::max(hidden)), 2 * 3 * static_cast<double>(hidden.size()),
+          "rollout", "--horizon"};
 }
 
 std::string PpoConfig::Text() const {
@@ -104,25 +131,6 @@ std::vector<std::string> PpoConfig::Warnings(int64_t steps, int64_t num_envs) co
 NetworkShape PpoConfig::Shape(int obs_size, int outputs) const {
   return {obs_size, hidden, outputs, layer_norm,
           activation == "tanh" ? Activation::kTanh : Activation::kRelu};
-}
-
-void PpoConfig::CheckBatch(int64_t num_envs) const {
-  constexpr int64_t kMostRollout = 10'000'000;
-  const int64_t rollout = horizon * num_envs;
-  if (rollout > kMostRollout) {
-    throw BadInput(Concat("horizon: expected at most ", kMostRollout / num_envs, " steps of ",
-                          Counted(num_envs, "environment"), ", got ", horizon));
-  }
-  if (rollout % batch == 0) return;
-  int64_t below = batch, above = batch;
-  while (below > 1 && rollout % below != 0) --below;
-  while (above < rollout && rollout % above != 0) ++above;
-  const std::string fits = below < batch && above <= rollout && rollout % above == 0
-                               ? Concat(below, " or ", above)
-                               : Concat(rollout);
-  throw BadInput(Concat("batch: expected a size that divides the ", rollout,
-                        " steps of a rollout (horizon ", horizon, ", ",
-                        Counted(num_envs, "environment"), "), such as ", fits, ", got ", batch));
 }
 
 }  // namespace upswing

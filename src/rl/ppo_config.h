@@ -39,9 +39,6 @@ struct PpoConfig : AgentConfig {
   bool discrete() const { return actions == "levels"; }
   /// The shape of the actor or critic, for observations of `obs_size` numbers.
   NetworkShape Shape(int obs_size, int outputs) const;
-  /// Throws BadInput unless minibatches divide a rollout of `num_envs` environments, and the
-  /// rollout has at most 10,000,000 steps.
-  void CheckBatch(int64_t num_envs) const;
 };
 
 }  // namespace upswing

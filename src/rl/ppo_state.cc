@@ -72,7 +72,7 @@ Metrics Ppo::TakeMetrics() {
 
 void Ppo::BeginSums() {
   if (!reported_) return;
-  report_.Clear();
+  report_ = {};
   report_updates_ = 0;
   reported_ = false;
 }
@@ -113,11 +113,7 @@ void Ppo::State(const Archive& archive) {
   }
   shuffle_rng_.State(archive.In("shuffle_rng"));
   mirror_rng_.State(archive.In("mirror_rng"));
-  const float most = std::numeric_limits<float>::max();
-  const float last_level = static_cast<float>(config_.levels - 1);
-  rollout_.State(archive.In("rollout"),
-                 config_.discrete() ? Bounds<float>{0, last_level} : Bounds<float>{-most, most},
-                 config_.discrete());
+  rollout_.State(archive.In("rollout"));
 
   // The order must be a permutation; the next epoch shuffles it further.
   archive.Array("order", std::span(order_), {0, rollout_.size() - 1});

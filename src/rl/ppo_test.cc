@@ -362,7 +362,7 @@ TEST(Ppo, SettingsThatDoNotFitAreRefused) {
   PpoConfig config = SmallPpo();
   config.batch = 24;  // does not divide 16 × 4 = 64
   try {
-    const Ppo agent(config, ToyEnv::Spec(4), 1, pool);
+    config.Check(4);
     FAIL();
   } catch (const Error& error) {
     EXPECT_STREQ(error.what(),
@@ -371,7 +371,7 @@ TEST(Ppo, SettingsThatDoNotFitAreRefused) {
   }
   config.batch = 100;
   try {
-    config.CheckBatch(4);
+    config.Check(4);
     FAIL();
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("such as 64, got 100"), std::string::npos);

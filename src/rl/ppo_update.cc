@@ -12,11 +12,6 @@
 
 namespace upswing {
 
-void Ppo::Sums::Clear() {
-  policy_loss = value_loss = entropy = kl = clipped = norm = 0;
-  std::ranges::fill(dlog_std, 0.0F);
-}
-
 void Ppo::Sums::Add(const Sums& other) {
   policy_loss += other.policy_loss;
   value_loss += other.value_loss;
@@ -39,7 +34,7 @@ void Ppo::Update(std::span<const int64_t> rows) {
   critic_.Prepare(pool_);
   ForSlices(pool_, B_, [&](RowRange slice) {
     Sums& sums = sums_[slice.first / SliceRows(B_)];
-    sums.Clear();
+    sums = {.dlog_std = AlignedVector<float>(std_.size())};
     Gather(rows, slice);
     BackwardActor(slice, sums);
     BackwardCritic(slice, sums);

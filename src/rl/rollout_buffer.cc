@@ -1,20 +1,19 @@
 #include "rl/rollout_buffer.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "rl/agent.h"
 
 namespace upswing {
 
-RolloutBuffer::RolloutBuffer(int64_t steps, int num_envs, int obs_size, int action_size)
+RolloutBuffer::RolloutBuffer(int64_t steps, int num_envs, int obs_size, const ActionSpace& actions)
     : steps_(steps),
       num_envs_(num_envs),
       obs_size_(obs_size),
-      action_size_(action_size),
+      actions_(actions),
       obs_(steps * num_envs * obs_size),
       next_obs_(obs_.size()),
-      action_(steps * num_envs * action_size),
+      action_(steps * num_envs * actions.size),
       log_prob_(steps * num_envs),
       reward_(log_prob_.size()),
       terminated_(log_prob_.size()),
@@ -40,7 +39,7 @@ void RolloutBuffer::Truncate() {
   }
 }
 
-void RolloutBuffer::State(const Archive& archive, Bounds<float> action_bounds, bool whole) {
+void RolloutBuffer::State(const Archive& archive) {
   archive.Scalar("filled", filled_, {0, steps_ - 1});
   const auto rows = static_cast<size_t>(filled_ * num_envs_);
   const auto part = [&](auto& values, int cols) {
@@ -48,10 +47,8 @@ void RolloutBuffer::State(const Archive& archive, Bounds<float> action_bounds, b
   };
   archive.Array("obs", part(obs_, obs_size_));
   archive.Array("next_obs", part(next_obs_, obs_size_));
-  archive.Array("action", part(action_, action_size_), action_bounds);
-  archive.Check(!whole || std::ranges::all_of(part(action_, action_size_),
-                                              [](float x) { return x == std::floor(x); }),
-                "action", "whole numbers");
+  archive.Array("action", part(action_, actions_.size));
+  actions_.Check(archive, "action", part(action_, actions_.size));
   archive.Array("log_prob", part(log_prob_, 1));
   archive.Array("reward", part(reward_, 1));
   archive.Array("terminated", part(terminated_, 1), {0, 1});

@@ -7,6 +7,7 @@
 #include "base/archive.h"
 #include "base/env.h"
 #include "base/matrix.h"
+#include "rl/action_space.h"
 
 namespace upswing {
 
@@ -14,7 +15,7 @@ namespace upswing {
 /// numbers of an action.
 class RolloutBuffer {
  public:
-  RolloutBuffer(int64_t steps, int num_envs, int obs_size, int action_size);
+  RolloutBuffer(int64_t steps, int num_envs, int obs_size, const ActionSpace& actions);
 
   int num_envs() const { return num_envs_; }  // N
   int64_t filled() const { return filled_; }  // steps so far
@@ -26,7 +27,7 @@ class RolloutBuffer {
   /// Space for the next step: observations (N × D), actions (N × A) and their ln π (N). Fill it
   /// before you call Add.
   Matrix<float> obs() { return Rows(obs_, obs_size_); }
-  Matrix<float> action() { return Rows(action_, action_size_); }
+  Matrix<float> action() { return Rows(action_, actions_.size); }
   std::span<float> log_prob() { return Rows(log_prob_, 1).values(); }
 
   /// Adds the result of the step. Multiplies rewards by `reward_scale`.
@@ -39,15 +40,14 @@ class RolloutBuffer {
   Matrix<const float> all_obs() const { return All(obs_, obs_size_); }  // (T·N × D)
   /// (T·N × D) true successors
   Matrix<const float> all_next_obs() const { return All(next_obs_, obs_size_); }
-  Matrix<const float> all_actions() const { return All(action_, action_size_); }  // (T·N × A)
-  Matrix<const float> log_probs() const { return Steps(log_prob_); }              // (T × N)
-  Matrix<const float> rewards() const { return Steps(reward_); }                  // (T × N)
-  Matrix<const uint8_t> terminated() const { return Steps(terminated_); }         // (T × N)
-  Matrix<const uint8_t> truncated() const { return Steps(truncated_); }           // (T × N)
+  Matrix<const float> all_actions() const { return All(action_, actions_.size); }  // (T·N × A)
+  Matrix<const float> log_probs() const { return Steps(log_prob_); }               // (T × N)
+  Matrix<const float> rewards() const { return Steps(reward_); }                   // (T × N)
+  Matrix<const uint8_t> terminated() const { return Steps(terminated_); }          // (T × N)
+  Matrix<const uint8_t> truncated() const { return Steps(truncated_); }            // (T × N)
 
-  /// Saves or loads the steps so far. Actions must be within `action_bounds`, and integers if
-  /// `whole`.
-  void State(const Archive& archive, Bounds<float> action_bounds, bool whole);
+  /// Saves or loads the steps so far.
+  void State(const Archive& archive);
 
  private:
   Matrix<float> Rows(std::vector<float>& values, int cols) {
@@ -62,7 +62,8 @@ class RolloutBuffer {
   }
 
   int64_t steps_;  // T
-  int num_envs_, obs_size_, action_size_;
+  int num_envs_, obs_size_;
+  ActionSpace actions_;
   int64_t filled_ = 0;
   std::vector<float> obs_, next_obs_, action_;   // (T·N × D), (T·N × D), (T·N × A)
   std::vector<float> log_prob_, reward_;         // (T·N)

@@ -66,7 +66,7 @@ AgentSize SacConfig::Size(const EnvSpec& spec) const {
           // Arrays: online, target or kept parameters, gradient, Adam's two moments, and transposed
           // weights.
           6, 4, 2.0 * D + A + 2, static_cast<double>(replay), static_cast<double>(batch),
-          std::max(Widest(hidden), static_cast<double>(bins)),
+          std::max(static_cast<double>(std::ranges::max(hidden)), static_cast<double>(bins)),
           (1 + critics) * 3 * static_cast<double>(hidden.size())};
 }
 

@@ -4,6 +4,8 @@
 #include <vector>
 
 #include "base/env.h"
+#include "base/error.h"
+#include "base/text.h"
 
 namespace upswing {
 
@@ -19,7 +21,12 @@ inline std::vector<double> TorqueLevels(double torque_limit, int64_t count) {
 }
 
 /// The actions of a discrete agent: the task's choices, or else `count` levels of its only torque.
-inline std::vector<double> ActionTable(const EnvSpec& spec, int64_t count) {
+/// Throws BadInput that begins with `agent` if the task has several torques.
+inline std::vector<double> ActionTable(const EnvSpec& spec, int64_t count, const char* agent) {
+  if (spec.action_size() != 1) {
+    throw BadInput(Concat(agent, ": expected a task with one torque, got ", spec.action_size(),
+                          " in ", spec.task));
+  }
   return spec.choices.empty() ? TorqueLevels(spec.action_limit.front(), count) : spec.choices;
 }
 

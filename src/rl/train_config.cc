@@ -1,6 +1,6 @@
 #include "rl/train_config.h"
 
-#include <algorithm>
+#include "rl/schedule.h"
 
 namespace upswing {
 
@@ -36,9 +36,7 @@ void TrainConfig::DescribeCurriculum(Options& o) {
 }
 
 double TrainConfig::StartNoise(int64_t step) const {
-  const double progress =
-      std::min(1.0, static_cast<double>(step) / static_cast<double>(curriculum_steps));
-  return start_noise + progress * (start_noise_end - start_noise);
+  return Scheduled(start_noise, start_noise_end, step, curriculum_steps);
 }
 
 }  // namespace upswing
