@@ -6,34 +6,15 @@
 
 namespace upswing {
 
-namespace {
-
-/// A learning algorithm's name and its settings, which create the agent.
-struct Algorithm {
-  const char* name;
-  AgentConfig& (*settings)(Config& config);
-};
-
-// The first is the default.
-constexpr Algorithm kAlgorithms[] = {
-    {"dqn", [](Config& config) -> AgentConfig& { return config.dqn; }},
-    {"sac", [](Config& config) -> AgentConfig& { return config.sac; }},
-    {"ppo", [](Config& config) -> AgentConfig& { return config.ppo; }},
-};
-
-}  // namespace
-
 const std::vector<std::string>& AlgorithmNames() {
-  static const std::vector<std::string> kNames = NamesOf(kAlgorithms);
+  static const std::vector<std::string> kNames{"dqn", "sac", "ppo"};
   return kNames;
 }
 
 AgentConfig& Config::learner() {
-  for (const Algorithm& known : kAlgorithms) {
-    if (algorithm == known.name) return known.settings(*this);
-  }
-  throw Failure(Concat("algorithm: expected one of ", Join(AlgorithmNames(), ", "), ", got \"",
-                       algorithm, "\""));
+  if (algorithm == "sac") return sac;
+  if (algorithm == "ppo") return ppo;
+  return dqn;
 }
 
 void Config::Describe(Options& o) {
