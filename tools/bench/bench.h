@@ -38,6 +38,11 @@ using BenchCases = std::vector<BenchCase>;
 /// Number of torque levels of agents with discrete actions.
 inline constexpr int kBenchActions = 9;
 
+/// Makes multiply-adds in registers at the processor's peak rate, with the vector instructions in
+/// use: `rounds` on each of many independent chains. Returns their number. `result` depends on all
+/// of them.
+int64_t MultiplyAddChains(int64_t rounds, float& result);
+
 // Cases of each part.
 BenchCases GradientCases(const BenchOptions& options);
 BenchCases EnvCases(const BenchOptions& options);

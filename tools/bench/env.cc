@@ -13,28 +13,16 @@
 namespace upswing {
 namespace {
 
-/// Random torque levels for kSteps control steps, repeated in a cycle.
-class Torques {
- public:
-  explicit Torques(int num_envs) : num_envs_(static_cast<size_t>(num_envs)) {
-    const std::vector<double> levels = TorqueLevels(Plant().torque_limit, kBenchActions);
-    Rng rng(1, "benchmark");
-    for (size_t i = 0; i < kSteps * num_envs_; ++i) {
-      values_.push_back(levels[rng.Below(levels.size())]);
-    }
-  }
+constexpr size_t kSteps = 64;  // control steps after which the torques repeat
 
-  /// Torques (N) of the next control step, N·m.
-  std::span<const double> Next() {
-    step_ = (step_ + 1) % kSteps;
-    return std::span(values_).subspan(step_ * num_envs_, num_envs_);
-  }
-
- private:
-  static constexpr size_t kSteps = 64;
-  size_t num_envs_, step_ = 0;
-  std::vector<double> values_;  // (kSteps, N)
-};
+/// Random torque levels (kSteps × N), N·m.
+std::vector<double> RandomTorques(int num_envs) {
+  const std::vector<double> levels = TorqueLevels(Plant().torque_limit, kBenchActions);
+  std::vector<double> torques(kSteps * static_cast<size_t>(num_envs));
+  Rng rng(1, "benchmark");
+  for (double& torque : torques) torque = levels[rng.Below(levels.size())];
+  return torques;
+}
 
 /// Case of whole environment steps: physics, observation, reward and, at the end of episodes,
 /// reset.
@@ -49,9 +37,11 @@ BenchCase EnvCase(const std::string& physics, int num_envs, int threads) {
             config.num_envs = num_envs;
             config.pool = pool.get();
             const auto env = std::make_shared<PendulumEnv>(config);
-            const auto torques = std::make_shared<Torques>(num_envs);
             const auto result = std::make_shared<StepResult>(env->MakeResult());
-            return [=, keep = pool] { env->Step(torques->Next(), *result); };
+            return [=, keep = pool, torques = RandomTorques(num_envs), step = 0]() mutable {
+              step = (step + 1) % static_cast<int>(kSteps);
+              env->Step(std::span(torques).subspan(step * num_envs, num_envs), *result);
+            };
           }};
 }
 

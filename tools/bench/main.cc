@@ -16,7 +16,6 @@
 #include "os/host.h"
 #include "os/streams.h"
 #include "tools/bench/bench.h"
-#include "tools/bench/roofline.h"
 
 namespace upswing {
 namespace {

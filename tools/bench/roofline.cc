@@ -1,4 +1,4 @@
-#include "tools/bench/roofline.h"
+#include "tools/bench/bench.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tools/bench/roofline.cc"

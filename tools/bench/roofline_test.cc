@@ -1,8 +1,7 @@
-#include "tools/bench/roofline.h"
-
 #include <gtest/gtest.h>
 
 #include "base/simd.h"
+#include "tools/bench/bench.h"
 
 namespace upswing {
 namespace {
