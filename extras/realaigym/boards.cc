@@ -62,15 +62,10 @@ BoardReport ScoreOnBoard(const MachinePolicy& policy, uint64_t seed, ThreadPool&
 }
 
 std::string BoardJson(const BoardReport& report) {
-  const BoardOutcome& o = report.nominal;
   ordered_json j;
   j["policy"] = report.policy->name;
   j["robot"] = NameOf(RobotOf(*report.policy));
-  j["performance"] = {{"score", PerformanceScore(o)},           {"swung_up", o.above_line},
-                      {"swing_up_seconds", o.swing_up_seconds}, {"energy", o.energy},
-                      {"torque_cost", o.torque_cost},           {"smoothness", o.smoothness},
-                      {"velocity_cost", o.velocity_cost},       {"max_torque", o.max_torque},
-                      {"penalties", PerformancePenalties(o)}};
+  j["performance"] = OutcomeJson(report.nominal);
   j["robustness"] = {{"score", report.robustness.score()}};
   for (size_t row = 0; row < kRobustnessRows; ++row) {
     j["robustness"][kRobustnessRowNames.at(row)] = report.robustness.rows.at(row);

@@ -118,6 +118,18 @@ HardwareReport ScoreHardware(std::span<const MachineLog> logs, std::optional<Rob
   return report;
 }
 
+nlohmann::ordered_json OutcomeJson(const BoardOutcome& o, const ScoreScales& scales) {
+  return {{"swung_up", o.above_line},
+          {"swing_up_seconds", o.swing_up_seconds},
+          {"energy", o.energy},
+          {"torque_cost", o.torque_cost},
+          {"smoothness", o.smoothness},
+          {"velocity_cost", o.velocity_cost},
+          {"max_torque", o.max_torque},
+          {"penalties", PerformancePenalties(o, scales)},
+          {"score", PerformanceScore(o, scales)}};
+}
+
 std::string HardwareJson(const HardwareReport& report) {
   nlohmann::ordered_json j;
   j["robot"] = NameOf(report.robot);
@@ -125,18 +137,9 @@ std::string HardwareJson(const HardwareReport& report) {
   j["runs"] = nlohmann::ordered_json::array();
   const ScoreScales scales = HardwareScales(report.robot, report.pushed);
   for (const HardwareRun& run : report.runs) {
-    const BoardOutcome& o = run.outcome;
-    j["runs"].push_back({{"name", run.name},
-                         {"swung_up", o.above_line},
-                         {"seconds", run.seconds},
-                         {"swing_up_seconds", o.swing_up_seconds},
-                         {"energy", o.energy},
-                         {"torque_cost", o.torque_cost},
-                         {"smoothness", o.smoothness},
-                         {"velocity_cost", o.velocity_cost},
-                         {"max_torque", o.max_torque},
-                         {"penalties", PerformancePenalties(o, scales)},
-                         {"score", run.score}});
+    nlohmann::ordered_json one{{"name", run.name}, {"seconds", run.seconds}};
+    one.update(OutcomeJson(run.outcome, scales));
+    j["runs"].push_back(std::move(one));
   }
   j["successes"] = report.successes();
   j["mean_score"] = report.mean();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 #include <string>
@@ -48,6 +49,8 @@ struct HardwareReport {
 /// Throws BadInput.
 HardwareReport ScoreHardware(std::span<const MachineLog> logs, std::optional<Robot> robot);
 
+/// The measures of a run, its penalties and its score.
+nlohmann::ordered_json OutcomeJson(const BoardOutcome& outcome, const ScoreScales& scales = {});
 std::string HardwareJson(const HardwareReport& report);
 
 }  // namespace upswing::realaigym

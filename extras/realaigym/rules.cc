@@ -56,56 +56,46 @@ double PerformanceScore(const BoardOutcome& outcome, const ScoreScales& scales) 
   return 1 - std::accumulate(penalties.begin(), penalties.end(), 0.0) / 5;
 }
 
-RobustnessCase MakeCase(RobustnessRow row, int parameter, double level, uint64_t seed) {
-  RobustnessCase made{row, parameter, level, {}};
-  BoardEpisode& episode = made.episode;
-  episode.seed = seed;
-  switch (row) {
-    case RobustnessRow::kModel: {
-      const BoardVariation& varied = kBoardVariations.at(static_cast<size_t>(parameter));
-      double& number = episode.plant.*varied.parameter;
-      made.value = varied.low + (varied.high - varied.low) * level;
-      number = varied.is_factor ? number * made.value : made.value;
-      break;
-    }
-    case RobustnessRow::kVelocityNoise:
-      episode.velocity_noise = made.value = 0.5 * level;
-      break;
-    case RobustnessRow::kTorqueNoise:
-      episode.torque_noise = made.value = 1.1 * level;
-      break;
-    case RobustnessRow::kResponse:
-      episode.response = made.value = 0.1 + (2 - 0.1) * level;
-      break;
-    case RobustnessRow::kDelay:
-      episode.delay = static_cast<int>(std::lround(level * (kBoardLevels - 1)));
-      made.value = episode.delay * kBoardTimestep;
-      break;
-    case RobustnessRow::kPush: {
-      Rng rng(seed, "realaigym: pushes");
-      episode.pushes = RandomPushes(rng);
-    }
-  }
-  return made;
-}
-
 std::vector<RobustnessCase> RobustnessCases(uint64_t seed) {
+  using enum RobustnessRow;
   std::vector<RobustnessCase> cases;
   Rng rng(seed, "realaigym: cases");
-  const auto add = [&](RobustnessRow row, int parameter, int level) {
-    const double share = static_cast<double>(level) / (kBoardLevels - 1);
-    cases.push_back(MakeCase(row, parameter, share, rng.Next()));
+  const auto add = [&](RobustnessRow row, int parameter) -> RobustnessCase& {
+    BoardEpisode episode;
+    episode.seed = rng.Next();
+    return cases.emplace_back(RobustnessCase{row, parameter, 0, episode});
+  };
+  // `vary` changes an episode by a level from 0 to 1, and returns the value of the varied quantity.
+  const auto add_levels = [&](RobustnessRow row, int parameter, int repeats, const auto& vary) {
+    for (int i = 0; i < kBoardLevels * repeats; ++i) {
+      RobustnessCase& made = add(row, parameter);
+      made.value = vary(made.episode, static_cast<double>(i / repeats) / (kBoardLevels - 1));
+    }
   };
   for (int parameter = 0; parameter < static_cast<int>(kBoardVariations.size()); ++parameter) {
-    for (int level = 0; level < kBoardLevels; ++level) add(RobustnessRow::kModel, parameter, level);
+    const BoardVariation& varied = kBoardVariations.at(static_cast<size_t>(parameter));
+    add_levels(kModel, parameter, 1, [&](BoardEpisode& e, double level) {
+      const double value = varied.low + (varied.high - varied.low) * level;
+      double& number = e.plant.*varied.parameter;
+      number = varied.is_factor ? number * value : value;
+      return value;
+    });
   }
-  for (const RobustnessRow row : {RobustnessRow::kVelocityNoise, RobustnessRow::kTorqueNoise}) {
-    for (int i = 0; i < kBoardLevels * kBoardRepeats; ++i) add(row, 0, i / kBoardRepeats);
+  add_levels(kVelocityNoise, 0, kBoardRepeats,
+             [](BoardEpisode& e, double level) { return e.velocity_noise = 0.5 * level; });
+  add_levels(kTorqueNoise, 0, kBoardRepeats,
+             [](BoardEpisode& e, double level) { return e.torque_noise = 1.1 * level; });
+  add_levels(kResponse, 0, 1,
+             [](BoardEpisode& e, double level) { return e.response = 0.1 + (2 - 0.1) * level; });
+  add_levels(kDelay, 0, 1, [](BoardEpisode& e, double level) {
+    e.delay = static_cast<int>(std::lround(level * (kBoardLevels - 1)));
+    return e.delay * kBoardTimestep;
+  });
+  for (int i = 0; i < kBoardPushCases; ++i) {
+    BoardEpisode& episode = add(kPush, 0).episode;
+    Rng pushes(episode.seed, "realaigym: pushes");
+    episode.pushes = RandomPushes(pushes);
   }
-  for (const RobustnessRow row : {RobustnessRow::kResponse, RobustnessRow::kDelay}) {
-    for (int level = 0; level < kBoardLevels; ++level) add(row, 0, level);
-  }
-  for (int i = 0; i < kBoardPushCases; ++i) add(RobustnessRow::kPush, 0, 0);
   return cases;
 }
 

@@ -110,9 +110,6 @@ struct RobustnessCase {
   BoardEpisode episode;
 };
 
-/// A case of a row at `level`, from 0 to 1 of its range. The seed draws noise and pushes.
-RobustnessCase MakeCase(RobustnessRow row, int parameter, double level, uint64_t seed);
-
 /// All robustness cases, in the order of the rows.
 std::vector<RobustnessCase> RobustnessCases(uint64_t seed);
 
