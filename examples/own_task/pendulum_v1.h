@@ -33,8 +33,6 @@ class PendulumV1 final : public upswing::VectorEnv {
     spec_.action_limit = {kMaxTorque};
     spec_.step_seconds = kStep;
     spec_.term_names = {"angle", "velocity", "effort"};
-    spec_.state_names = {"theta", "omega"};
-    spec_.state_units = {"rad", "rad/s"};
     spec_.mirror_signs = {1, -1, -1};  // left-right symmetry
     spec_.evaluation = {.seconds = kSeconds, .return_seconds = kSeconds, .solved_return = -160};
     for (int i = 0; i < num_envs; ++i) Reset(i);
@@ -63,15 +61,6 @@ class PendulumV1 final : public upswing::VectorEnv {
       std::copy_n(obs_.begin() + 3 * i, 3, r.next_obs.begin() + 3 * i);  // before the reset
       if (r.done(size_t(i))) Reset(i);
     }
-  }
-
-  void GetState(int env, std::span<double> state) const override {
-    state[0] = rods_[size_t(env)].theta;
-    state[1] = rods_[size_t(env)].omega;
-  }
-  void SetState(int env, std::span<const double> state) override {
-    rods_[size_t(env)] = {state[0], state[1], 0};
-    Show(env);
   }
 
   void State(const upswing::Archive& archive) override {

@@ -58,7 +58,7 @@ class Observer {
   /// The observation of a state (S) that consists of floats.
   std::vector<float> Observe(std::span<const double> s) const {
     if (policy_.is_foreign()) return {s.begin(), s.end()};
-    env_->SetState(0, s);
+    env_->SetState(0, {s[0], s[1], s[2], s[3]});
     const auto now = env_->obs().row(0);
     std::vector<float> obs(now.begin(), now.end());
     obs.resize(static_cast<size_t>(policy_.obs_size()));

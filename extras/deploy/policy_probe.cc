@@ -39,7 +39,7 @@ int main(int argc, char** argv) try {
     std::vector<float> numbers(row.begin(), row.end());
     Matrix<const float> obs(numbers.data(), 1, policy.obs_size());
     if (what == "states") {
-      env.SetState(0, row);
+      env.SetState(0, {row[0], row[1], row[2], row[3]});
       obs = env.obs();
     }
     const auto memory = policy.Start(1);

@@ -107,11 +107,6 @@ class CallbackEnv final : public VectorEnv {
     std::ranges::copy(ValuesOf(truncated_), result.truncated.begin());
   }
 
-  // The environments have no state that the program knows.
-  void GetState(int /*env*/, std::span<double> /*state*/) const override {}
-  void SetState(int /*env*/, std::span<const double> /*state*/) override {
-    throw NoForeignEnvironment(spec_.task);
-  }
   /// Saves the observations only. Loading begins new episodes.
   void State(const Archive& archive) override {
     archive.Array("obs", std::span(float_obs_));

@@ -1,5 +1,6 @@
 // Double pendulums with Gymnasium's interface: takes actions, returns arrays that view the results.
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/vector.h>
@@ -12,7 +13,6 @@
 #include <mutex>
 #include <optional>
 
-#include "agents/config_checks.h"
 #include "base/error.h"
 #include "base/text.h"
 #include "mujoco/engines.h"
@@ -139,10 +139,10 @@ class Environments {
     });
   }
 
-  /// Begins an episode of an environment in a state (S).
-  void SetState(int env, const std::vector<double>& state) {
+  /// Begins an episode of an environment in a state: q1, q2, w1, w2.
+  void SetState(int env, const std::array<double, 4>& s) {
     Alone([&] {
-      env_.SetState(env, state);
+      env_.SetState(env, {s[0], s[1], s[2], s[3]});
       ShowStart(env);
     });
   }
@@ -244,11 +244,8 @@ nb::dict DescribeTask(Environments& self) {
   d["num_envs"] = spec.num_envs;
   d["obs_size"] = spec.obs_size;
   d["action_limit"] = spec.action_limit;
-  d["action_unit"] = spec.action_unit;
   d["step_seconds"] = spec.step_seconds;
   d["reward_terms"] = spec.term_names;
-  d["state_names"] = spec.state_names;
-  d["state_units"] = spec.state_units;
   d["levels"] = self.levels();
   d["threads"] = self.threads();
   d["settings"] = ConfigToml(self.config(), false);

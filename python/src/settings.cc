@@ -8,7 +8,6 @@
 #include <string_view>
 
 #include "agents/config.h"
-#include "agents/config_checks.h"
 #include "base/text.h"
 #include "python/src/bindings.h"
 #include "runs/config_files.h"
@@ -125,12 +124,6 @@ void BindSettings(nb::module_& m) {
   m.def("training_settings", &SettingsOfTraining, nb::arg("agent"));
   m.def("trial_settings", &SettingsOfTrial);
   m.def("agents", &NamedAgents);
-  m.def(
-      "config_toml",
-      [](const SettingTexts& settings, const std::string& config) {
-        return CompleteToml(BuildConfig(config, FlagsOf(settings)));
-      },
-      nb::arg("settings"), nb::arg("config"));
 }
 
 }  // namespace upswing

@@ -30,7 +30,6 @@ class Core:
         self.num_envs: int = spec["num_envs"]
         self.step_seconds: float = spec["step_seconds"]
         self.reward_terms: list[str] = spec["reward_terms"]
-        self.state_names: list[str] = spec["state_names"]
         self.levels = np.array(spec["levels"])
         self.settings: str = spec["settings"]
         self.threads: int = spec["threads"]
@@ -105,7 +104,7 @@ class Core:
             if not self.is_reset and not mask.all():
                 raise gym.error.ResetNeeded("reset_mask: expected a reset of all environments first")
         if states is not None:
-            size = len(self.state_names)
+            size = 4
             try:
                 states = np.asarray(states, np.float64)
                 if states.shape not in ((size,), (n, size)):
@@ -113,7 +112,7 @@ class Core:
                 states = np.broadcast_to(states, (n, size))
             except (ValueError, TypeError):
                 raise _upswing.InputError(
-                    f"state: expected {', '.join(self.state_names)} (rad, rad/s) of shape "
+                    f"state: expected q1, q2, w1, w2 (rad, rad/s) of shape "
                     f"({size},) or ({n}, {size}), got shape {np.shape(states)}") from None
             if not np.isfinite(states[mask]).all():
                 raise _upswing.InputError("state: expected finite numbers, got others")

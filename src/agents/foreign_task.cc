@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/error.h"
 #include "base/json.h"
 #include "base/text.h"
 
@@ -76,12 +77,6 @@ EnvSpec ForeignTask::Spec(int num_envs) const {
 
 bool IsForeign(std::string_view task) { return task.starts_with(kBeginning); }
 
-Error NoForeignEnvironment(const std::string& task) {
-  return BadInput(Concat(task, ": expected a task of the program, got an environment of ",
-                         "Gymnasium, which only Python makes and steps (upswing.train and "
-                         "upswing.evaluate with env)"));
-}
-
 std::string ReplacementOf(std::string_view name) {
   if (name == "ppo-discrete") return "; use the agent ppo with --actions levels";
   const std::string_view env = name.ends_with("pendulum-v1") ? "Pendulum-v1"
@@ -93,8 +88,11 @@ std::string ReplacementOf(std::string_view name) {
 
 std::unique_ptr<VectorEnv> MakeEnv(const EnvConfig& config) {
   if (config.environment.empty()) return std::make_unique<PendulumEnv>(config);
-  if (!config.make_foreign) throw NoForeignEnvironment(SpecOf(config).task);
-  return config.make_foreign(config);
+  if (config.make_foreign) return config.make_foreign(config);
+  throw BadInput(Concat(SpecOf(config).task,
+                        ": expected a task of the program, got an environment ",
+                        "of Gymnasium, which only Python makes and steps (upswing.train and "
+                        "upswing.evaluate with env)"));
 }
 
 EnvSpec SpecOf(const EnvConfig& config) {

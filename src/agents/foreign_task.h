@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "base/env.h"
-#include "base/error.h"
 #include "pendulum/pendulum_env.h"
 
 namespace upswing {
@@ -34,9 +33,6 @@ struct ForeignTask {
 
 /// Whether this is the name of a foreign task.
 bool IsForeign(std::string_view task);
-
-/// The error for work that needs a foreign task's environment.
-Error NoForeignEnvironment(const std::string& task);
 
 /// The replacement of a task or agent of version 0.5.0, for messages: `; train on …`. Empty for
 /// another name.

@@ -12,7 +12,7 @@
 namespace upswing {
 
 /// Static description of a task. Letters: N environments, D observation size, A action size, K
-/// reward terms, S state variables.
+/// reward terms.
 struct EnvSpec {
   std::string task;                  // name of the task, such as "double-pendulum"
   int num_envs = 1;                  // N
@@ -21,11 +21,9 @@ struct EnvSpec {
   // (Q) The only actions of a task with discrete actions, where A = 1. Empty: any action within the
   // limit.
   std::vector<double> choices = {};
-  std::string action_unit = "N·m";       // unit of the action's components
-  double step_seconds = 0;               // control period, s
-  std::vector<std::string> term_names;   // (K) names of the reward's terms
-  std::vector<std::string> state_names;  // (S) such as "q1"
-  std::vector<std::string> state_units;  // (S) such as "rad"
+  std::string action_unit = "N·m";      // unit of the action's components
+  double step_seconds = 0;              // control period, s
+  std::vector<std::string> term_names;  // (K) names of the reward's terms
   // (D) Sign of each observation under the task's mirror symmetry, step(-s, -u) = -step(s, u).
   // Empty if the task has no such symmetry.
   std::vector<float> mirror_signs;
@@ -68,10 +66,6 @@ class VectorEnv {
   /// Applies `action` (N × A) for one control period and clamps its components to their limits. An
   /// environment whose episode ends resets itself.
   virtual void Step(Matrix<const double> action, StepResult& result) = 0;
-
-  /// GetState reads the state (S) of an environment. SetState begins an episode in the given state.
-  virtual void GetState(int env, std::span<double> state) const = 0;
-  virtual void SetState(int env, std::span<const double> state) = 0;
 
   /// Writes the lean of each body (bodies): its angle from its pose at the current goal, in [-π, π]
   /// rad.

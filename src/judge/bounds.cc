@@ -55,9 +55,9 @@ EpisodeBounds FindBounds(const BoundsConfig& config, ThreadPool& pool, const Pro
   EpisodeBounds bounds{rule, std::vector<std::vector<double>>(n), none, none};
   pool.ParallelFor(static_cast<int>(n), [&](int index) {
     const auto i = static_cast<size_t>(index);
+    const auto [q1, q2, w1, w2] = OneEpisode(env, index).state(0);
     std::vector<double>& start = bounds.starts[i];
-    start.resize(4);
-    OneEpisode(env, index).GetState(0, start);
+    start = {q1, q2, w1, w2};
     BestEpisodeSearch own = search;  // a copy per thread: it has buffers
     const auto found = own.From(StateVector(start.data()), tables);
     for (size_t k = 0; k < tables.size(); ++k) {

@@ -47,8 +47,6 @@ EnvSpec PendulumSpec(const PendulumEnvConfig& config) {
   spec.term_names = {kRewardTermNames.begin(), kRewardTermNames.end()};
   const std::string& reward = config.reward.expression;
   if (!reward.empty()) spec.term_names = OwnReward(reward).names();
-  spec.state_names = {"q1", "q2", "w1", "w2"};
-  spec.state_units = {"rad", "rad", "rad/s", "rad/s"};
   spec.mirror_signs = {kMirrorSigns.begin(), kMirrorSigns.end()};
   if (config.identified_from) {
     spec.mirror_signs.insert(spec.mirror_signs.end(), kIdentifiedMirrorSigns.begin(),
@@ -92,15 +90,6 @@ void PendulumEnv::Lean(int env, std::span<double> lean) const {
 
 Matrix<const float> PendulumEnv::obs() const {
   return {obs_.data(), config_.num_envs, spec_.obs_size};
-}
-
-void PendulumEnv::GetState(int env, std::span<double> s) const {
-  const PendulumState now = state(env);
-  std::ranges::copy(std::array{now.q1, now.q2, now.w1, now.w2}, s.begin());
-}
-
-void PendulumEnv::SetState(int env, std::span<const double> s) {
-  SetState(env, PendulumState{s[0], s[1], s[2], s[3]});
 }
 
 void PendulumEnv::SetState(int env, const PendulumState& s) {

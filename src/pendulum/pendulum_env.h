@@ -73,8 +73,6 @@ class PendulumEnv : public VectorEnv {
   }
   /// Steps every environment under the torque (N), N·m.
   void Step(std::span<const double> torque, StepResult& result);
-  void GetState(int env, std::span<double> state) const override;
-  void SetState(int env, std::span<const double> state) override;
   void SetStartNoise(double sigma) override { config_.start.noise = sigma; }
   void State(const Archive& archive) override;
 

@@ -106,7 +106,7 @@ TEST(Evaluate, ABlownUpEpisodeFailsEvenIfLaterStatesAreAtTheGoal) {
 TEST(Evaluate, ATimeLimitBeforeTheEndOfTheTimeEndsAnEpisode) {
   // A toy episode has 10 steps, the rule 20. The walk stays where it begins.
   ToyEnv env(3);
-  for (int i = 0; i < 3; ++i) env.SetState(i, std::array{0.0});
+  for (int i = 0; i < 3; ++i) env.SetState(i, 0);
   for (const EvaluationEpisode& episode : EvaluateEpisodes(Constant(0), env)) {
     EXPECT_EQ(episode.seconds, 10);
     EXPECT_EQ(episode.reward_sum, 10);

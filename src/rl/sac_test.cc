@@ -145,8 +145,7 @@ class PeakBandit : public ToyEnv {
       r.reward[i] = r.reward_terms[i] = 1 - miss * miss;
       r.terminated[i] = 1;
       r.truncated[i] = 0;
-      const double zero = 0;
-      SetState(static_cast<int>(i), std::span(&zero, 1));
+      SetState(static_cast<int>(i), 0);
     }
   }
 };

@@ -26,8 +26,6 @@ class ToyEnv : public VectorEnv {
     spec.action_limit = {1};
     spec.step_seconds = 1;
     spec.term_names = {"near"};
-    spec.state_names = {"x"};
-    spec.state_units = {""};
     spec.mirror_signs = {-1};
     spec.evaluation = {20, 10, 10, 0};
     return spec;
@@ -35,12 +33,7 @@ class ToyEnv : public VectorEnv {
   const EnvSpec& spec() const override { return spec_; }
   Matrix<const float> obs() const override { return {x_.data(), num_envs(), 1}; }
   void SetStartNoise(double sigma) override { noise_ = sigma; }
-  void GetState(int env, std::span<double> state) const override {
-    state[0] = x_[static_cast<size_t>(env)];
-  }
-  void SetState(int env, std::span<const double> state) override {
-    x_[static_cast<size_t>(env)] = static_cast<float>(state[0]);
-  }
+  void SetState(int env, float x) { x_[static_cast<size_t>(env)] = x; }
 
   void Step(Matrix<const double> action, StepResult& r) override {
     const std::span<const double> torque = action.values();

@@ -80,13 +80,12 @@ json Learner::LastUpdate() const {
 std::vector<std::byte> Learner::policy() const { return FileOf(*training_.policy()); }
 
 std::vector<std::byte> Learner::Poses() const {
-  const VectorEnv& env = training_.env();
-  std::vector<double> state(env.spec().state_names.size());
+  const auto& env = dynamic_cast<const PendulumEnv&>(training_.env());
   std::vector<float> poses;
   for (int i = 0; i < env.num_envs(); ++i) {
-    env.GetState(i, state);
-    poses.push_back(static_cast<float>(state[0]));
-    poses.push_back(static_cast<float>(state[1]));
+    const PendulumState state = env.state(i);
+    poses.push_back(static_cast<float>(state.q1));
+    poses.push_back(static_cast<float>(state.q2));
   }
   const auto bytes = std::as_bytes(std::span(poses));
   return {bytes.begin(), bytes.end()};
