@@ -183,19 +183,6 @@ TEST(Dqn, CenteringShiftsAllValuesByAShareOfTheMeanError) {
   }
 }
 
-/// Trains on the toy environment for `steps` steps of all environments.
-void Walk(Dqn& agent, ToyEnv& env, int steps) {
-  StepResult result(env.spec());
-  std::vector<double> torques(static_cast<size_t>(env.num_envs()));
-  const Matrix<double> action(torques.data(), env.num_envs(), 1);
-  for (int i = 0; i < steps; ++i) {
-    agent.Act(env.obs(), action);
-    env.Step(action, result);
-    agent.Observe(result);
-    agent.Learn();
-  }
-}
-
 TEST(Dqn, WeightsMultiplyTheGradientOfTheirTransition) {
   // A transition of weight 1/2, twice, equals one of weight 1. A transition of weight 0 changes
   // nothing.
@@ -384,11 +371,8 @@ TEST(Dqn, LearnsToStayNearZero) {
     Dqn agent(SmallDqn(), ToyEnv::Spec(4), seed, pool);
     ToyEnv env(4, seed);
     Walk(agent, env, 1500);
-    const auto policy = agent.ExportPolicy({});
     for (const float x : {-2.0F, 0.0F, 2.0F}) {
-      double torque = 9;
-      policy->Act({&x, 1, 1}, {&torque, 1, 1}, *policy->Start(1));
-      EXPECT_EQ(torque, x == 0 ? 0 : -x / 2) << "seed " << seed << ", x = " << x;
+      EXPECT_EQ(ActionAt(agent, x), x == 0 ? 0 : -x / 2) << "seed " << seed << ", x = " << x;
     }
   }
 }
@@ -419,15 +403,7 @@ TEST(Dqn, TheNumberOfThreadsChangesNoBit) {
   // Layers of 130 and 70 inputs have five tasks. Their 19,000 parameters make three chunks of Adam.
   config.hidden = {130};
   config.head = 70;
-  std::vector<float> parameters[2];
-  for (const int threads : {1, 3}) {
-    ThreadPool pool(threads);
-    Dqn agent(config, ToyEnv::Spec(4), 1, pool);
-    ToyEnv env(4);
-    Walk(agent, env, 100);
-    parameters[threads == 1 ? 0 : 1].assign(agent.online().begin(), agent.online().end());
-  }
-  EXPECT_EQ(parameters[0], parameters[1]);
+  ExpectThreadsChangeNoBit(config, 4, 100);
 }
 
 TEST(Dqn, LoadedStateContinuesWithTheSameBits) {
@@ -435,34 +411,13 @@ TEST(Dqn, LoadedStateContinuesWithTheSameBits) {
   config.n_step = 3;
   config.prioritized = config.mirror = true;
   config.policy_tau = 0.1;
-  ThreadPool pool(1);
-  Dqn saved(config, ToyEnv::Spec(2), 1, pool);
-  ToyEnv env(2);
-  Walk(saved, env, 101);
-  Dqn loaded(config, ToyEnv::Spec(2), 99, pool);  // another seed; loading must replace its state
-  ToyEnv loaded_env(2, 99);
-  const auto state = [](Dqn& agent, ToyEnv& walk) {
-    return [&](const Archive& archive) {
-      agent.State(archive.In("agent"));
-      walk.State(archive.In("env"));
-    };
-  };
-  SaveAndLoad(state(saved, env), state(loaded, loaded_env));
-  Walk(saved, env, 100);
-  Walk(loaded, loaded_env, 100);
-  EXPECT_TRUE(std::ranges::equal(saved.online(), loaded.online()));
-  EXPECT_TRUE(std::ranges::equal(saved.target(), loaded.target()));
-  EXPECT_EQ(saved.epsilon(), loaded.epsilon());
-  EXPECT_EQ(saved.learning_rate(), loaded.learning_rate());
+  ExpectLoadedStateGoesOn(config, 101);
 }
 
 TEST(Dqn, NumbersThatAreNotFiniteAreFailures) {
-  ThreadPool pool(1);
-  Dqn agent(SmallDqn(), ToyEnv::Spec(1), 1, pool);
-  ToyEnv env(1);
-  env.poison = true;
-  EXPECT_THROW(Walk(agent, env, 1), Error);
+  ExpectPoisonFails(SmallDqn());
 
+  ThreadPool pool(1);
   Dqn other(SmallDqn(), ToyEnv::Spec(1), 1, pool);
   const std::vector<float> before(other.online().begin(), other.online().end());
   Minibatch batch = RandomBatch(16);

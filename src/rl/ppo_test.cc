@@ -27,32 +27,6 @@ PpoConfig SmallPpo(const std::string& actions = "continuous") {
   return config;
 }
 
-/// Trains for `steps` steps of all environments.
-void Walk(Ppo& agent, VectorEnv& env, int steps) {
-  StepResult result(env.spec());
-  std::vector<double> torques(result.torque.size());
-  const Matrix<double> action(torques.data(), env.num_envs(), env.spec().action_size());
-  for (int i = 0; i < steps; ++i) {
-    agent.Act(env.obs(), action);
-    env.Step(action, result);
-    agent.Observe(result);
-    agent.Learn();
-  }
-}
-
-std::vector<float> Parameters(const Ppo& agent) {
-  std::vector<float> all(agent.actor().begin(), agent.actor().end());
-  all.insert(all.end(), agent.critic().begin(), agent.critic().end());
-  return all;
-}
-
-double ActionAt(const Ppo& agent, float x) {
-  const auto policy = agent.ExportPolicy({});
-  double action = 9;
-  policy->Act({&x, 1, 1}, {&action, 1, 1}, *policy->Start(1));
-  return action;
-}
-
 /// Episodes of one step from x = 1. The reward -(a - 0.6)² is largest at 0.6.
 class Bandit : public ToyEnv {
  public:
@@ -291,42 +265,15 @@ TEST_P(PpoActions, TheNumberOfThreadsChangesNoBit) {
   config.hidden = {130, 70};  // several tasks per layer, three chunks of Adam
   config.batch = 128;
   config.mirror = true;
-  std::vector<float> parameters[2];
-  for (const int threads : {1, 3}) {
-    ThreadPool pool(threads);
-    Ppo agent(config, ToyEnv::Spec(80), 1, pool);  // three blocks of environments
-    ToyEnv env(80);
-    Walk(agent, env, 40);
-    parameters[threads == 1 ? 0 : 1] = Parameters(agent);
-  }
-  EXPECT_EQ(parameters[0], parameters[1]);
+  ExpectThreadsChangeNoBit(config, 80, 40);  // three blocks of environments
 }
 
 TEST_P(PpoActions, LoadedStateContinuesWithTheSameBits) {
   PpoConfig config = SmallPpo(GetParam());
   config.mirror = true;
   config.value_clip = 0.2;
-  for (const int steps : {32, 41}) {  // between two rollouts, and within one
-    ThreadPool pool(1);
-    Ppo saved(config, ToyEnv::Spec(2), 1, pool);
-    ToyEnv env(2);
-    Walk(saved, env, steps);
-    Ppo loaded(config, ToyEnv::Spec(2), 99, pool);  // another seed; loading must replace its state
-    ToyEnv loaded_env(2, 99);
-    const auto state = [](Ppo& agent, ToyEnv& walk) {
-      return [&](const Archive& archive) {
-        agent.State(archive.In("agent"));
-        walk.State(archive.In("env"));
-      };
-    };
-    SaveAndLoad(state(saved, env), state(loaded, loaded_env));
-    Walk(saved, env, 100);
-    Walk(loaded, loaded_env, 100);
-    EXPECT_EQ(Parameters(saved), Parameters(loaded));
-    EXPECT_EQ(saved.learning_rate(), loaded.learning_rate());
-    EXPECT_EQ(saved.TakeMetrics(), loaded.TakeMetrics());
-    EXPECT_EQ(saved.normalizer().mean(), loaded.normalizer().mean());
-  }
+  // between two rollouts, and within one
+  for (const int steps : {32, 41}) ExpectLoadedStateGoesOn(config, steps);
 }
 
 TEST(Ppo, AStateThatIsNoneIsRefused) {
@@ -387,13 +334,7 @@ TEST(Ppo, SettingsThatDoNotFitAreRefused) {
   EXPECT_NO_THROW(Ppo(SmallPpo(), spec, 1, pool));
 }
 
-TEST(Ppo, NumbersThatAreNotFiniteAreFailures) {
-  ThreadPool pool(1);
-  Ppo agent(SmallPpo(), ToyEnv::Spec(1), 1, pool);
-  ToyEnv env(1);
-  env.poison = true;
-  EXPECT_THROW(Walk(agent, env, 1), Error);
-}
+TEST(Ppo, NumbersThatAreNotFiniteAreFailures) { ExpectPoisonFails(SmallPpo()); }
 
 }  // namespace
 }  // namespace upswing

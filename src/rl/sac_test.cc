@@ -44,27 +44,6 @@ Minibatch RandomMinibatch(int size) {
 
 std::vector<float> Copy(std::span<const float> values) { return {values.begin(), values.end()}; }
 
-/// Trains on an environment for `steps` steps of all environments.
-void Walk(Sac& agent, VectorEnv& env, int steps) {
-  StepResult result(env.spec());
-  std::vector<double> torques(static_cast<size_t>(env.num_envs()));
-  const Matrix<double> action(torques.data(), env.num_envs(), 1);
-  for (int i = 0; i < steps; ++i) {
-    agent.Act(env.obs(), action);
-    env.Step(action, result);
-    agent.Observe(result);
-    agent.Learn();
-  }
-}
-
-/// The action of the exported policy at an observation.
-double ActionAt(const Sac& agent, float x) {
-  const auto policy = agent.ExportPolicy({});
-  double action = 99;
-  policy->Act({&x, 1, 1}, {&action, 1, 1}, *policy->Start(1));
-  return action;
-}
-
 TEST(SoftTargets, ByHand) {
   // Use the smaller of both values minus α ln π. A discount of 0 (a termination) leaves only the
   // reward.
@@ -312,18 +291,7 @@ TEST(Sac, TheNumberOfThreadsChangesNoBit) {
   SacConfig config = SmallSac();
   config.batch = 128;     // four slices
   config.hidden = {130};  // three tasks
-  std::vector<float> actor[2], critic[2];
-  for (const int threads : {1, 3}) {
-    ThreadPool pool(threads);
-    Sac agent(config, ToyEnv::Spec(40), 1, pool);
-    ToyEnv env(40);
-    Walk(agent, env, 10);
-    EXPECT_GT(agent.updates(), 100);
-    actor[threads == 1 ? 0 : 1] = Copy(agent.actor());
-    critic[threads == 1 ? 0 : 1] = Copy(agent.critic(1));
-  }
-  EXPECT_EQ(actor[0], actor[1]);
-  EXPECT_EQ(critic[0], critic[1]);
+  ExpectThreadsChangeNoBit(config, 40, 10);
 }
 
 class SacState : public ::testing::TestWithParam<int> {};
@@ -335,37 +303,15 @@ TEST_P(SacState, LoadedStateContinuesWithTheSameBits) {
   config.policy_tau = 0.1;
   config.bins = GetParam();
   config.twin = GetParam() == 0;
-  ThreadPool pool(1);
-  Sac saved(config, ToyEnv::Spec(2), 1, pool);
-  ToyEnv env(2);
-  Walk(saved, env, 101);
-  Sac loaded(config, ToyEnv::Spec(2), 99, pool);  // another seed, which loading must replace
-  ToyEnv loaded_env(2, 99);
-  const auto state = [](Sac& agent, ToyEnv& walk) {
-    return [&](const Archive& archive) {
-      agent.State(archive.In("agent"));
-      walk.State(archive.In("env"));
-    };
-  };
-  SaveAndLoad(state(saved, env), state(loaded, loaded_env));
-  EXPECT_EQ(saved.TakeMetrics(), loaded.TakeMetrics());
-  Walk(saved, env, 100);
-  Walk(loaded, loaded_env, 100);
-  EXPECT_EQ(Copy(saved.actor()), Copy(loaded.actor()));
-  EXPECT_EQ(Copy(saved.critic(0)), Copy(loaded.critic(0)));
-  EXPECT_EQ(saved.TakeMetrics(), loaded.TakeMetrics());
-  EXPECT_EQ(ActionAt(saved, 0.3F), ActionAt(loaded, 0.3F));
+  ExpectLoadedStateGoesOn(config, 101);
 }
 
 INSTANTIATE_TEST_SUITE_P(Critics, SacState, ::testing::Values(0, 11));
 
 TEST(Sac, NumbersThatAreNotFiniteAreFailures) {
-  ThreadPool pool(1);
-  Sac agent(SmallSac(), ToyEnv::Spec(1), 1, pool);
-  ToyEnv env(1);
-  env.poison = true;
-  EXPECT_THROW(Walk(agent, env, 1), Error);
+  ExpectPoisonFails(SmallSac());
 
+  ThreadPool pool(1);
   Sac other(SmallSac(), ToyEnv::Spec(1), 1, pool);
   const std::vector<float> before = Copy(other.critic(0));
   Minibatch batch = RandomMinibatch(16);

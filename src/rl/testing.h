@@ -5,8 +5,12 @@
 #include <algorithm>
 #include <limits>
 #include <string>
+#include <vector>
 
-#include "rl/agent.h"
+#include "base/safetensors.h"
+#include "base/testing.h"
+#include "rl/agent_config.h"
+#include "rl/toy_env.h"
 
 /// Helpers for tests of agents.
 namespace upswing {
@@ -16,6 +20,79 @@ inline double Metric(const Metrics& metrics, const std::string& name) {
   const auto found = std::ranges::find(metrics, name, &Metrics::value_type::first);
   EXPECT_NE(found, metrics.end()) << name;
   return found == metrics.end() ? std::numeric_limits<double>::quiet_NaN() : found->second;
+}
+
+/// Trains on an environment for `steps` steps of all environments.
+inline void Walk(Agent& agent, VectorEnv& env, int steps) {
+  StepResult result(env.spec());
+  std::vector<double> torques(result.torque.size());
+  const Matrix<double> action(torques, env.num_envs(), env.spec().action_size());
+  for (int i = 0; i < steps; ++i) {
+    agent.Act(env.obs(), action);
+    env.Step(action, result);
+    agent.Observe(result);
+    agent.Learn();
+  }
+}
+
+/// The action of the exported policy at an observation.
+inline double ActionAt(const Agent& agent, float x) {
+  const auto policy = agent.ExportPolicy({});
+  double action = 99;
+  policy->Act({&x, 1, 1}, {&action, 1, 1}, *policy->Start(1));
+  return action;
+}
+
+/// The agent's whole state.
+inline std::vector<std::byte> BytesOf(Agent& agent) {
+  Tensors state;
+  agent.State(Archive::Saver(state));
+  return WriteSafetensors(state).Joined();
+}
+
+/// Expects that 1 and 3 threads learn the same bits on toy environments.
+inline void ExpectThreadsChangeNoBit(const AgentConfig& config, int num_envs, int steps) {
+  std::vector<std::byte> first;
+  for (const int threads : {1, 3}) {
+    ThreadPool pool(threads);
+    const auto agent = config.Make(ToyEnv::Spec(num_envs), 1, pool);
+    ToyEnv env(num_envs);
+    Walk(*agent, env, steps);
+    EXPECT_GT(agent->updates(), 0);
+    if (threads == 1) first = BytesOf(*agent);
+    EXPECT_EQ(BytesOf(*agent), first);
+  }
+}
+
+/// Expects that an agent and its environments, saved after `steps` steps and loaded into others
+/// with another seed, go on with the same bits.
+inline void ExpectLoadedStateGoesOn(const AgentConfig& config, int steps) {
+  ThreadPool pool(1);
+  const auto saved = config.Make(ToyEnv::Spec(2), 1, pool);
+  const auto loaded = config.Make(ToyEnv::Spec(2), 99, pool);
+  ToyEnv env(2), loaded_env(2, 99);
+  Walk(*saved, env, steps);
+  const auto state = [](Agent& agent, ToyEnv& toy) {
+    return [&](const Archive& archive) {
+      agent.State(archive.In("agent"));
+      toy.State(archive.In("env"));
+    };
+  };
+  SaveAndLoad(state(*saved, env), state(*loaded, loaded_env));
+  EXPECT_EQ(saved->TakeMetrics(), loaded->TakeMetrics());
+  Walk(*saved, env, 100);
+  Walk(*loaded, loaded_env, 100);
+  EXPECT_EQ(BytesOf(*saved), BytesOf(*loaded));
+  EXPECT_EQ(saved->TakeMetrics(), loaded->TakeMetrics());
+}
+
+/// Expects that an observation that is not finite ends the learning.
+inline void ExpectPoisonFails(const AgentConfig& config) {
+  ThreadPool pool(1);
+  const auto agent = config.Make(ToyEnv::Spec(1), 1, pool);
+  ToyEnv env(1);
+  env.poison = true;
+  EXPECT_THROW(Walk(*agent, env, 1), Error);
 }
 
 }  // namespace upswing
