@@ -18,21 +18,6 @@ struct Product {
   const Real* bias = nullptr;    // (N); null: no bias
   bool relu = false;             // C = max(C, 0)
   Matrix<const Real> gate = {};  // (M × N) C = 0 where gate is not positive; empty: no gate
-
-  /// The part of the product for `rows` rows from row m and `cols` columns from column n.
-  Product Part(int m, int rows, int n, int cols) const {
-    return {rows,
-            cols,
-            K,
-            a + m * a_m,
-            a_m,
-            a_k,
-            b.Cols(n, cols),
-            c.Rows(m, rows).Cols(n, cols),
-            bias == nullptr ? nullptr : bias + n,
-            relu,
-            gate.empty() ? gate : gate.Rows(m, rows).Cols(n, cols)};
-  }
 };
 
 /// Computes C (at least one column) with vector instructions. The order of each sum depends only on

@@ -51,8 +51,7 @@ HWY_INLINE void Store(Vec value, Real* to, size_t count) {
 }
 
 #if HWY_TARGET != HWY_SCALAR
-/// Transposes 4 × 4 floats. Each register holds one row of four numbers, or one row of several
-/// blocks side by side.
+/// Transposes 4 × 4 floats; each register holds one row.
 template <class D>
 HWY_INLINE void TransposeBlocks(D d, hn::Vec<D> (&rows)[4]) {
   const hn::Repartition<double, D> pairs;
