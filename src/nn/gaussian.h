@@ -65,11 +65,6 @@ template <typename T>
 T LogTanhSlope(T size, T e) {
   return 2 * (std::numbers::ln2_v<T> - size - std::log1p(e));
 }
-/// ln(1 - tanh²(u)), the logarithm of the slope of tanh.
-template <typename T>
-T LogTanhSlope(T u) {
-  return LogTanhSlope(std::abs(u), std::exp(-2 * std::abs(u)));
-}
 
 /// A sample of a squashed policy.
 template <typename T>

@@ -49,23 +49,7 @@ void Transpose(Matrix<const Real> x, Matrix<Real> y) {
 }
 
 void SumRows(Matrix<const Real> x, std::span<Real> sum) {
-  // Sum four registers at a time, because each addition waits for the previous one in the same
-  // register.
-  const Tag d;
-  const size_t lanes = hn::Lanes(d);
-  size_t done = 0;
-  for (; done + 4 * lanes <= sum.size(); done += 4 * lanes) {
-    Vec column[4] = {hn::Zero(d), hn::Zero(d), hn::Zero(d), hn::Zero(d)};
-    for (int r = 0; r < x.rows(); ++r) {
-      const Real* row = x.row(r).data() + done;
-      HWY_UNROLL(4)
-      for (size_t v = 0; v < 4; ++v) column[v] = hn::Add(column[v], hn::LoadU(d, row + v * lanes));
-    }
-    HWY_UNROLL(4)
-    for (size_t v = 0; v < 4; ++v) hn::StoreU(column[v], d, sum.data() + done + v * lanes);
-  }
-  ForVectors(sum.size() - done, [&](size_t first, size_t count, auto partial) HWY_ATTR {
-    const size_t i = done + first;
+  ForVectors(sum.size(), [&](size_t i, size_t count, auto partial) HWY_ATTR {
     Vec column = hn::Zero(Tag());
     for (int r = 0; r < x.rows(); ++r) {
       column = hn::Add(column, Load<partial.value>(x.row(r).data() + i, count));

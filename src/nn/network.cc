@@ -88,12 +88,6 @@ void Network::Add(const std::string& name, int in, int out, Activation activatio
   std::ranges::copy(layers_.back().Blocks(), std::back_inserter(blocks_));
 }
 
-double Network::multiply_adds() const {
-  double sum = 0;
-  for (const Layer& layer : layers_) sum += static_cast<double>(layer.in()) * layer.out();
-  return sum;
-}
-
 std::vector<LayerView> Network::Views(std::span<const Real> parameters) const {
   std::vector<LayerView> views;
   for (const Layer& layer : layers_) views.push_back(layer.View(parameters));
@@ -202,14 +196,6 @@ Real Network::BackwardWeights(int task, Matrix<const Real> x, const Activations&
     input = layers_[layer - 1].Output({0, x.rows()}, a[layer - 1]);
   }
   return layers_[layer].BackwardWeights(rows, input, a[layer], gradient);
-}
-
-void Network::Backward(std::span<const Real> parameters, Matrix<const Real> x, Activations& a,
-                       Matrix<const Real> dy, std::span<Real> gradient, Matrix<Real> dx) const {
-  AlignedVector<Real> transposed(num_parameters());
-  for (int task = 0; task < num_tasks(); ++task) TransposeWeights(task, parameters, transposed);
-  BackwardInputs(parameters, transposed, dy, {0, x.rows()}, a, dx);
-  for (int task = 0; task < num_tasks(); ++task) BackwardWeights(task, x, a, gradient);
 }
 
 }  // namespace upswing

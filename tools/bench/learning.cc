@@ -33,7 +33,10 @@ DqnConfig BareDqn(bool dueling, const Widths& hidden, int64_t batch) {
 /// observations, and the gradients of all weights.
 double UpdateFlops(const DqnConfig& config) {
   const NetworkShape shape = config.Shape(kObservationSize, kBenchActions);
-  const double all = Network(shape).multiply_adds();
+  double all = 0;  // multiply-adds of a forward pass of one row
+  for (const ParameterBlock& block : Network(shape).blocks()) {
+    if (block.in > 0) all += static_cast<double>(block.size());
+  }
   const double first = static_cast<double>(shape.inputs) * shape.hidden.front();
   const double forward = (config.double_q ? 3 : 2) * all;
   return 2 * static_cast<double>(config.batch) * (forward + 2 * all - first);
