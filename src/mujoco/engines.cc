@@ -189,11 +189,11 @@ bool MuJoCoPhysics::BlewUp(int env) const {
 
 void MuJoCoPhysics::Judge(int env, double torque, StepResult& result) const {
   const auto i = static_cast<size_t>(env);
+  const size_t obs_size = result.next_obs.size() / result.reward.size();
   const PendulumState s = state(env);
   const Plant& plant = config_.plant(env);
   const double tau = std::clamp(torque, -plant.torque_limit, plant.torque_limit);
-  std::ranges::copy(Observe(plant, s),
-                    std::span(result.next_obs).subspan(i * kObservationSize).begin());
+  std::ranges::copy(Observe(plant, s), std::span(result.next_obs).subspan(i * obs_size).begin());
   const auto terms = std::span(result.reward_terms).subspan(i * kRewardTerms, kRewardTerms);
   std::ranges::copy(RewardTerms(plant, s, tau), terms.begin());
   result.reward[i] = 0;

@@ -103,18 +103,10 @@ HWY_INLINE V MotorAngleOf(const ClosedFormBatch& batch, size_t i, const State& x
 /// Sines and cosines of the joints' angles.
 struct Angles {
   Angle q1, q2;
-
-  HWY_INLINE V c12() const { return NegMulAdd(q1.s, q2.s, q1.c * q2.c); }
 };
 
 HWY_INLINE Angles AnglesOf(const JointVectors& q) {
   return {SineCosineOf(q.one), SineCosineOf(q.two)};
-}
-
-/// Height of the tip over the pivot, divided by the length of both links.
-HWY_INLINE V HeightOf(const ClosedFormBatch& batch, size_t i, const Angles& angles) {
-  return hn::Neg(
-      MulAdd(LoadFrom(batch.share1, i), angles.q1.c, LoadFrom(batch.share2, i) * angles.c12()));
 }
 
 /// M(q) q̈ = r = τ - c(q, q̇) - g(q) - d q̇ - f atan(100 q̇), solved for q̈.
@@ -153,16 +145,13 @@ HWY_INLINE JointVectors Acceleration(const Dynamics& p, const State& x, const An
 /// Makes one classical Runge-Kutta step of K vectors of environments, so that the processor
 /// overlaps their operations. For q̈ = a(q, w), the four slopes of q are the stages' w, so that
 ///   q += h w + h²/6 (a1 + a2 + a3),  w += h/6 (a1 + 2 a2 + 2 a3 + a4).
-/// `before` gets the sines and cosines of the first stage.
 template <bool kFriction, size_t K>
-HWY_INLINE void RungeKuttaStep(const Dynamics (&p)[K], double h, State (&x)[K],
-                               Angles (&before)[K]) {
+HWY_INLINE void RungeKuttaStep(const Dynamics (&p)[K], double h, State (&x)[K]) {
   JointVectors a1[K], a2[K], middle[K], early[K];
   State stage[K];
   HWY_UNROLL(2)
   for (size_t k = 0; k < K; ++k) {
-    before[k] = AnglesOf(x[k].q);
-    a1[k] = Acceleration<kFriction>(p[k], x[k], before[k]);
+    a1[k] = Acceleration<kFriction>(p[k], x[k], AnglesOf(x[k].q));
     stage[k] = {x[k].q.Plus(h / 2, x[k].w), x[k].w.Plus(h / 2, a1[k])};
   }
   HWY_UNROLL(2)
@@ -191,7 +180,6 @@ HWY_INLINE void AdvanceVectors(ClosedFormBatch& batch, int steps, size_t first, 
   const size_t lanes = hn::Lanes(kDoubles);
   Dynamics p[K];
   State x[K];
-  Angles before[K] = {};  // before the last step
   HWY_UNROLL(2)
   for (size_t k = 0; k < K; ++k) {
     p[k] = LoadDynamics(batch, first + k * lanes);
@@ -199,13 +187,9 @@ HWY_INLINE void AdvanceVectors(ClosedFormBatch& batch, int steps, size_t first, 
     hn::Store(MotorAngleOf(batch, first + k * lanes, x[k]), kDoubles,
               batch.angle_before.data() + first + k * lanes);
   }
-  for (int step = 0; step < steps; ++step) RungeKuttaStep<kFriction>(p, timestep, x, before);
+  for (int step = 0; step < steps; ++step) RungeKuttaStep<kFriction>(p, timestep, x);
   HWY_UNROLL(2)
-  for (size_t k = 0; k < K; ++k) {
-    const size_t i = first + k * lanes;
-    hn::Store(HeightOf(batch, i, before[k]), kDoubles, batch.height_before.data() + i);
-    StoreState(x[k], i, batch);
-  }
+  for (size_t k = 0; k < K; ++k) StoreState(x[k], first + k * lanes, batch);
 }
 
 template <bool kFriction>
@@ -241,7 +225,7 @@ HWY_INLINE Pose PoseOf(const ClosedFormBatch& batch, size_t i, const State& x) {
   const Angles angles = AnglesOf(x.q);
   pose.q1 = angles.q1;
   pose.q2 = angles.q2;
-  pose.c12 = angles.c12();
+  pose.c12 = NegMulAdd(pose.q1.s, pose.q2.s, pose.q1.c * pose.q2.c);
 
   // E = (T1 w1² + T2 w12²)/2 + b c2 w1 w12 - G1 c1 - G2 c12, with w12 = w1 + w2
   const V half = Constant(0.5);
@@ -251,7 +235,8 @@ HWY_INLINE Pose PoseOf(const ClosedFormBatch& batch, size_t i, const State& x) {
   const V minus_potential =
       MulAdd(LoadFrom(batch.G1, i), pose.q1.c, LoadFrom(batch.G2, i) * pose.c12);
   pose.energy = MulAdd(kinetic - minus_potential, LoadFrom(batch.energy_scale, i), half);
-  pose.height = HeightOf(batch, i, angles);
+  pose.height =
+      hn::Neg(MulAdd(LoadFrom(batch.share1, i), pose.q1.c, LoadFrom(batch.share2, i) * pose.c12));
   return pose;
 }
 
@@ -314,12 +299,13 @@ HWY_INLINE void JudgeVector(const ClosedFormBatch& batch, const RewardConfig& we
 void JudgeRange(const ClosedFormBatch& batch, const RewardConfig& weights, size_t first,
                 size_t last, StepResult& result) {
   const size_t lanes = hn::Lanes(kDoubles);
+  const size_t obs_size = result.next_obs.size() / result.reward.size();
   Verdict verdict;
   for (size_t i = first; i < last; i += lanes) {
     JudgeVector(batch, weights, i, verdict);
     for (size_t lane = 0; lane < std::min(lanes, last - i); ++lane) {
       const size_t env = i + lane;
-      float* obs = result.next_obs.data() + env * kObservationSize;
+      float* obs = result.next_obs.data() + env * obs_size;
       HWY_UNROLL(8)
       for (size_t k = 0; k < kObservationSize; ++k) obs[k] = verdict.obs[k][lane];
       double* terms = result.reward_terms.data() + env * kRewardTerms;
@@ -362,11 +348,9 @@ HWY_EXPORT(SineCosineRange);
 ClosedFormBatch::ClosedFormBatch(size_t num_envs) {
   constexpr size_t kWidest = HWY_NAMESPACE::kWidest;
   const size_t padded = (num_envs + kWidest - 1) / kWidest * kWidest;
-  for (Array* array :
-       {&q1,           &q2,     &w1,    &w2,    &tau,   &angle_before, &height_before,
-        &J1,           &J2,     &b,     &a,     &G1,    &G2,           &d1,
-        &d2,           &f1,     &f2,    &limit, &joint, &T1,           &T2,
-        &energy_scale, &share1, &share2}) {
+  for (Array* array : {&q1,    &q2,    &w1, &w2, &tau,          &angle_before, &J1,    &J2,
+                       &b,     &a,     &G1, &G2, &d1,           &d2,           &f1,    &f2,
+                       &limit, &joint, &T1, &T2, &energy_scale, &share1,       &share2}) {
     array->resize(padded);
   }
   for (size_t i = 0; i < padded; ++i) SetPlant(i, Plant());

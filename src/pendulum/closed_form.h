@@ -35,7 +35,6 @@ struct ClosedFormBatch {
   Array q1, q2, w1, w2;  // rad, rad/s
   Array tau;             // N·m, held until it is set again
   Array angle_before;    // angle of the motor's joint before the last Advance, rad
-  Array height_before;   // tip height before the last step of Advance, over the links' length
 
   // Equations of motion, see Manipulator.
   Array J1, J2, b, a;         // kg·m²

@@ -110,14 +110,6 @@ const Plant& PendulumEnv::ObservedPlant(int env) const {
   return config_.assumed_plant ? *config_.assumed_plant : plant(env);
 }
 
-void PendulumEnv::SpreadRows(std::vector<float>& table) const {
-  // Moves the last row first, so that no row is overwritten before it is moved.
-  for (int env = config_.num_envs - 1; env > 0; --env) {
-    const auto from = table.begin() + static_cast<ptrdiff_t>(env) * kObservationSize;
-    std::copy_backward(from, from + kObservationSize, Row(table, env).begin() + kObservationSize);
-  }
-}
-
 void PendulumEnv::Randomize(int env) {
   const auto i = static_cast<size_t>(env);
   const Randomization& random = config_.randomization;
@@ -194,7 +186,6 @@ void PendulumEnv::JudgeByOwnReward(StepResult& result) {
 }
 
 void PendulumEnv::ObserveSuccessors(std::span<const double> chosen, StepResult& result) {
-  if (spec_.obs_size > kObservationSize) SpreadRows(result.next_obs);
   if (exact_ && config_.memory == 0) return;
   for (int env = 0; env < config_.num_envs; ++env) {
     if (IsHeld(env)) continue;

@@ -105,7 +105,7 @@ class PendulumEnv : public VectorEnv {
   // The stages of a step. The torques `chosen` (N) are in N·m.
   /// Returns the torques (N) that the motors apply now, N·m: the chosen ones, after their delay.
   std::span<const double> Actuate(std::span<const double> chosen);
-  /// Applies sensors, identification and memory to the packed observations of the successors.
+  /// Applies sensors, identification and memory to the observations of the successors.
   void ObserveSuccessors(std::span<const double> chosen, StepResult& result);
   /// Counts the steps of the episodes and truncates those whose time is up.
   void KeepTime(StepResult& result);
@@ -125,8 +125,6 @@ class PendulumEnv : public VectorEnv {
   /// The plant whose energy and height are in the observations.
   const Plant& ObservedPlant(int env) const;
   bool IsHeld(int env) const { return !held_.empty() && held_[static_cast<size_t>(env)]; }
-  /// Moves rows of kObservationSize numbers to the beginnings of wider rows.
-  void SpreadRows(std::vector<float>& table) const;
 
   /// One environment's observation (D) within a table of observations.
   template <typename Table>

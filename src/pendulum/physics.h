@@ -70,9 +70,8 @@ class Physics {
   virtual void SetPlant(int env, const Plant& plant) = 0;
 
   /// Holds `torque` (N), N·m, for one control period and fills `result` except `truncated`.
-  /// `next_obs` gets N packed rows of kObservationSize, even if its rows are wider. A state blows
-  /// up if a number is not finite or beyond 1e10, or if MuJoCo warns; then only `terminated` has a
-  /// meaning.
+  /// Of each row of `next_obs`, it fills the first kObservationSize numbers. A state blows up if a
+  /// number is not finite or beyond 1e10, or if MuJoCo warns; then only `terminated` has a meaning.
   virtual void Step(std::span<const double> torque, StepResult& result) = 0;
 
   /// Adds a torque (N·m) to each joint of an environment, on top of the motor's, as when a person
