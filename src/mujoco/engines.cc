@@ -17,36 +17,6 @@ namespace {
 constexpr int kSmallestSlice = 4;  // environments; fewer are not worth a task
 constexpr int kMostSlices = 20;
 
-/// Gives every simulation of the batch its own row of a model field.
-template <typename T = mjtNum>
-T* Expand(mjBatch* batch, const char* field, int env) {
-  int size = 0;
-  auto* rows = static_cast<T*>(mjb_expand(batch, field, &size, nullptr));
-  if (rows == nullptr) throw Failure(Concat("MuJoCo cannot expand ", field));
-  return rows + env * size;
-}
-
-/// The fields of an environment, as FieldsOf gives them.
-ModelFields ExpandedFields(mjBatch* batch, bool built_in, bool rotors, bool friction, int env) {
-  const auto if_any = [&](bool any, const char* field) {
-    return any ? Expand(batch, field, env) : nullptr;
-  };
-  return {Expand(batch, "body_mass", env),
-          Expand(batch, "body_inertia", env),
-          Expand(batch, "body_ipos", env),
-          Expand(batch, "body_pos", env),
-          Expand(batch, "geom_pos", env),
-          Expand(batch, "geom_size", env),
-          Expand(batch, "dof_damping", env),
-          Expand(batch, "actuator_ctrlrange", env),
-          Expand<int>(batch, "actuator_trnid", env),
-          Expand(batch, "opt.gravity", env),
-          if_any(built_in, "dof_armature"),
-          if_any(rotors, "tendon_armature"),
-          if_any(rotors, "wrap_prm"),
-          if_any(friction, "dof_frictionloss")};
-}
-
 /// A plant whose MJCF has every element that any of these plants needs.
 Plant Superset(const std::vector<Plant>& plants) {
   Plant superset;
@@ -80,9 +50,6 @@ class MuJoCoPhysics : public Physics {
     mjtNum *qpos, *qvel, *ctrl, *push;  // in row 0 of the state table
   };
   Slice MakeSlice(const mjModel& model, int first, int count) const;
-  ModelFields FieldsAt(mjBatch* batch, int row) const {
-    return ExpandedFields(batch, config_.mjcf.empty(), rotors_, dry_friction_, row);
-  }
   const Slice& SliceOf(int env) const { return slices_[static_cast<size_t>(env / slice_size_)]; }
   /// The part of an environment's state that starts at `first` in row 0 of its slice.
   mjtNum* Component(mjtNum* first, int env) const {
@@ -95,10 +62,9 @@ class MuJoCoPhysics : public Physics {
   PhysicsConfig config_;
   int slice_size_;
   std::vector<Slice> slices_;
-  bool rotors_ = false, dry_friction_ = false;  // whether the model has them
-  int substeps_ = 0;                            // physics steps per control period
-  int state_size_ = 0;                          // numbers in a state row
-  std::vector<double> previous_angle_;          // (N) of the motor's joint before the step, rad
+  int substeps_ = 0;                    // physics steps per control period
+  int state_size_ = 0;                  // numbers in a state row
+  std::vector<double> previous_angle_;  // (N) of the motor's joint before the step, rad
 };
 
 MuJoCoPhysics::MuJoCoPhysics(const PhysicsConfig& config)
@@ -109,8 +75,6 @@ MuJoCoPhysics::MuJoCoPhysics(const PhysicsConfig& config)
                              ? CompileModel(Mjcf(Superset(config_.plants)), "model")
                              : LoadModel(config_.mjcf, "model").model;
   WritePlant(config_.plant(0), FieldsOf(*model, config_.mjcf.empty()));
-  rotors_ = HasRotors(*model);
-  dry_friction_ = HasDryFriction(*model);
   // The built-in model has no springs, sensors and islands. Disabled, MuJoCo skips the search.
   if (config_.mjcf.empty()) {
     model->opt.disableflags |= mjDSBL_SPRING | mjDSBL_SENSOR | mjDSBL_ISLAND;
@@ -135,7 +99,7 @@ MuJoCoPhysics::Slice MuJoCoPhysics::MakeSlice(const mjModel& model, int first, i
   if (batch == nullptr) throw Failure(Concat("MuJoCo: ", message.data()));
   if (config_.plants.size() > 1) {
     for (int i = 0; i < count; ++i) {
-      WritePlant(config_.plant(first + i), FieldsAt(batch.get(), i));
+      WritePlant(config_.plant(first + i), FieldsOf(batch.get(), i, config_.mjcf.empty()));
     }
     mjb_setConst(batch.get(), nullptr, 0);
   }
@@ -169,7 +133,7 @@ void MuJoCoPhysics::SetPlant(int env, const Plant& plant) {
   config_.plants[static_cast<size_t>(env)] = plant;
   const Slice& slice = SliceOf(env);
   const int row = env - slice.first;
-  WritePlant(plant, FieldsAt(slice.batch.get(), row));
+  WritePlant(plant, FieldsOf(slice.batch.get(), row, config_.mjcf.empty()));
   mjb_setConst(slice.batch.get(), &row, 1);
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <mutex>
 #include <numbers>
+#include <type_traits>
 
 #include "base/error.h"
 #include "base/text.h"
@@ -12,6 +13,32 @@
 
 namespace upswing {
 namespace {
+
+/// Whether a model has the fields for a plant's rotors, and for its dry friction.
+bool HasRotors(const mjModel& model) { return model.ntendon == 1; }
+bool HasDryFriction(const mjModel& model) { return model.nuser_jnt == 1; }
+
+/// The fields that `field(name, pointer into m)` returns.
+template <typename Model, typename Field>
+ModelFields FieldsBy(Model& m, bool built_in, const Field& field) {
+  const auto if_any = [&](bool any, const char* name, mjtNum* numbers) {
+    return any ? field(name, numbers) : nullptr;
+  };
+  return {field("body_mass", m.body_mass),
+          field("body_inertia", m.body_inertia),
+          field("body_ipos", m.body_ipos),
+          field("body_pos", m.body_pos),
+          field("geom_pos", m.geom_pos),
+          field("geom_size", m.geom_size),
+          field("dof_damping", m.dof_damping),
+          field("actuator_ctrlrange", m.actuator_ctrlrange),
+          field("actuator_trnid", m.actuator_trnid),
+          field("opt.gravity", m.opt.gravity),
+          if_any(built_in, "dof_armature", m.dof_armature),
+          if_any(HasRotors(m), "tendon_armature", m.tendon_armature),
+          if_any(HasRotors(m), "wrap_prm", m.wrap_prm),
+          if_any(HasDryFriction(m), "dof_frictionloss", m.dof_frictionloss)};
+}
 
 /// Adds the dry friction c atan(s w) to models that have it; c is a joint's frictionloss and s its
 /// user data. MuJoCo's own frictionloss is a constraint, which holds at rest and has no slope. As a
@@ -147,26 +174,18 @@ std::vector<std::string> DifferencesFromBuiltIn(const LoadedModel& loaded) {
 }
 
 ModelFields FieldsOf(mjModel& model, bool built_in) {
-  const bool rotors = HasRotors(model);
-  return {model.body_mass,
-          model.body_inertia,
-          model.body_ipos,
-          model.body_pos,
-          model.geom_pos,
-          model.geom_size,
-          model.dof_damping,
-          model.actuator_ctrlrange,
-          model.actuator_trnid,
-          model.opt.gravity,
-          built_in ? model.dof_armature : nullptr,
-          rotors ? model.tendon_armature : nullptr,
-          rotors ? model.wrap_prm : nullptr,
-          HasDryFriction(model) ? model.dof_frictionloss : nullptr};
+  return FieldsBy(model, built_in, [](const char* /*name*/, auto* field) { return field; });
 }
 
-bool HasRotors(const mjModel& model) { return model.ntendon == 1; }
-
-bool HasDryFriction(const mjModel& model) { return model.nuser_jnt == 1; }
+ModelFields FieldsOf(mjBatch* batch, int row, bool built_in) {
+  return FieldsBy(*mjb_model(batch), built_in, [&](const char* name, auto* field) {
+    int size = 0;
+    using Number = std::remove_const_t<std::remove_pointer_t<decltype(field)>>;
+    auto* rows = static_cast<Number*>(mjb_expand(batch, name, &size, nullptr));
+    if (rows == nullptr) throw Failure(Concat("MuJoCo cannot expand ", name));
+    return rows + row * size;
+  });
+}
 
 void WritePlant(const Plant& plant, const ModelFields& fields) {
   const std::array<double, 2> masses{plant.mass1, plant.mass2};

@@ -86,11 +86,10 @@ struct ModelFields {
   mjtNum* wrap_prm;          // (2)
   mjtNum* dof_frictionloss;  // (2)
 };
-/// Whether a model has the fields for a plant's rotors, and for its dry friction.
-bool HasRotors(const mjModel& model);
-bool HasDryFriction(const mjModel& model);
 /// The fields of a model. `built_in`: it is the built-in one, not from a file.
 ModelFields FieldsOf(mjModel& model, bool built_in = true);
+/// The fields of simulation `row` of a batch. Every simulation gets its own. Throws Failure.
+ModelFields FieldsOf(mjBatch* batch, int row, bool built_in);
 
 /// Writes a plant into a loaded model, as if its MJCF had these numbers. The caller then calls
 /// mj_setConst or mjb_setConst. Throws BadInput if the plant has rotors or dry friction and the
