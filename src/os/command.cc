@@ -26,70 +26,46 @@ Error SystemFailure(std::string_view what) {
   return Failure(Concat("cannot ", what, ": ", std::strerror(errno)));
 }
 
-/// A nameless temporary file. Three pipes could block each other; three files cannot.
-class Scratch {
- public:
-  Scratch() : file_(std::tmpfile(), &std::fclose) {
-    if (!file_) throw SystemFailure("make a temporary file");
+using File = std::unique_ptr<FILE, int (*)(FILE*)>;
+
+/// Makes a nameless temporary file with this text. Three pipes could block each other; three files
+/// cannot.
+File Scratch(const std::string& text) {
+  File file(std::tmpfile(), &std::fclose);
+  if (!file) throw SystemFailure("make a temporary file");
+  std::fwrite(text.data(), 1, text.size(), file.get());
+  if (std::fflush(file.get()) != 0 || std::ferror(file.get()) != 0) {
+    throw SystemFailure("write a temporary file");
   }
-  int descriptor() const { return fileno(file_.get()); }
+  std::rewind(file.get());
+  return file;
+}
 
-  /// Writes the text and goes back to the beginning of the file.
-  void Fill(const std::string& text) {
-    std::fwrite(text.data(), 1, text.size(), file_.get());
-    if (std::fflush(file_.get()) != 0 || std::ferror(file_.get()) != 0) {
-      throw SystemFailure("write a temporary file");
-    }
-    std::rewind(file_.get());
-  }
-
-  std::string Read() {
-    std::rewind(file_.get());
-    std::string text;
-    std::array<char, 65536> buffer;
-    while (const size_t got = std::fread(buffer.data(), 1, buffer.size(), file_.get())) {
-      text.append(buffer.data(), got);
-    }
-    return text;
-  }
-
- private:
-  std::unique_ptr<FILE, int (*)(FILE*)> file_;
-};
-
-/// The standard input, output and error of a child process.
-class FileActions {
- public:
-  FileActions() { posix_spawn_file_actions_init(&actions_); }
-  ~FileActions() { posix_spawn_file_actions_destroy(&actions_); }
-  FileActions(const FileActions&) = delete;
-  FileActions& operator=(const FileActions&) = delete;
-  void Give(const Scratch& file, int as) {
-    posix_spawn_file_actions_adddup2(&actions_, file.descriptor(), as);
-  }
-  const posix_spawn_file_actions_t* get() const { return &actions_; }
-
- private:
-  posix_spawn_file_actions_t actions_{};
-};
+std::string ReadAll(const File& file) {
+  std::fseek(file.get(), 0, SEEK_END);
+  std::string text(static_cast<size_t>(std::ftell(file.get())), '\0');
+  std::rewind(file.get());
+  text.resize(std::fread(text.data(), 1, text.size(), file.get()));
+  return text;
+}
 
 }  // namespace
 
 std::optional<CommandResult> RunCommand(std::vector<std::string> words, const std::string& input) {
-  Scratch in, out, errors;
-  in.Fill(input);
-  FileActions actions;
-  actions.Give(in, STDIN_FILENO);
-  actions.Give(out, STDOUT_FILENO);
-  actions.Give(errors, STDERR_FILENO);
-
+  const std::array<File, 3> files{Scratch(input), Scratch(""), Scratch("")};
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  for (int i = 0; i < 3; ++i) {  // standard input, output and error
+    posix_spawn_file_actions_adddup2(&actions, fileno(files.at(i).get()), i);
+  }
   std::vector<char*> arguments;
   arguments.reserve(words.size() + 1);
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
   pid_t child = 0;
   const int error =
-      posix_spawnp(&child, arguments[0], actions.get(), nullptr, arguments.data(), environ);
+      posix_spawnp(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
   if (error == ENOENT) return std::nullopt;
   if (error != 0) throw Failure(Concat("cannot run ", words[0], ": ", std::strerror(error)));
 
@@ -97,7 +73,7 @@ std::optional<CommandResult> RunCommand(std::vector<std::string> words, const st
   while (waitpid(child, &status, 0) < 0) {
     if (errno != EINTR) throw SystemFailure(Concat("wait for ", words[0]));
   }
-  CommandResult result{0, 0, out.Read(), errors.Read()};
+  CommandResult result{0, 0, ReadAll(files[1]), ReadAll(files[2])};
   if (WIFSIGNALED(status)) {
     result.signal = WTERMSIG(status);
   } else {

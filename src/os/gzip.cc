@@ -3,7 +3,7 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <array>
+#include <memory>
 
 #include "base/error.h"
 
@@ -14,55 +14,34 @@ namespace {
 // times. Small texts may do so.
 constexpr size_t kMostRatio = 100, kSmall = 1 << 20;
 
-/// zlib's state for inflating gzip members.
-class Inflater {
- public:
-  explicit Inflater(std::string_view bytes) {
-    stream_.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
-    stream_.avail_in = static_cast<uInt>(bytes.size());
-    constexpr int kGzipOnly = 16;  // expects a header of gzip, not of zlib
-    if (inflateInit2(&stream_, MAX_WBITS + kGzipOnly) != Z_OK) throw Failure("zlib does not work");
-  }
-  ~Inflater() { inflateEnd(&stream_); }
-  Inflater(const Inflater&) = delete;
-  Inflater& operator=(const Inflater&) = delete;
-
-  /// Appends the next piece of text. Returns zlib's status.
-  int Next(std::string& text) {
-    stream_.next_out = reinterpret_cast<Bytef*>(buffer_.data());
-    stream_.avail_out = static_cast<uInt>(buffer_.size());
-    const int status = inflate(&stream_, Z_NO_FLUSH);
-    text.append(buffer_.data(), buffer_.size() - stream_.avail_out);
-    return status;
-  }
-  bool at_end() const { return stream_.avail_in == 0; }
-  void NextMember() { inflateReset(&stream_); }
-
- private:
-  z_stream stream_{};
-  std::array<char, 65536> buffer_{};
-};
-
 }  // namespace
 
 bool IsGzip(std::string_view bytes) { return bytes.starts_with("\x1f\x8b"); }
 
 std::string Gunzip(std::string_view bytes, const std::string& where, size_t most_bytes) {
   most_bytes = std::min(most_bytes, kSmall + kMostRatio * bytes.size());
-  Inflater inflater(bytes);
-  std::string text;
+  z_stream stream{};
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
+  stream.avail_in = static_cast<uInt>(bytes.size());
+  constexpr int kGzipOnly = 16;  // expects a header of gzip, not of zlib
+  if (inflateInit2(&stream, MAX_WBITS + kGzipOnly) != Z_OK) throw Failure("zlib does not work");
+  const std::unique_ptr<z_stream, int (*)(z_stream*)> inflating(&stream, &inflateEnd);
+  std::string text, piece(65536, '\0');
   while (true) {
-    const int status = inflater.Next(text);
+    stream.next_out = reinterpret_cast<Bytef*>(piece.data());
+    stream.avail_out = static_cast<uInt>(piece.size());
+    const int status = inflate(&stream, Z_NO_FLUSH);
+    text.append(piece, 0, piece.size() - stream.avail_out);
     if (text.size() > most_bytes) {
       throw BadInput(Concat("cannot read ", where, ": expected at most ", most_bytes,
                             " bytes after decompression, got more"));
     }
     if (status == Z_STREAM_END) {
-      if (inflater.at_end()) return text;
-      inflater.NextMember();
+      if (stream.avail_in == 0) return text;
+      inflateReset(&stream);
     } else if (status != Z_OK) {
       throw BadInput(Concat("cannot read ", where, ": expected a gzip file, got ",
-                            inflater.at_end() ? "only its beginning" : "a damaged one"));
+                            stream.avail_in == 0 ? "only its beginning" : "a damaged one"));
     }
   }
 }

@@ -3,7 +3,6 @@
 #include <dirent.h>
 #include <fcntl.h>
 #include <sys/file.h>
-#include <sys/random.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -12,6 +11,7 @@
 #include <cstdio>
 #include <ctime>
 #include <memory>
+#include <random>
 #include <utility>
 
 #include "base/checksum.h"
@@ -26,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view kMark = ".making-";
-constexpr size_t kDigits = 16, kHostDigits = 8;
+constexpr int kDigits = 16, kHostDigits = 8;
 constexpr int kMostTries = 100;  // one try is enough unless another process interferes
 // A file or folder of another host without a change for this long is abandoned. Its lock tells
 // nothing: on NFS and others, only the own host knows a folder's lock.
@@ -41,7 +41,8 @@ std::string HostDigits() {
 
 /// A temporary name for `name`.
 std::string MakingName(std::string_view name) {
-  return Concat('.', name, kMark, HostDigits(), RandomDigits().substr(kHostDigits));
+  const auto random = HexDigits(std::random_device()(), kDigits - kHostDigits);
+  return Concat('.', name, kMark, HostDigits(), random);
 }
 
 /// Whether a temporary name belongs to this host.
@@ -66,14 +67,6 @@ bool HasName(const Descriptor& fd) {
 }
 
 }  // namespace
-
-std::string RandomDigits() {
-  uint64_t number = 0;
-  if (getrandom(&number, sizeof(number), 0) != sizeof(number)) {
-    throw Failure("the system gives no random numbers");
-  }
-  return HexDigits(number, kDigits);
-}
 
 Descriptor::~Descriptor() {
   if (fd_ >= 0) close(fd_);

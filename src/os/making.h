@@ -19,9 +19,6 @@ class Descriptor {
   int fd_;
 };
 
-/// 16 random hexadecimal digits, for a name that no other process uses.
-std::string RandomDigits();
-
 /// A file or folder under construction. It appears under its name complete or not at all.
 ///
 /// Until then it is locked and has the name `.NAME.making-` plus 16 hexadecimal digits, 8 of this
