@@ -80,15 +80,6 @@ NetworkShape ShapeFromJson(const Tensors& file, const std::string& key, ActionRu
   }
 }
 
-/// Makes the network of a file. Throws BadInput if a size is invalid.
-Network NetworkOf(const NetworkShape& shape, const std::string& where) {
-  try {
-    return Network(shape);
-  } catch (const Error& error) {
-    throw BadInput(Concat(where, ": ", error.what()));
-  }
-}
-
 // ---- Tensors.
 
 /// Reads a tensor of this shape and checks that its numbers are finite. Throws BadInput.
@@ -244,6 +235,37 @@ ActionRule RuleOf(const Tensors& file) {
                         "\""));
 }
 
+/// Reads the networks, torques and limits of a policy file. Throws BadInput, about a network's
+/// sizes without the file's name.
+NetworkPolicyParts ReadParts(const Tensors& file) {
+  NetworkPolicyParts parts;
+  parts.rule = RuleOf(file);
+  int outputs = 0;
+  if (parts.rule != ActionRule::kLevels) {
+    parts.action_limit = ReadVector(file, "action_limit");
+    if (!std::ranges::all_of(parts.action_limit, [](double limit) { return limit > 0; })) {
+      throw BadInput(Concat(file.where(), ": tensor \"action_limit\": expected numbers above 0"));
+    }
+    if (parts.rule == ActionRule::kCategorical) parts.torques = ReadVector(file, "torques");
+    outputs = static_cast<int>(parts.torques.empty() ? 2 * parts.action_limit.size()
+                                                     : parts.torques.size());
+  }
+  parts.shape = ShapeFromJson(file, "network", parts.rule, outputs);
+  if (parts.rule == ActionRule::kLevels) {
+    parts.torques = ReadFinite<double>(file, "torques", {parts.shape.outputs});
+  }
+  const Network network(parts.shape);
+  ExpectParameters(file, "", network);
+  if (parts.rule != ActionRule::kLevels && file.metadata.contains("critic")) {
+    parts.critic = ShapeFromJson(file, "critic", parts.rule, 1);
+    const Network critic(parts.critic);
+    ExpectParameters(file, kCriticPrefix, critic);
+    parts.critic_parameters = ReadParameters(file, kCriticPrefix, critic);
+  }
+  parts.parameters = ReadParameters(file, "", network);
+  return parts;
+}
+
 }  // namespace
 
 std::string NameOf(ActionRule rule) {
@@ -278,33 +300,8 @@ Tensors NetworkPolicy::ToTensors() const {
 
 NetworkPolicy NetworkPolicy::From(const Tensors& file) {
   const std::string& where = file.where();
-  NetworkPolicyParts parts;
-  parts.rule = RuleOf(file);
-  int outputs = 0;
-  if (parts.rule != ActionRule::kLevels) {
-    parts.action_limit = ReadVector(file, "action_limit");
-    if (!std::ranges::all_of(parts.action_limit, [](double limit) { return limit > 0; })) {
-      throw BadInput(Concat(where, ": tensor \"action_limit\": expected numbers above 0"));
-    }
-    if (parts.rule == ActionRule::kCategorical) parts.torques = ReadVector(file, "torques");
-    outputs = static_cast<int>(parts.torques.empty() ? 2 * parts.action_limit.size()
-                                                     : parts.torques.size());
-  }
-  parts.shape = ShapeFromJson(file, "network", parts.rule, outputs);
-  if (parts.rule == ActionRule::kLevels) {
-    parts.torques = ReadFinite<double>(file, "torques", {parts.shape.outputs});
-  }
-  const Network network = NetworkOf(parts.shape, where);
-  ExpectParameters(file, "", network);
-  if (parts.rule != ActionRule::kLevels && file.metadata.contains("critic")) {
-    parts.critic = ShapeFromJson(file, "critic", parts.rule, 1);
-    const Network critic = NetworkOf(parts.critic, where);
-    ExpectParameters(file, kCriticPrefix, critic);
-    parts.critic_parameters = ReadParameters(file, kCriticPrefix, critic);
-  }
-  parts.parameters = ReadParameters(file, "", network);
   try {
-    NetworkPolicy policy(std::move(parts), ParsePolicyInfo(file.metadata, where));
+    NetworkPolicy policy(ReadParts(file), ParsePolicyInfo(file.metadata, where));
     policy.CheckSamples(file);
     return policy;
   } catch (const Error& error) {
