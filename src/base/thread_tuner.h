@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <functional>
 #include <vector>
 
@@ -27,31 +26,24 @@ class ThreadTuner {
     End();
   }
 
-  /// Number of threads on which the work runs now.
-  int threads() const;
+  /// Number of threads on which the work runs between trials.
+  int threads() const { return choices_[chosen_]; }
 
  private:
   void Begin();
   void End();
-  /// Compares a timed block on the chosen number of threads with a timed block on the candidate
-  /// number.
-  void Compare();
-  /// Moves to the next candidate, or ends the trial.
-  void NextCandidate();
+  /// Index in choices_ of the number that the current block of a trial takes.
+  size_t candidate() const;
 
   ThreadPool* pool_;  // null if there is no choice
   std::function<double()> clock_;
-  std::vector<int> choices_;  // 1, 2, 4, … threads
-  size_t chosen_ = 0;         // index in choices_ of the number in use
-  size_t candidate_ = 0;  // index in choices_ under trial; equal to chosen_ if no trial is running
-  /// Whether the trial is testing more threads; it tests fewer threads afterwards.
-  bool upwards_ = true;
-  int calls_ = 0;                       // calls in the current block
-  std::array<double, 2> seconds_ = {};  // (chosen, candidate) time in this round
-  std::vector<double> ratios_;          // candidate time over chosen time, one per round
-  double trial_seconds_ = 0;            // time that this trial has taken, s
-  double until_trial_ = 0;              // seconds of work before the next trial
-  double begin_ = 0;                    // start of the current call, s
+  std::vector<int> choices_{1};  // 1, 2, 4, … threads
+  size_t chosen_ = 0;            // index in choices_
+  double until_trial_ = 0;       // seconds of work before the next trial; at most 0 in a trial
+  int calls_ = 0;                // calls in this trial
+  double trial_seconds_ = 0, block_seconds_ = 0;
+  std::vector<double> fastest_;  // seconds of the fastest block of this trial on each of choices_
+  double begin_ = 0;             // start of the current call, s
 };
 
 }  // namespace upswing
