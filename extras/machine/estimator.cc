@@ -6,8 +6,6 @@
 #include <cmath>
 #include <string_view>
 
-#include "pendulum/friction.h"
-
 namespace upswing::machine {
 namespace {
 

@@ -6,7 +6,6 @@
 
 #include "base/error.h"
 #include "pendulum/equations.h"
-#include "pendulum/friction.h"
 
 // Symbols: those of Manipulator; z zeros of the encoders, k1 = G1 z1, k2 = G2 (z1 + z2).
 namespace upswing::machine {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pendulum/friction.h"
 #include "pendulum/runge_kutta.h"
 
 namespace upswing::machine {

@@ -18,7 +18,6 @@
 #include "extras/machine/identify.h"
 #include "extras/machine/testing.h"
 #include "extras/realaigym/machine_trials.h"
-#include "pendulum/friction.h"
 
 namespace upswing::realaigym {
 namespace {

@@ -7,8 +7,6 @@
 #include <numbers>
 #include <vector>
 
-#include "pendulum/friction.h"
-
 namespace upswing::realaigym {
 namespace {
 

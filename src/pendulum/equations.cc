@@ -4,8 +4,6 @@
 
 #include <cmath>
 
-#include "pendulum/friction.h"
-
 namespace upswing {
 
 ManipulatorTerms Manipulator::At(const PendulumState& s) const {

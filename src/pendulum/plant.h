@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
@@ -70,6 +71,9 @@ std::array<Link, 2> LinksOf(const Plant& plant);
 
 /// Armature of joint 1, with the rotor of its motor, kg·m².
 double Armature1(const Plant& plant);
+
+/// Torque (N·m) of the dry friction f (N·m) against a velocity w (rad/s): f atan(100 w).
+inline double DryFriction(double f, double w) { return f * std::atan(kFrictionSlope * w); }
 
 /// State of the two joints.
 struct PendulumState {
