@@ -5,46 +5,56 @@
 
 namespace upswing {
 
+namespace {
+
+constexpr Range kMass{0.01, 100}, kLength{0.1, 10}, kDamping{0, 100}, kCoulomb{0, 10};
+constexpr Range kCenter{0, 10}, kInertia{0, 10000};
+
+}  // namespace
+
+const std::array<PlantParameter, 18> kPlantParameters{{
+    {"mass1", &Plant::mass1, kMass, "kg", "mass of link 1"},
+    {"mass2", &Plant::mass2, kMass, "kg", "mass of link 2"},
+    {"length1", &Plant::length1, kLength, "m", "length of link 1"},
+    {"length2", &Plant::length2, kLength, "m", "length of link 2"},
+    {"damping1", &Plant::damping1, kDamping, "N·m·s/rad", "damping of joint 1"},
+    {"damping2", &Plant::damping2, kDamping, "N·m·s/rad", "damping of joint 2"},
+    {"gravity", &Plant::gravity, {0.01, 100}, "m/s²", "downward gravity"},
+    {"torque_limit", &Plant::torque_limit, {0.01, 1000}, "N·m", "largest torque of the motor"},
+    {"actuated_joint",
+     &Plant::actuated_joint,
+     {1, 2},
+     "",
+     "joint that the motor drives; 1: pendubot, 2: acrobot"},
+    {"rotor_inertia",
+     &Plant::rotor_inertia,
+     {0, 1},
+     "kg·m²",
+     "rotor inertia of each joint's motor"},
+    {"gear_ratio", &Plant::gear_ratio, {0, 1000}, "", "gear ratio: rotor turns per joint turn"},
+    {"coulomb1", &Plant::coulomb1, kCoulomb, "N·m",
+     "dry friction of joint 1: c in c·atan(100 w), w the joint's velocity"},
+    {"coulomb2", &Plant::coulomb2, kCoulomb, "N·m",
+     "dry friction of joint 2: c in c·atan(100 w), w the joint's velocity"},
+    {"center1", &Plant::center1, kCenter, "m",
+     "distance from joint 1 to the centre of mass of link 1; 0: half of length1"},
+    {"center2", &Plant::center2, kCenter, "m",
+     "distance from joint 2 to the centre of mass of link 2; 0: half of length2"},
+    {"inertia1", &Plant::inertia1, kInertia, "kg·m²",
+     "moment of inertia of link 1 about its centre of mass; 0: that of a solid capsule"},
+    {"inertia2", &Plant::inertia2, kInertia, "kg·m²",
+     "moment of inertia of link 2 about its centre of mass; 0: that of a solid capsule"},
+    {"armature", &Plant::armature, {0, 10}, "kg·m²", "armature of each joint, without rotors"},
+}};
+
 void Plant::Describe(Options& o) {
-  constexpr Range kMass{0.01, 100}, kLength{0.1, 10}, kDamping{0, 100};
   o.Section("plant");
-  o.Add(&mass1, "mass1", kMass, "kg", "mass of link 1");
-  o.Add(&mass2, "mass2", kMass, "kg", "mass of link 2");
-  o.Add(&length1, "length1", kLength, "m", "length of link 1");
-  o.Add(&length2, "length2", kLength, "m", "length of link 2");
-  o.Add(&damping1, "damping1", kDamping, "N·m·s/rad", "damping of joint 1");
-  o.Add(&damping2, "damping2", kDamping, "N·m·s/rad", "damping of joint 2");
-  o.Add(&gravity, "gravity", {0.01, 100}, "m/s²", "downward gravity");
-  o.Add(&torque_limit, "torque_limit", {0.01, 1000}, "N·m", "largest torque of the motor");
-  Option& joint = o.Add(&actuated_joint, "actuated_joint", {1, 2}, "",
-                        "joint that the motor drives; 1: pendubot, 2: acrobot");
-  joint.step = 1;
-  joint.implied = true;
-  o.Add(&rotor_inertia, "rotor_inertia", {0, 1}, "kg·m²", "rotor inertia of each joint's motor")
-      .implied = true;
-  o.Add(&gear_ratio, "gear_ratio", {0, 1000}, "", "gear ratio: rotor turns per joint turn")
-      .implied = true;
-  o.Add(&coulomb1, "coulomb1", {0, 10}, "N·m",
-        "dry friction of joint 1: c in c·atan(100 w), w the joint's velocity")
-      .implied = true;
-  o.Add(&coulomb2, "coulomb2", {0, 10}, "N·m",
-        "dry friction of joint 2: c in c·atan(100 w), w the joint's velocity")
-      .implied = true;
-  constexpr Range kCenter{0, 10}, kInertia{0, 10000};
-  o.Add(&center1, "center1", kCenter, "m",
-        "distance from joint 1 to the centre of mass of link 1; 0: half of length1")
-      .implied = true;
-  o.Add(&center2, "center2", kCenter, "m",
-        "distance from joint 2 to the centre of mass of link 2; 0: half of length2")
-      .implied = true;
-  o.Add(&inertia1, "inertia1", kInertia, "kg·m²",
-        "moment of inertia of link 1 about its centre of mass; 0: that of a solid capsule")
-      .implied = true;
-  o.Add(&inertia2, "inertia2", kInertia, "kg·m²",
-        "moment of inertia of link 2 about its centre of mass; 0: that of a solid capsule")
-      .implied = true;
-  o.Add(&armature, "armature", {0, 10}, "kg·m²", "armature of each joint, without rotors").implied =
-      true;
+  for (size_t k = 0; k < kPlantParameters.size(); ++k) {
+    const auto& [name, value, range, unit, help] = kPlantParameters.at(k);
+    Option& option = o.Add(&(this->*value), name, range, unit, help);
+    option.implied = k >= kMainParameters;
+    if (value == &Plant::actuated_joint) option.step = 1;
+  }
   o.Alias("mass", {"mass1", "mass2"});
   o.Alias("length", {"length1", "length2"});
   o.Alias("damping", {"damping1", "damping2"});

@@ -48,6 +48,17 @@ struct Plant {
   }
 };
 
+/// A parameter of the plant as a setting.
+struct PlantParameter {
+  const char* name;
+  double Plant::*value;
+  Range range;
+  const char *unit, *help;
+};
+/// All parameters. Files of every version have the first kMainParameters.
+extern const std::array<PlantParameter, 18> kPlantParameters;
+inline constexpr size_t kMainParameters = 8;
+
 /// Name and value of each parameter of the plant. Parameters that a file may lack (Option::implied)
 /// are left out at their defaults.
 std::vector<std::pair<std::string, double>> PlantValues(const Plant& plant);

@@ -15,17 +15,9 @@ constexpr double kRounding = 1e-6;  // of a correlation
 constexpr double kSmallestLink = 1e-5;
 constexpr std::string_view kLatency = "sensor_latency";
 
-/// A parameter of the plant that identification can find.
-struct UncertainParameter {
-  const char* name;
-  double Plant::*value;
-};
-constexpr UncertainParameter kUncertain[] = {
-    {"mass1", &Plant::mass1},       {"mass2", &Plant::mass2},       {"length1", &Plant::length1},
-    {"length2", &Plant::length2},   {"damping1", &Plant::damping1}, {"damping2", &Plant::damping2},
-    {"gravity", &Plant::gravity},   {"coulomb1", &Plant::coulomb1}, {"coulomb2", &Plant::coulomb2},
-    {"center1", &Plant::center1},   {"center2", &Plant::center2},   {"inertia1", &Plant::inertia1},
-    {"inertia2", &Plant::inertia2}, {"armature", &Plant::armature}};
+// Parameters of the plant that identification cannot find.
+constexpr std::string_view kCertain[] = {"torque_limit", "actuated_joint", "rotor_inertia",
+                                         "gear_ratio"};
 
 /// The words of a row; several blanks count as one.
 std::vector<std::string_view> WordsOf(std::string_view row) {
@@ -65,9 +57,9 @@ Range UncertainRange(const Option& option) {
 }
 
 bool Posterior::Knows(std::string_view name) {
-  return name == kLatency || std::ranges::any_of(kUncertain, [&](const UncertainParameter& p) {
-           return p.name == name;
-         });
+  const auto same = [&](const PlantParameter& parameter) { return parameter.name == name; };
+  return name == kLatency ||
+         (std::ranges::any_of(kPlantParameters, same) && std::ranges::count(kCertain, name) == 0);
 }
 
 std::string Posterior::Text(const std::vector<std::string>& names,
@@ -109,8 +101,8 @@ Posterior Posterior::Parse(std::string_view text, const std::string& where) {
     if (!L) throw BadInput(Concat(where, ": expected a positive matrix, got another one"));
     posterior.rows_.push_back(std::move(*L));
     Value value{nullptr, UncertainRange(*options.Get(name))};
-    for (const UncertainParameter& p : kUncertain) {
-      if (p.name == name) value.of_plant = p.value;
+    for (const PlantParameter& parameter : kPlantParameters) {
+      if (parameter.name == name) value.of_plant = parameter.value;
     }
     posterior.values_.push_back(value);
   }

@@ -5,26 +5,11 @@
 #include "base/error.h"
 
 namespace upswing {
-namespace {
-
-/// A parameter of the plant that may be random.
-struct Parameter {
-  const char* name;
-  double Plant::*value;
-};
-constexpr Parameter kParameters[] = {
-    {"mass1", &Plant::mass1},       {"mass2", &Plant::mass2},
-    {"length1", &Plant::length1},   {"length2", &Plant::length2},
-    {"damping1", &Plant::damping1}, {"damping2", &Plant::damping2},
-    {"gravity", &Plant::gravity},   {"torque_limit", &Plant::torque_limit}};
-
-}  // namespace
-
 void Randomization::Describe(Options& o) {
   constexpr Range kRelative{0, 0.99};  // drawn values stay positive
   o.Section("randomize");
   for (size_t k = 0; k < plant.size(); ++k) {
-    const std::string name = kParameters[k].name;
+    const std::string name = kPlantParameters.at(k).name;
     o.Add(&plant[k], "randomize_" + name, kRelative, "",
           "draw " + name + " for each episode within ± this share of its nominal value");
   }
@@ -72,7 +57,7 @@ std::optional<Posterior> Randomization::MakePosterior() const {
 Plant Randomization::Draw(const Plant& nominal, Rng& rng) const {
   Plant drawn = nominal;
   for (size_t k = 0; k < plant.size(); ++k) {
-    drawn.*kParameters[k].value *= 1 + rng.Uniform(-plant[k], plant[k]);
+    drawn.*kPlantParameters.at(k).value *= 1 + rng.Uniform(-plant[k], plant[k]);
   }
   return drawn;
 }

@@ -15,8 +15,9 @@ namespace upswing {
 /// Domain randomisation: how far the plant, sensors and motor of each episode may be from the
 /// nominal ones; zeros: no randomisation.
 struct Randomization {
-  /// Half-widths relative to the nominal value, in the order of Plant: 0.25 stands for ±25%.
-  std::array<double, 8> plant{};
+  /// Half-widths relative to the nominal value, in the order of kPlantParameters: 0.25 stands for
+  /// ±25%.
+  std::array<double, kMainParameters> plant{};
   double sensor_noise = 0;      // largest addition to the nominal noise, rad, rad/s
   double delay = 0;             // largest addition to the delay, s
   double sensor_latency = 0;    // largest addition to the sensor latency, s
