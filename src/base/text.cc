@@ -10,6 +10,8 @@
 namespace upswing {
 namespace {
 
+constexpr std::string_view kBlanks = " \t\r\n";
+
 /// Levenshtein distance: number of insertions, deletions and substitutions that turn `a` into `b`.
 size_t EditDistance(std::string_view a, std::string_view b) {
   std::vector<size_t> row(b.size() + 1);
@@ -103,25 +105,12 @@ std::string Initials(std::string_view name) {
 
 }  // namespace
 
-std::string_view Piece::Write(int64_t number) {
-  return {digits_.data(), std::to_chars(digits_.begin(), digits_.end(), number).ptr};
-}
-
-std::string_view Piece::Write(uint64_t number) {
-  return {digits_.data(), std::to_chars(digits_.begin(), digits_.end(), number).ptr};
-}
-
-std::string_view Piece::Write(double number) {
+void AddTo(std::string& text, double part) {
   constexpr int kDigits = 6;
-  const auto [end, error] = std::to_chars(digits_.data(), digits_.data() + digits_.size(), number,
-                                          std::chars_format::general, kDigits);
-  return {digits_.data(), end};
-}
-
-std::string ConcatPieces(std::initializer_list<Piece> pieces) {
-  std::string all;
-  for (const Piece& piece : pieces) all += piece.text();
-  return all;
+  std::array<char, 24> digits;
+  text.append(
+      digits.data(),
+      std::to_chars(digits.begin(), digits.end(), part, std::chars_format::general, kDigits).ptr);
 }
 
 std::string FormatNumber(double value) {
@@ -149,10 +138,9 @@ std::optional<int64_t> ParseInteger(std::string_view text) {
 }
 
 std::string_view Trim(std::string_view text) {
-  constexpr std::string_view kBlank = " \t\r\n";
-  const size_t first = text.find_first_not_of(kBlank);
+  const size_t first = text.find_first_not_of(kBlanks);
   if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
+  return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
 }
 
 std::vector<std::string_view> Split(std::string_view text, char separator) {
@@ -163,6 +151,16 @@ std::vector<std::string_view> Split(std::string_view text, char separator) {
     if (at == std::string_view::npos) return pieces;
     text.remove_prefix(at + 1);
   }
+}
+
+std::vector<std::string> Words(std::string_view text) {
+  std::vector<std::string> words;
+  for (size_t at = 0; (at = text.find_first_not_of(kBlanks, at)) != std::string_view::npos;) {
+    const size_t end = std::min(text.find_first_of(kBlanks, at), text.size());
+    words.emplace_back(text.substr(at, end - at));
+    at = end;
+  }
+  return words;
 }
 
 std::string_view TakeLine(std::string_view& rest) {
@@ -208,8 +206,7 @@ size_t Columns(std::string_view text) {
 std::string WrapText(std::string_view text, size_t columns, size_t indent) {
   std::string wrapped;
   size_t column = indent;  // current length of the line
-  for (const std::string_view word : Split(text, ' ')) {
-    if (word.empty()) continue;
+  for (const std::string& word : Words(text)) {
     const bool is_first = column == indent;
     if (!is_first && column + 1 + Columns(word) > columns) {
       wrapped += '\n' + std::string(indent, ' ');

@@ -1,10 +1,8 @@
 #pragma once
 
-#include <array>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
-#include <initializer_list>
 #include <optional>
 #include <span>
 #include <string>
@@ -13,34 +11,18 @@
 
 namespace upswing {
 
-/// An argument of Concat, as text.
-class Piece {
- public:
-  explicit Piece(std::string_view text) : text_(text) {}
-  explicit Piece(char character) : digits_{character}, text_(digits_.data(), 1) {}
-  explicit Piece(std::signed_integral auto number) : text_(Write(int64_t{number})) {}
-  explicit Piece(std::unsigned_integral auto number) : text_(Write(uint64_t{number})) {}
-  explicit Piece(double number) : text_(Write(number)) {}
-  Piece(const Piece&) = delete;  // text_ may point to digits_
-  Piece& operator=(const Piece&) = delete;
-
-  std::string_view text() const { return text_; }
-
- private:
-  std::string_view Write(int64_t number);
-  std::string_view Write(uint64_t number);
-  std::string_view Write(double number);
-
-  std::array<char, 24> digits_;
-  std::string_view text_;
-};
-
-std::string ConcatPieces(std::initializer_list<Piece> pieces);
+/// Adds an argument of Concat to a text.
+inline void AddTo(std::string& text, std::string_view part) { text += part; }
+inline void AddTo(std::string& text, char part) { text += part; }
+inline void AddTo(std::string& text, std::integral auto part) { text += std::to_string(part); }
+void AddTo(std::string& text, double part);
 
 /// Joins its arguments into one string. Numbers have six digits.
 template <typename... Parts>
 std::string Concat(const Parts&... parts) {
-  return ConcatPieces({Piece(parts)...});
+  std::string text;
+  (AddTo(text, parts), ...);
+  return text;
 }
 
 /// The bytes of a string.
@@ -60,6 +42,9 @@ std::string_view Trim(std::string_view text);
 
 /// Splits `text` at the separators and trims each piece; "a,,b" has three pieces.
 std::vector<std::string_view> Split(std::string_view text, char separator);
+
+/// The words of `text`, which blanks and line ends separate.
+std::vector<std::string> Words(std::string_view text);
 
 /// Takes the first line off the rest of a text. Returns it trimmed.
 std::string_view TakeLine(std::string_view& rest);

@@ -83,18 +83,6 @@ constexpr std::string_view kKeywords =
     "Newton dense sparse pyramidal elliptic hinge slide ball free capsule sphere ellipsoid "
     "cylinder box plane none fixed affine";
 
-/// The words of `text`, separated by whitespace.
-std::vector<std::string> Words(std::string_view text) {
-  constexpr std::string_view kBlanks = " \t\n\r";
-  std::vector<std::string> words;
-  for (size_t at = 0; (at = text.find_first_not_of(kBlanks, at)) != std::string_view::npos;) {
-    const size_t end = std::min(text.find_first_of(kBlanks, at), text.size());
-    words.emplace_back(text.substr(at, end - at));
-    at = end;
-  }
-  return words;
-}
-
 /// `text` in quotes, cut if it is long.
 std::string Quoted(std::string_view text) {
   constexpr size_t kMostShown = 40;

@@ -19,13 +19,6 @@ constexpr std::string_view kLatency = "sensor_latency";
 constexpr std::string_view kCertain[] = {"torque_limit", "actuated_joint", "rotor_inertia",
                                          "gear_ratio"};
 
-/// The words of a row; several blanks count as one.
-std::vector<std::string_view> WordsOf(std::string_view row) {
-  std::vector<std::string_view> words = Split(row, ' ');
-  std::erase(words, std::string_view());
-  return words;
-}
-
 /// Row `covariance` of the Cholesky factor L, after the given rows of L; nothing if the matrix is
 /// not positive. A value without variance has a row of zeros.
 std::optional<std::vector<double>> FactorRow(const std::vector<double>& covariance,
@@ -79,18 +72,18 @@ Posterior Posterior::Parse(std::string_view text, const std::string& where) {
   const Plant plant;
   Options options = OptionsOf(plant);
   options.AddMissing(OptionsOf(disturbance));
-  std::vector<std::string_view> names;
+  std::vector<std::string> names;
   for (const std::string_view row : Split(text, ';')) {
-    const std::vector<std::string_view> words = WordsOf(row);
+    const std::vector<std::string> words = Words(row);
     const size_t n = posterior.rows_.size() + 1;
-    const std::string_view name = words.empty() ? "" : words.front();
+    const std::string name = words.empty() ? "" : words.front();
     if (!Knows(name) || std::ranges::find(names, name) != names.end()) {
       throw BadInput(Concat(where, ": expected rows with different values of a machine, got \"",
                             Printable(name), "\""));
     }
     names.push_back(name);
     std::vector<double> covariance;
-    for (const std::string_view word : std::span(words).subspan(1)) {
+    for (const std::string& word : std::span(words).subspan(1)) {
       const std::optional<double> number = ParseNumber(word);
       if (number && std::isfinite(*number)) covariance.push_back(*number);
     }
