@@ -209,7 +209,7 @@ void PrintComparison(const Comparison& comparison) {
   for (const AgainstPolicy& against : comparison.against) PrintAgainst(comparison, against);
   for (const std::string& note : comparison.notes) fmt::print("Note: {}\n", Printable(note));
   const bool fewer = std::ranges::any_of(comparison.groups, [](const RunGroup& group) {
-    return ResamplesOf({std::vector<double>(group.runs.size())}) < kResamples;
+    return ResamplesOf(std::ssize(group.runs)) < kResamples;
   });
   fmt::print(
       "Intervals: Wilson for shares, Newcombe if all pairs of runs agree, else percentile "

@@ -8,44 +8,14 @@
 namespace upswing {
 namespace {
 
-/// Scores of all tasks together.
-std::vector<double> Pooled(std::span<const std::vector<double>> strata) {
-  std::vector<double> pooled;
-  for (const std::vector<double>& stratum : strata) {
-    pooled.insert(pooled.end(), stratum.begin(), stratum.end());
-  }
-  return pooled;
-}
-
 constexpr double kZ95 = 1.959963984540054;  // 97.5% quantile of the standard normal
 
-/// Variance of the mean of U / (m n) over the tasks, if the probability is p on each task. This is
-/// the variance of Hanley and McNeil (1982) for exponentially distributed scores. (m + n) / 2 - 1
-/// replaces both m - 1 and n - 1 (Newcombe, 2006).
-double ImprovementVariance(double p, const Strata& x, const Strata& y) {
-  double sum = 0;
-  for (size_t task = 0; task < x.size(); ++task) {
-    const auto m = static_cast<double>(x[task].size());
-    const auto n = static_cast<double>(y[task].size());
-    const double others = (m + n) / 2 - 1;
-    sum += p * (1 - p) * (1 + others * ((1 - p) / (2 - p) + p / (1 + p))) / (m * n);
-  }
-  const auto tasks = static_cast<double>(x.size());
-  return sum / (tasks * tasks);
-}
-
-/// Estimates a statistic of two agents. The resamples of their strata are independent.
-Estimate EstimateOfTwo(const Strata& x, const Strata& y,
-                       const std::function<double(std::span<const std::vector<double>>,
-                                                  std::span<const std::vector<double>>)>& figure,
-                       int64_t resamples) {
-  Strata both = x;
-  both.insert(both.end(), y.begin(), y.end());
-  const auto statistic = [&](const Strata& strata) {
-    const std::span<const std::vector<double>> all = strata;
-    return figure(all.first(x.size()), all.subspan(x.size()));
-  };
-  return {statistic(both), BootstrapInterval(both, statistic, resamples)};
+/// Variance of U / (m n) if the probability is p: that of Hanley and McNeil (1982) for
+/// exponentially distributed scores. (m + n) / 2 - 1 replaces both m - 1 and n - 1 (Newcombe,
+/// 2006).
+double ImprovementVariance(double p, double m, double n) {
+  const double others = (m + n) / 2 - 1;
+  return p * (1 - p) * (1 + others * ((1 - p) / (2 - p) + p / (1 + p))) / (m * n);
 }
 
 /// Draws as many scores as `sorted` has, with replacement, and keeps them sorted.
@@ -77,10 +47,8 @@ std::vector<double> Sorted(std::span<const double> values) {
 
 }  // namespace
 
-int64_t ResamplesOf(const Strata& strata, int64_t most) {
+int64_t ResamplesOf(int64_t scores, int64_t most) {
   constexpr int64_t kMany = 1000;
-  int64_t scores = 0;
-  for (const std::vector<double>& stratum : strata) scores += std::ssize(stratum);
   return most * kMany / std::max(kMany, scores);
 }
 
@@ -107,13 +75,15 @@ double ProbabilityOfImprovement(std::span<const double> x, std::span<const doubl
 std::optional<Interval> BootstrapInterval(Strata strata,
                                           const std::function<double(const Strata&)>& statistic,
                                           int64_t resamples) {
+  int64_t scores = 0;
   for (std::vector<double>& stratum : strata) {
     if (stratum.size() < 2) return std::nullopt;
     std::ranges::sort(stratum);
+    scores += std::ssize(stratum);
   }
   Rng rng(0, "bootstrap");
   Strata resample = strata;
-  std::vector<double> values(static_cast<size_t>(ResamplesOf(strata, resamples)));
+  std::vector<double> values(static_cast<size_t>(ResamplesOf(scores, resamples)));
   for (double& value : values) {
     for (size_t s = 0; s < strata.size(); ++s) Resample(strata[s], rng, resample[s]);
     value = statistic(resample);
@@ -124,10 +94,11 @@ std::optional<Interval> BootstrapInterval(Strata strata,
   return interval;
 }
 
-Interval ImprovementScoreInterval(double estimate, const Strata& x, const Strata& y) {
+Interval ImprovementScoreInterval(double estimate, size_t m, size_t n) {
   const auto inside = [&](double p) {
     const double off = estimate - p;
-    return off * off <= kZ95 * kZ95 * ImprovementVariance(p, x, y);
+    const double variance = ImprovementVariance(p, static_cast<double>(m), static_cast<double>(n));
+    return off * off <= kZ95 * kZ95 * variance;
   };
   // The last p inside the interval on the way from the estimate to `end`, by bisection to the last
   // digit.
@@ -142,30 +113,23 @@ Interval ImprovementScoreInterval(double estimate, const Strata& x, const Strata
   return {farthest(0), farthest(1)};
 }
 
-Estimate EstimateIqm(const Strata& scores, int64_t resamples) {
-  const auto iqm = [](const Strata& strata) { return InterquartileMean(Pooled(strata)); };
-  return {iqm(scores), BootstrapInterval(scores, iqm, resamples)};
+Estimate EstimateIqm(const std::vector<double>& scores, int64_t resamples) {
+  const auto iqm = [](const Strata& s) { return InterquartileMean(s[0]); };
+  return {InterquartileMean(scores), BootstrapInterval({scores}, iqm, resamples)};
 }
 
-Estimate EstimateIqmDifference(const Strata& x, const Strata& y, int64_t resamples) {
-  const auto difference = [](auto a, auto b) {
-    return InterquartileMean(Pooled(a)) - InterquartileMean(Pooled(b));
+Estimate EstimateIqmDifference(const std::vector<double>& x, const std::vector<double>& y) {
+  const auto difference = [](const Strata& s) {
+    return InterquartileMean(s[0]) - InterquartileMean(s[1]);
   };
-  return EstimateOfTwo(x, y, difference, resamples);
+  return {difference({x, y}), BootstrapInterval({x, y}, difference)};
 }
 
-Estimate EstimateImprovement(const Strata& x, const Strata& y, int64_t resamples) {
-  const auto mean_probability = [](auto a, auto b) {
-    double sum = 0;
-    for (size_t task = 0; task < a.size(); ++task) {
-      sum += ProbabilityOfImprovement(a[task], b[task]);
-    }
-    return sum / static_cast<double>(a.size());
-  };
-  Estimate e = EstimateOfTwo(x, y, mean_probability, resamples);
-  const auto repeated = [](const std::vector<double>& runs) { return runs.size() > 1; };
-  if (!e.interval && std::ranges::all_of(x, repeated) && std::ranges::all_of(y, repeated)) {
-    e.interval = ImprovementScoreInterval(e.value, x, y);
+Estimate EstimateImprovement(const std::vector<double>& x, const std::vector<double>& y) {
+  const auto probability = [](const Strata& s) { return ProbabilityOfImprovement(s[0], s[1]); };
+  Estimate e{probability({x, y}), BootstrapInterval({x, y}, probability)};
+  if (!e.interval && x.size() > 1 && y.size() > 1) {
+    e.interval = ImprovementScoreInterval(e.value, x.size(), y.size());
   }
   return e;
 }

@@ -16,12 +16,12 @@ namespace upswing {
 
 inline constexpr int64_t kResamples = 10000;  // default limit on bootstrap resamples
 
-/// Scores of one agent. Each task is a stratum with the scores of its runs.
+/// Scores in groups that a bootstrap resamples separately.
 using Strata = std::vector<std::vector<double>>;
 
 /// Number of resamples of a bootstrap: `most`, or fewer in inverse proportion if there are more
 /// than 1,000 scores. More scores already give narrow intervals.
-int64_t ResamplesOf(const Strata& strata, int64_t most = kResamples);
+int64_t ResamplesOf(int64_t scores, int64_t most = kResamples);
 
 /// An estimated statistic with its 95% interval. There is no interval if a stratum has fewer than
 /// two runs or if all resamples agree. The runs then give no information about the error.
@@ -51,21 +51,20 @@ std::optional<Interval> BootstrapInterval(Strata strata,
                                           int64_t resamples = kResamples);
 
 /// 95% score interval of a probability of improvement (Newcombe, 2006, method 5). `estimate` is its
-/// value over all pairs of a run of x and a run of y; tasks are strata.
+/// value over all pairs of one of `m` runs and one of `n` others.
 ///
 /// The interval contains each probability from which the estimate is at most 1.96 standard
 /// deviations away. Unlike the bootstrap interval, it has a width even if all pairs agree.
-Interval ImprovementScoreInterval(double estimate, const Strata& x, const Strata& y);
+Interval ImprovementScoreInterval(double estimate, size_t m, size_t n);
 
-/// Interquartile mean over the runs of all tasks together.
-Estimate EstimateIqm(const Strata& scores, int64_t resamples = kResamples);
+/// Interquartile mean over runs.
+Estimate EstimateIqm(const std::vector<double>& scores, int64_t resamples = kResamples);
 
 /// Interquartile mean of `x` minus interquartile mean of `y`. All scores must be finite.
-Estimate EstimateIqmDifference(const Strata& x, const Strata& y, int64_t resamples = kResamples);
+Estimate EstimateIqmDifference(const std::vector<double>& x, const std::vector<double>& y);
 
-/// Probability that a run of `x` has a higher score than a run of `y` on the same task, averaged
-/// over the tasks. If the bootstrap interval has no width, the interval is
-/// ImprovementScoreInterval.
-Estimate EstimateImprovement(const Strata& x, const Strata& y, int64_t resamples = kResamples);
+/// Probability that a run of `x` has a higher score than a run of `y`. If the bootstrap interval
+/// has no width, the interval is ImprovementScoreInterval.
+Estimate EstimateImprovement(const std::vector<double>& x, const std::vector<double>& y);
 
 }  // namespace upswing

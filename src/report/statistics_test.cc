@@ -36,8 +36,9 @@ TEST(Statistics, AgreeWithRliable) {
   const auto file = nlohmann::json::parse(ReadOwnFile(folder / "testdata/rliable.json"));
   ASSERT_EQ(file["cases"].size(), 4U);
   for (const auto& c : file["cases"]) {
-    const auto x = c["x"].get<Strata>();
-    const auto y = c["y"].get<Strata>();
+    if (c["x"].size() > 1) continue;  // scores of several tasks, which we do not have
+    const auto x = c["x"][0].get<std::vector<double>>();
+    const auto y = c["y"][0].get<std::vector<double>>();
     SCOPED_TRACE(c["iqm"].dump());
     ExpectSame(EstimateIqm(x), c["iqm"], "IQM");
     ExpectSame(EstimateIqmDifference(x, y), c["difference"], "difference of IQMs");
@@ -65,14 +66,14 @@ TEST(Statistics, ProbabilityOfImprovementByHand) {
 }
 
 TEST(Statistics, AnIntervalDependsOnlyOnTheScores) {
-  const auto a = EstimateIqm({{3, 1, 4, 1, 5}}), b = EstimateIqm({{1, 1, 3, 4, 5}});
+  const auto a = EstimateIqm({3, 1, 4, 1, 5}), b = EstimateIqm({1, 1, 3, 4, 5});
   EXPECT_EQ(a.interval->low, b.interval->low);
   EXPECT_EQ(a.interval->high, b.interval->high);
   EXPECT_LT(a.interval->low, a.value);
   EXPECT_GT(a.interval->high, a.value);
-  EXPECT_FALSE(EstimateIqm({{1}}).interval);
-  EXPECT_FALSE(EstimateImprovement({{1, 2}}, {{1}}).interval);
-  EXPECT_FALSE(EstimateIqm({{2, 2, 2}}).interval);  // no interval without a width
+  EXPECT_FALSE(EstimateIqm({1}).interval);
+  EXPECT_FALSE(EstimateImprovement({1, 2}, {1}).interval);
+  EXPECT_FALSE(EstimateIqm({2, 2, 2}).interval);  // no interval without a width
 }
 
 TEST(Statistics, EachStratumIsResampledOnItsOwn) {
@@ -84,7 +85,7 @@ TEST(Statistics, EachStratumIsResampledOnItsOwn) {
 }
 
 TEST(Statistics, AProbabilityHasAnIntervalWhereAllPairsAgreeToo) {
-  const Estimate all = EstimateImprovement({{6, 7, 8, 9, 10}}, {{1, 2, 3, 4, 5}});
+  const Estimate all = EstimateImprovement({6, 7, 8, 9, 10}, {1, 2, 3, 4, 5});
   EXPECT_EQ(all.value, 1);
   ASSERT_TRUE(all.interval);
   EXPECT_EQ(all.interval->high, 1);
@@ -93,12 +94,12 @@ TEST(Statistics, AProbabilityHasAnIntervalWhereAllPairsAgreeToo) {
   const double variance = p * (1 - p) * (1 + 4 * ((1 - p) / (2 - p) + p / (1 + p))) / 25;
   EXPECT_NEAR(1 - p, 1.959963984540054 * std::sqrt(variance), 1e-12);
   EXPECT_NEAR(p, 0.643, 0.001);
-  const Estimate none = EstimateImprovement({{1, 2, 3, 4, 5}}, {{6, 7, 8, 9, 10}});
+  const Estimate none = EstimateImprovement({1, 2, 3, 4, 5}, {6, 7, 8, 9, 10});
   EXPECT_EQ(none.interval->low, 0);
   EXPECT_NEAR(none.interval->high, 1 - p, 1e-12);
   // Runs that never solve the task say little about which agent would be faster.
-  const Estimate ties = EstimateImprovement({{-kInfinity, -kInfinity, -kInfinity}},
-                                            {{-kInfinity, -kInfinity, -kInfinity}});
+  const Estimate ties = EstimateImprovement({-kInfinity, -kInfinity, -kInfinity},
+                                            {-kInfinity, -kInfinity, -kInfinity});
   EXPECT_NEAR(ties.interval->low, 0.153, 0.001);
   EXPECT_NEAR(ties.interval->high, 0.847, 0.001);
 }
@@ -116,7 +117,7 @@ TEST(Statistics, TheScoreIntervalOfAProbabilityHoldsItInAbout95PercentOfCases) {
         for (double& score : x) score = rng.Normal() + shifts[k];
         for (double& score : y) score = rng.Normal();
         const double estimate = ProbabilityOfImprovement(x, y);
-        const Interval interval = ImprovementScoreInterval(estimate, {x}, {y});
+        const Interval interval = ImprovementScoreInterval(estimate, runs, runs);
         held += interval.low <= ps[k] && ps[k] <= interval.high ? 1 : 0;
       }
       EXPECT_NEAR(held / 2000.0, 0.955, 0.025) << runs << " runs, p = " << ps[k];
@@ -125,7 +126,7 @@ TEST(Statistics, TheScoreIntervalOfAProbabilityHoldsItInAbout95PercentOfCases) {
 }
 
 TEST(Statistics, AnIntervalOfRunsThatNeverSolvedReachesInfinity) {
-  const Estimate some = EstimateIqm({{10, 11, 12, 13, kInfinity}});
+  const Estimate some = EstimateIqm({10, 11, 12, 13, kInfinity});
   EXPECT_EQ(some.value, 12);
   EXPECT_LT(some.interval->low, 12);
   EXPECT_EQ(some.interval->high, kInfinity);
@@ -139,7 +140,7 @@ double Coverage(size_t runs) {
   for (int i = 0; i < kSamples; ++i) {
     std::vector<double> sample(runs);
     for (double& x : sample) x = rng.Normal();
-    const auto interval = EstimateIqm({sample}, 500).interval;
+    const auto interval = EstimateIqm(sample, 500).interval;
     held += interval->low <= 0 && interval->high >= 0 ? 1 : 0;
   }
   return static_cast<double>(held) / kSamples;

@@ -217,7 +217,7 @@ void AddPolicies(const std::vector<LoadedPolicy>& policies, bool redesign, Threa
       const int64_t higher = std::ranges::count_if(differences, [](double x) { return x > 0; });
       comparison.against.push_back({group, policy, higher,
                                     WilsonInterval(higher, std::ssize(differences)),
-                                    EstimateIqm({differences})});
+                                    EstimateIqm(differences)});
     }
   }
 }

@@ -10,7 +10,7 @@ namespace {
 Scores ScoresOf(std::vector<double> values) {
   const auto [low, high] = std::ranges::minmax(values);
   const double median = QuartilesOf(values).median;
-  const Estimate iqm = EstimateIqm({values});
+  const Estimate iqm = EstimateIqm(values);
   return {std::move(values), low, median, high, iqm};
 }
 
@@ -110,10 +110,10 @@ PairSummary ComparePair(const std::vector<RunGroup>& groups, size_t a, size_t b)
     const std::vector<double>& of_a = (groups[a].summary.*scores).values;
     const std::vector<double>& of_b = (groups[b].summary.*scores).values;
     PairFigure figure;
-    figure.better = less_is_better ? EstimateImprovement({Negated(of_a)}, {Negated(of_b)})
-                                   : EstimateImprovement({of_a}, {of_b});
+    figure.better = less_is_better ? EstimateImprovement(Negated(of_a), Negated(of_b))
+                                   : EstimateImprovement(of_a, of_b);
     if (AllFinite(of_a) && AllFinite(of_b)) {
-      figure.difference = EstimateIqmDifference({of_a}, {of_b});
+      figure.difference = EstimateIqmDifference(of_a, of_b);
     }
     return figure;
   };

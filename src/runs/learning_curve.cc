@@ -101,7 +101,7 @@ Line LearningCurve(const RunGroup& group, const CurveAxis& x, const CurveAxis& y
   for (const double place : grid) {
     std::vector<double> values;
     for (const RunRecord& run : group.runs) values.push_back(At(run, x, y, place));
-    const Estimate iqm = EstimateIqm({values}, kCurveResamples);
+    const Estimate iqm = EstimateIqm(values, kCurveResamples);
     line.y.push_back(iqm.value);
     if (group.runs.size() < 2) continue;
     // If all runs agree, the band has zero width.

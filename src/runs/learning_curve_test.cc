@@ -27,7 +27,7 @@ TEST(LearningCurve, IsTheInterquartileMeanWithItsInterval) {
   }
   const Line line = LearningCurve(group, Seconds, Return, {1, 2});
   EXPECT_EQ(line.y, (std::vector<double>{(4 + 9 + 16) / 3.0, 7}));
-  const Interval interval = *EstimateIqm({{1, 4, 9, 16, 25}}, 2000).interval;
+  const Interval interval = *EstimateIqm({1, 4, 9, 16, 25}, 2000).interval;
   EXPECT_EQ(line.low, (std::vector<double>{interval.low, 7}));
   EXPECT_EQ(line.high, (std::vector<double>{interval.high, 7}));
 }
