@@ -2,6 +2,7 @@
 
 #include "agents/arguments.h"
 #include "agents/controllers.h"
+#include "base/error.h"
 #include "base/text.h"
 #include "cli/say.h"
 #include "report/figure.h"
@@ -93,8 +94,11 @@ void AddEpisodeOptions(CommandLine& line, TrialArguments& a) {
 }
 
 void SayIfNoFigures() {
-  const std::string why = WhyNoFigures();
-  if (!why.empty()) SayError(Concat("tables only, no figures: ", why));
+  try {
+    CheckCanDraw();
+  } catch (const Error& error) {
+    SayError(Concat("tables only, no figures: ", error.what()));
+  }
 }
 
 }  // namespace upswing

@@ -47,9 +47,6 @@ struct Figure {
   std::string caption = {};       // text below the title, wrapped into lines
 };
 
-/// Why figures cannot be drawn, such as a missing gnuplot; empty if they can.
-std::string WhyNoFigures();
-
 /// Throws Failure if figures cannot be drawn. Call it before long work that is nothing without its
 /// figures.
 void CheckCanDraw();
@@ -62,8 +59,7 @@ void CheckFigureName(const std::filesystem::path& file);
 /// Throws Failure if gnuplot is missing or fails.
 void Draw(const Figure& figure, const std::filesystem::path& file);
 
-/// Draws a figure as NAME.svg and NAME.png and returns these files; none if there is a reason in
-/// WhyNoFigures.
+/// Draws a figure as NAME.svg and NAME.png and returns these files; none if CheckCanDraw throws.
 std::vector<std::string> DrawIfPossible(const Figure& figure, const std::filesystem::path& name);
 
 }  // namespace upswing

@@ -22,17 +22,8 @@ double ImprovementVariance(double p, double m, double n) {
 void Resample(const std::vector<double>& sorted, Rng& rng, std::vector<double>& drawn) {
   std::vector<uint32_t> times(sorted.size());
   for (size_t k = 0; k < sorted.size(); ++k) ++times[rng.Below(sorted.size())];
-  // Most scores are drawn at most four times. Always write four copies, because a branch would be
-  // unpredictable. Later scores overwrite surplus copies, and the end is cut off.
-  constexpr size_t kUsual = 4;
-  drawn.resize(sorted.size() + kUsual);
-  size_t next = 0;
-  for (size_t i = 0; i < sorted.size(); ++i) {
-    std::fill_n(drawn.begin() + static_cast<ptrdiff_t>(next), kUsual, sorted[i]);
-    for (size_t k = kUsual; k < times[i]; ++k) drawn[next + k] = sorted[i];
-    next += times[i];
-  }
-  drawn.resize(sorted.size());
+  drawn.clear();
+  for (size_t i = 0; i < sorted.size(); ++i) drawn.insert(drawn.end(), times[i], sorted[i]);
 }
 
 void SortUnlessSorted(std::vector<double>& values) {
