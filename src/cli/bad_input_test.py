@@ -155,9 +155,10 @@ class CommandLineTest(ProgramTest):
                 self.refuse(["simulate", "--set", change], "--set", *words)
 
     def test_start(self):
-        for start in ("0,0,0", "0,0,0,0,0", "a,b,c,d", "nan,0,0,0", "0,0,0,inf", "", "0;0;0;0"):
+        for start in ("0,0,0", "0,0,0,0,0", "a,b,c,d", "nan,0,0,0", "0,0,0,inf", "0;0;0;0"):
             with self.subTest(start=start):
                 self.refuse(["simulate", "--start", start], "--start", "q1,q2,w1,w2", f'"{start}"')
+        self.refuse(["simulate", "--start", ""], "--start", "q1,q2,w1,w2", "an empty text")
 
     def test_seconds(self):
         for seconds in ("-1", "1e9", "nan", "long"):

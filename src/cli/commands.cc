@@ -19,6 +19,11 @@ void AddPolicy(CommandLine& line, PolicyArguments& a) {
   AddControllers(line, a);
 }
 
+std::string PolicyWords() {
+  return Concat("policy.safetensors, run folders, shipped policies or controllers (",
+                Join(ControllerNames(), ", "), ")");
+}
+
 void AddControllers(CommandLine& line, PolicyArguments& a) {
   const ControllerConfig defaults;
   line.Settings(OptionsOf(defaults), a.flags);
@@ -85,7 +90,7 @@ void AddTrialOptions(CommandLine& line, TrialArguments& a, const std::string& se
 
 void AddEpisodeOptions(CommandLine& line, TrialArguments& a) {
   line.Text("--start", a.start, "q1,q2,w1,w2",
-            "start state [rad, rad/s] (default 0,0,0,0: hanging)", "");
+            "start state [rad, rad/s] (default 0,0,0,0: hanging)", "4 numbers q1,q2,w1,w2");
   Options own;
   own.Add(&a.episode, "episode", {0, 999999}, "",
           "index of the episode of `eval` with the same flags")

@@ -28,6 +28,9 @@ void AddCompletion(CommandLine& line);
 /// controllers' settings.
 void AddPolicy(CommandLine& line, PolicyArguments& a);
 
+/// What an argument for several policies takes: `policy.safetensors, run folders, …`.
+std::string PolicyWords();
+
 /// Adds the settings of controllers and --made-for.
 void AddControllers(CommandLine& line, PolicyArguments& a);
 

@@ -4,7 +4,6 @@
 #include <functional>
 
 #include "agents/config.h"
-#include "agents/controllers.h"
 #include "agents/loaded_policy.h"
 #include "base/error.h"
 #include "base/format.h"
@@ -98,9 +97,7 @@ int RunMapCommand(const MapCommand& a) {
 void AddMap(CommandLine& line) {
   MapCommand& a = line.Runs(RunMapCommand);
   line.Texts("policies", a.policies, "POLICY|RUN",
-             Concat("policies, several for maps side by side: policy.safetensors, run folders, "
-                    "shipped policies or ",
-                    "controllers (", Join(ControllerNames(), ", "), ")"));
+             Concat("policies, several for maps side by side: ", PolicyWords()));
   line.Require("policies");
   AddControllers(line, a.controllers);
   constexpr const char* kAxis = "NAME=FROM:TO[:CELLS]";

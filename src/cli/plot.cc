@@ -44,7 +44,7 @@ std::string Caption(const PlotArguments& a, const RolloutConfig& config, const R
   std::vector<std::string> parts;
   if (a.trial.is_of_eval()) parts.push_back(Concat("episode ", a.trial.episode, " of eval"));
   if (!a.trial.is_of_eval()) {
-    parts.push_back(Concat("start ", a.trial.start.value_or("0,0,0,0")));
+    parts.push_back(Concat("start ", a.trial.start.empty() ? "0,0,0,0" : a.trial.start));
   }
   parts.push_back(Concat("seed ", a.trial.seed));
   parts.push_back(a.trial.physics);

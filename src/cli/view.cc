@@ -2,17 +2,16 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "agents/controllers.h"
 #include "base/error.h"
 #include "base/format.h"
 #include "base/text.h"
 #include "cli/commands.h"
+#include "cli/progress.h"
 #include "cli/python_child.h"
 #include "cli/say.h"
 #include "cli/signals.h"
@@ -42,15 +41,6 @@ struct ViewArguments {
   double speed = 1;
 };
 
-/// The policies of the command line, in their order. Throws BadInput.
-std::vector<LoadedPolicy> PoliciesOf(const ViewArguments& a) {
-  if (a.names.size() > kMostPolicies) {
-    throw BadInput(
-        Concat("view: expected at most ", kMostPolicies, " policies, got ", a.names.size()));
-  }
-  return GetPolicies(a.names, a.controller);
-}
-
 /// The kind of a recording: mp4, gif, png or folder. Throws BadInput.
 std::string KindOf(const std::string& path) {
   if (path.ends_with('/')) return "folder";
@@ -79,23 +69,16 @@ std::unique_ptr<Making> MakeRecording(const std::string& path) {
 
 /// Sets width and height [pixels]. Throws BadInput.
 void SetSize(const std::string& text, nlohmann::json& job) {
-  const size_t cross = text.find('x');
-  const auto number = [](const std::string& digits) {
-    const std::optional<double> value = ParseNumber(digits);
-    constexpr double kLeast = 16, kMost = 8192;
-    const bool fits = value && *value >= kLeast && *value <= kMost && *value == std::floor(*value);
-    return fits ? static_cast<int>(*value) : 0;
-  };
-  const int width = number(text.substr(0, cross));
-  const int height = cross == std::string::npos ? 0 : number(text.substr(cross + 1));
-  if (width == 0 || height == 0) {
-    throw BadInput(
-        Concat("--size: expected WIDTHxHEIGHT, each 16 to 8192 pixels, such as 960x640, "
-               "got \"",
-               Printable(text), "\""));
+  const std::vector<std::string_view> sides = Split(text, 'x');
+  for (size_t i = 0; i < 2; ++i) {
+    const auto side = sides.size() == 2 ? ParseInteger(sides[i]) : std::nullopt;
+    if (!side || *side < 16 || *side > 8192) {
+      throw BadInput(
+          Concat("--size: expected WIDTHxHEIGHT, each 16 to 8192 pixels, such as 960x640, got \"",
+                 Printable(text), "\""));
+    }
+    job[i == 0 ? "width" : "height"] = *side;
   }
-  job["width"] = width;
-  job["height"] = height;
 }
 
 /// Episodes that the drawing program goes through.
@@ -195,7 +178,11 @@ int RunView(const ViewArguments& a) {
   nlohmann::json job;
   SetSize(a.size, job);
   if (!a.record.empty()) (void)KindOf(a.record);
-  const std::vector<LoadedPolicy> policies = PoliciesOf(a);
+  if (a.names.size() > kMostPolicies) {
+    throw BadInput(
+        Concat("view: expected at most ", kMostPolicies, " policies, got ", a.names.size()));
+  }
+  const std::vector<LoadedPolicy> policies = GetPolicies(a.names, a.controller);
   Show show(a, policies);
   show.Describe(job);
   std::unique_ptr<Making> making;
@@ -256,9 +243,7 @@ void AddView(CommandLine& line) {
   ViewArguments& a = line.Runs(RunView);
   AddControllers(line, a.controller);
   line.Texts("policies", a.names, "POLICY|RUN",
-             Concat("policies, shown side by side: policy.safetensors, run folders, shipped "
-                    "policies or controllers (",
-                    Join(ControllerNames(), ", "), "); none: the motor is off"));
+             Concat("policies, shown side by side: ", PolicyWords(), "; none: the motor is off"));
   AddPicture(line, a);
   AddEpisodeOptions(line, a.trial);
   AddTrialOptions(line, a.trial, "noise, random plants and the start of --episode");

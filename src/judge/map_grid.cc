@@ -1,7 +1,6 @@
 #include "judge/map_grid.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <mutex>
@@ -110,6 +109,10 @@ PendulumState MapPoint::start() const {
 
 std::string MapAxis::label() const { return unit.empty() ? name : Concat(name, " (", unit, ")"); }
 
+bool MapAxis::Sets(const std::string& setting) const {
+  return std::ranges::find(settings, setting) != settings.end();
+}
+
 MapAxis ParseMapAxis(const std::string& text, const MapPoint& training, const std::string& where) {
   const size_t equals = text.find('=');
   const auto pieces = Split(std::string_view(text).substr(std::min(equals, text.size())), ':');
@@ -128,6 +131,7 @@ MapAxis ParseMapAxis(const std::string& text, const MapPoint& training, const st
   MapPoint point = training;
   const Options options = OptionsOf(point);
   const std::vector<const Option*> members = options.Find(axis.name, where);
+  for (const Option* member : members) axis.settings.push_back(member->name);
   axis.unit = members.front()->unit;
   axis.start = members.front()->section == "start";
   axis.at_training = CommonValue(members);
@@ -155,14 +159,10 @@ MapAxis ParseMapAxis(const std::string& text, const MapPoint& training, const st
 }
 
 void CheckDifferent(const MapAxis& x, const MapAxis& y) {
-  MapPoint point;
-  const Options options = OptionsOf(point);
-  for (const Option* a : options.Find(x.name, "--x")) {
-    for (const Option* b : options.Find(y.name, "--y")) {
-      if (a != b) continue;
-      throw BadInput(Concat("--x and --y: expected two different quantities, got ", x.name, " and ",
-                            y.name, ", which both set ", a->name));
-    }
+  for (const std::string& setting : x.settings) {
+    if (!y.Sets(setting)) continue;
+    throw BadInput(Concat("--x and --y: expected two different quantities, got ", x.name, " and ",
+                          y.name, ", which both set ", setting));
   }
 }
 
@@ -170,8 +170,8 @@ MapPoint MapConfig::PointOf(int64_t cell) const {
   MapPoint result = point;
   const Options options = OptionsOf(result);
   const auto set = [&](const MapAxis& axis, size_t index) {
-    for (const Option* member : options.Find(axis.name, "map")) {
-      *std::get<double*>(member->target) = axis.values[index];
+    for (const std::string& setting : axis.settings) {
+      *std::get<double*>(options.Get(setting)->target) = axis.values[index];
     }
   };
   const auto i = static_cast<size_t>(cell);
@@ -185,22 +185,15 @@ std::vector<MapCell> RunMap(const MapConfig& config, const Policy& policy, Threa
   const int64_t total = config.cells() * config.episodes;
   std::vector<EpisodeResult> episodes(static_cast<size_t>(total));
   std::mutex mutex;
-  int64_t done = 0;
-  std::atomic<bool> failed = false;  // stops the other ranges
+  double done = 0;
   const int64_t ranges = (total + kTaskEpisodes - 1) / kTaskEpisodes;
   pool.ParallelFor(static_cast<int>(ranges), [&](int range) {
-    if (failed) return;
     const int64_t first = int64_t{range} * kTaskEpisodes;
     const int count = static_cast<int>(std::min<int64_t>(total - first, kTaskEpisodes));
-    try {
-      std::ranges::copy(RunRange(config, policy, first, count), episodes.begin() + first);
-      const std::lock_guard lock(mutex);
-      done += count;
-      if (progress) progress(static_cast<double>(done), static_cast<double>(total));
-    } catch (...) {
-      failed = true;
-      throw;
-    }
+    std::ranges::copy(RunRange(config, policy, first, count), episodes.begin() + first);
+    const std::lock_guard lock(mutex);
+    done += count;
+    if (progress) progress(done, static_cast<double>(total));
   });
   std::vector<MapCell> map;
   const auto count = static_cast<size_t>(config.episodes);

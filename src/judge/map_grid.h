@@ -28,6 +28,7 @@ struct MapPoint {
 /// One axis of the grid.
 struct MapAxis {
   std::string name;                   // of a setting of MapPoint, or an alias
+  std::vector<std::string> settings;  // names of the settings that it sets
   std::string unit;                   // such as "kg"
   std::vector<double> values;         // (n) one for each cell, ascending
   std::optional<double> at_training;  // value in the training, if it is a single number
@@ -35,6 +36,8 @@ struct MapAxis {
 
   /// Name and unit, such as "mass2 (kg)".
   std::string label() const;
+  /// Whether it sets this setting.
+  bool Sets(const std::string& setting) const;
 };
 
 /// Parses NAME=FROM:TO[:CELLS]. CELLS defaults to 31, or to one cell per step for a setting with

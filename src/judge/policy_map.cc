@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 
 #include "agents/config.h"
@@ -50,22 +49,12 @@ DesignConditions DesignOf(const LoadedPolicy& loaded) {
   return design;
 }
 
-/// Whether an axis sets this setting.
-bool OnAxis(const MapConfig& config, const Option& option) {
-  MapPoint point;
-  const Options options = OptionsOf(point);
-  return std::ranges::any_of(std::array{&config.x, &config.y}, [&](const MapAxis* axis) {
-    return std::ranges::any_of(options.Find(axis->name, "map"),
-                               [&](const Option* member) { return member->name == option.name; });
-  });
-}
-
 /// Values on no axis that differ from the training, such as `mass1 1.2 kg (training: 1), …`.
 std::string ChangesOf(const MapConfig& config, const DesignConditions& design) {
   std::vector<std::string> texts;
   for (const auto& [option, before] :
        Differences(OptionsOf(config.point), OptionsOf(design.point))) {
-    if (OnAxis(config, option)) continue;
+    if (config.x.Sets(option.name) || config.y.Sets(option.name)) continue;
     texts.push_back(fmt::format("{} {:.4g} {}", option.name, option.number(), option.unit));
     if (option.section == "start") continue;
     texts.back() += fmt::format(" ({}: {:.4g})", design.word, before->number());
@@ -102,14 +91,13 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
   CheckDifferent(config.x, config.y);
   const Options options = OptionsOf(config.point);
   for (MapAxis* axis : {&config.x, &config.y}) {
-    const bool in_plant = options.Find(axis->name, "map").front()->section != "disturbance";
+    const bool in_plant = options.Get(axis->settings.front())->section != "disturbance";
     if (!in_plant && !design.known) axis->at_training.reset();
   }
   for (const Option* option : ApplyChanges(options, a.trial.set)) {
     config.start_given |= option->section == "start";
     for (const MapAxis* axis : {&config.x, &config.y}) {
-      const auto members = options.Find(axis->name, "map");
-      if (std::ranges::find(members, option) == members.end()) continue;
+      if (!axis->Sets(option->name)) continue;
       throw BadInput(Concat("--set ", option->name,
                             ": expected a quantity that is on no axis; the axis ", axis->name,
                             " sets it"));

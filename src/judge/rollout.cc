@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "agents/config.h"
+#include "base/csv.h"
 #include "base/error.h"
 #include "base/text.h"
 
@@ -128,28 +129,25 @@ std::string TorqueText(const Rollout& rollout) {
 }
 
 std::string RolloutCsv(const Rollout& rollout) {
-  std::string csv =
-      "t,qpos0,qpos1,qvel0,qvel1,torque,energy,height,inverted,reward,energy_reward,"
-      "height_reward,balance_reward,velocity_penalty,torque_penalty\n";
+  constexpr const char* kTerms[] = {"energy_reward", "height_reward", "balance_reward",
+                                    "velocity_penalty", "torque_penalty"};
+  CsvTable csv;
   for (const RolloutRow& row : rollout.rows) {
     const PendulumState& s = row.state;
-    std::vector<double> cells{row.t,
-                              s.q1,
-                              s.q2,
-                              s.w1,
-                              s.w2,
-                              row.torque,
-                              Energy(rollout.plant, s),
-                              TipHeight(rollout.plant, s),
-                              row.inverted ? 1.0 : 0.0,
-                              row.reward};
-    for (const double term : row.terms) cells.push_back(term + 0.0);  // turns -0 into 0
-    std::vector<std::string> texts;
-    texts.reserve(cells.size());
-    for (const double cell : cells) texts.push_back(FormatNumber(cell));
-    csv += Join(texts, ",") + '\n';
+    csv.Add("t", row.t);
+    csv.Add("qpos0", s.q1);
+    csv.Add("qpos1", s.q2);
+    csv.Add("qvel0", s.w1);
+    csv.Add("qvel1", s.w2);
+    csv.Add("torque", row.torque);
+    csv.Add("energy", Energy(rollout.plant, s));
+    csv.Add("height", TipHeight(rollout.plant, s));
+    csv.Add("inverted", row.inverted ? 1 : 0);
+    csv.Add("reward", row.reward);
+    for (size_t k = 0; k < kRewardTerms; ++k) csv.Add(kTerms[k], row.terms[k] + 0.0);  // no -0
+    csv.EndRow();
   }
-  return csv;
+  return csv.text();
 }
 
 std::string JudgementText(const Policy& policy, const PendulumEnvConfig& config) {

@@ -123,15 +123,15 @@ fs::path FigureFolder(const std::string& out, const LoadedPolicy& loaded, const 
 }
 
 RolloutConfig TrialEpisode(const TrialArguments& a, const LoadedPolicy* loaded) {
-  if (a.start && a.is_of_eval()) {
+  if (!a.start.empty() && a.is_of_eval()) {
     throw BadInput("--start: expected none with --episode, which has its own start");
   }
   RolloutConfig config;
   if (loaded != nullptr) config.policy = loaded->policy.get();
   config.env = TrialEnvironments(a, loaded);
   config.env.first_index = static_cast<uint64_t>(std::max<int64_t>(0, a.episode));
-  if (a.start) {
-    config.start = ParseStart(*a.start);
+  if (!a.start.empty()) {
+    config.start = ParseStart(a.start);
   } else if (!a.is_of_eval()) {
     config.start = PendulumState();
   }

@@ -25,9 +25,9 @@ struct TrialArguments {
   int64_t seed = 0;
   bool unknown_plant = false;
   bool known_plant = false;  // design a controller for each episode's plant; only in eval
-  // The single episode of `simulate`, `plot` and `view`: its start, or its index in `eval`
-  // (negative: none).
-  std::optional<std::string> start;
+  // The single episode of `simulate`, `plot` and `view`: its start (empty: hanging), or its index in
+  // `eval` (negative: none).
+  std::string start;
   int64_t episode = -1;
 
   bool is_of_eval() const { return episode >= 0; }
