@@ -13,12 +13,12 @@
 #include "nn/network_policy.h"
 #include "os/file.h"
 #include "os/host.h"
+#include "runs/config_files.h"
 #include "runs/find_policy.h"
 #include "runs/run_folder.h"
 #include "runs/run_record.h"
 #include "runs/tensor_file.h"
 #include "runs/this_host.h"
-#include "runs/train_command.h"
 
 namespace upswing::deploy {
 namespace {

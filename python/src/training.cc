@@ -15,7 +15,6 @@
 #include "runs/config_files.h"
 #include "runs/find_policy.h"
 #include "runs/run_folder.h"
-#include "runs/run_rows.h"
 #include "runs/this_host.h"
 #include "runs/training_run.h"
 

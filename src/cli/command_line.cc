@@ -262,7 +262,7 @@ std::string Explain(const CLI::App& program, const CLI::ParseError& error) {
   return error.what();
 }
 
-/// Adds a text argument; `Target` is std::string, an optional string or a vector.
+/// Adds a text argument; `Target` is std::string or a vector.
 template <typename Target>
 CLI::Option* AddText(CLI::App& app, std::string_view name, Target& target, std::string_view type,
                      std::string_view help, std::string_view what) {
@@ -270,6 +270,42 @@ CLI::Option* AddText(CLI::App& app, std::string_view name, Target& target, std::
   if (!type.empty()) option->type_name(std::string(type));
   if (!what.empty()) option->check(NotEmpty(what));
   return option;
+}
+
+/// Throws BadInput if a file to write is another file of the command line, to read or to write.
+void ExpectOtherOutputs(const CLI::App& app) {
+  namespace fs = std::filesystem;
+  constexpr std::array kOutputs{"--out", "--csv",    "--figure",       "--onnx",
+                                "--c",   "--record", "--episodes-csv", "--log"};
+  struct Named {
+    const CLI::Option* option;
+    std::string path;
+    bool is_output;
+  };
+  std::vector<Named> files;
+  for (const CLI::Option* option : app.get_options()) {
+    const bool is_output = std::ranges::find(kOutputs, option->get_name()) != kOutputs.end();
+    for (const std::string& text : option->results()) files.push_back({option, text, is_output});
+  }
+  const auto same = [](const Named& output, const Named& other) {
+    std::error_code error;
+    if (fs::is_regular_file(output.path, error)) {
+      return fs::equivalent(output.path, other.path, error);
+    }
+    // Other words are names: an agent, for example.
+    return other.is_output && !fs::exists(output.path, error) &&
+           fs::weakly_canonical(output.path, error) == fs::weakly_canonical(other.path, error);
+  };
+  for (const Named& output : files) {
+    if (!output.is_output || output.path.empty() || output.path == "-") continue;
+    for (const Named& other : files) {
+      if (&other == &output || !same(output, other)) continue;
+      throw BadInput(
+          Concat(output.option->get_name(), ": expected another file than ",
+                 other.option->nonpositional() ? other.option->get_name() : "the argument", " ",
+                 Printable(other.path), ", which would be lost"));
+    }
+  }
 }
 
 /// Whether packages have a command: they leave out some programs, and the launcher.
@@ -294,6 +330,7 @@ int CommandLine::Run() const {
   for (const auto& subcommand : subcommands_) {
     if (subcommand->app_.parsed()) return subcommand->Run();
   }
+  ExpectOtherOutputs(app_);
   for (const auto& check : checks_) check();
   return run_();
 }
@@ -302,11 +339,6 @@ size_t HelpColumns() { return static_cast<size_t>(std::clamp(TerminalWidth(100),
 
 void CommandLine::Text(std::string_view name, std::string& target, std::string_view type,
                        std::string_view help, std::string_view what) {
-  AddText(app_, name, target, type, help, what);
-}
-
-void CommandLine::Text(std::string_view name, std::optional<std::string>& target,
-                       std::string_view type, std::string_view help, std::string_view what) {
   AddText(app_, name, target, type, help, what);
 }
 
@@ -385,6 +417,16 @@ void CommandLine::Footer(const std::string& text) { app_.footer(text); }
 
 void CommandLine::Check(std::function<void()> check) { checks_.push_back(std::move(check)); }
 
+void CommandLine::Excludes(std::string_view name, std::vector<std::string> others,
+                           std::string_view why) {
+  Check([this, name = std::string(name), others = std::move(others), why = std::string(why)] {
+    for (const std::string& other : others) {
+      if (!Has(name) || !Has(other)) continue;
+      throw BadInput(Concat(name, ": expected no ", other, " with it", why));
+    }
+  });
+}
+
 bool CommandLine::Has(std::string_view name) const { return app_.count(std::string(name)) > 0; }
 
 std::string CommandLine::Last(std::string_view name) const {
@@ -398,49 +440,6 @@ std::string_view CalledCommand(int argc, const char* const* argv) {
       std::ranges::find_if(words, [](std::string_view word) { return !word.starts_with('-'); });
   return called == words.end() ? std::string_view() : *called;
 }
-
-namespace {
-
-/// Throws BadInput if a file to write is another file of the command line, to read or to write.
-void ExpectOtherOutputs(const CLI::App& program) {
-  namespace fs = std::filesystem;
-  constexpr std::array kOutputs{"--out", "--csv",    "--figure",       "--onnx",
-                                "--c",   "--record", "--episodes-csv", "--log"};
-  struct Named {
-    std::string flag, path;
-    bool is_output;
-  };
-  std::vector<Named> files;
-  for (const CLI::App* app = &program; app != nullptr;) {
-    for (const CLI::Option* option : app->get_options()) {
-      const std::string flag = option->get_lnames().empty() ? "" : "--" + option->get_lnames()[0];
-      const bool is_output = std::ranges::find(kOutputs, flag) != kOutputs.end();
-      for (const std::string& path : option->results()) files.push_back({flag, path, is_output});
-    }
-    const auto chosen = app->get_subcommands();
-    app = chosen.empty() ? nullptr : chosen.front();
-  }
-  const auto same = [](const Named& output, const Named& other) {
-    std::error_code error;
-    if (fs::is_regular_file(output.path, error)) {
-      return fs::equivalent(output.path, other.path, error);
-    }
-    // Other words are names: an agent, for example.
-    return other.is_output && !fs::exists(output.path, error) &&
-           fs::weakly_canonical(output.path, error) == fs::weakly_canonical(other.path, error);
-  };
-  for (size_t i = 0; i < files.size(); ++i) {
-    if (!files[i].is_output || files[i].path.empty() || files[i].path == "-") continue;
-    for (size_t k = 0; k < files.size(); ++k) {
-      if (k == i || !same(files[i], files[k])) continue;
-      throw BadInput(Concat(files[i].flag, ": expected another file than ",
-                            files[k].flag.empty() ? "the argument" : files[k].flag, " ",
-                            Printable(files[k].path), ", which would be lost"));
-    }
-  }
-}
-
-}  // namespace
 
 int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> table,
                std::span<const Command> own, const std::string& footer) {
@@ -474,7 +473,6 @@ int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> 
   }
   try {
     program.parse(argc, argv);
-    ExpectOtherOutputs(program);
   } catch (const CLI::Success& request) {  // --help and --version
     if (const std::string unknown = ExplainUnknown(program); !unknown.empty()) {
       throw BadInput(unknown);

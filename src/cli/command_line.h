@@ -36,8 +36,6 @@ class CommandLine {
   /// `what` allows empty values.
   void Text(std::string_view name, std::string& target, std::string_view type,
             std::string_view help, std::string_view what = kPath);
-  void Text(std::string_view name, std::optional<std::string>& target, std::string_view type,
-            std::string_view help, std::string_view what = kPath);
   /// Adds a positional argument that takes any number of texts.
   void Texts(std::string_view name, std::vector<std::string>& target, std::string_view type,
              std::string_view help);
@@ -69,6 +67,8 @@ class CommandLine {
   void Footer(const std::string& text);
   /// Adds a check that runs once all arguments are known, before anything else.
   void Check(std::function<void()> check);
+  /// Adds a check that none of `others` is given together with `name`. `why` ends the message.
+  void Excludes(std::string_view name, std::vector<std::string> others, std::string_view why = "");
   /// Sets the function that runs the command and returns the exit code. Returns the arguments that
   /// the function will get; the caller declares them.
   template <typename Arguments>

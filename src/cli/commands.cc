@@ -67,7 +67,7 @@ void AddSet(CommandLine& line, std::vector<std::string>& set, const std::string&
 void AddPlant(CommandLine& line, std::string& plant) {
   line.Text("--plant", plant, "FILE|NAME",
             Concat("plant file (TOML with a table [plant]) or shipped plant (",
-                   Join(ShippedPlants(), ", "), "), which other flags change"));
+                   Join(NamesOf(EmbeddedPlants()), ", "), "), which other flags change"));
 }
 
 void AddUnknownPlant(CommandLine& line, bool& unknown_plant) {

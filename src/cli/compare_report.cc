@@ -198,7 +198,7 @@ ordered_json GroupJson(const RunGroup& group) {
 
 void PrintComparison(const Comparison& comparison) {
   const auto task_text = [&](int task) {
-    if (NumTasks(comparison) == 1) return std::string();
+    if (comparison.task_texts.size() == 1) return std::string();
     return fmt::format("{} ({})", task + 1, comparison.task_texts[static_cast<size_t>(task)]);
   };
   for (const RunGroup& group : comparison.groups) PrintGroup(group, task_text(group.task));

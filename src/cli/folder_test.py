@@ -118,7 +118,7 @@ class LinkTest(RunTest):
     def test_a_variant_is_no_link(self):
         study = 'seeds = 1\n[settings]\nagent = "d3qn-small"\n[variants.a]\n'
         (self.folder / "many").mkdir()
-        for name in ("s.toml", "many/study.toml"):
+        for name in ("s.toml", "many/plan.json"):
             self.write(name, study)
         (self.folder / "many/a").symlink_to("../precious")
         self.refuse(["study", "s.toml", "--out", "many"], "many/a: expected a folder, got a link")

@@ -190,6 +190,7 @@ class SeedsTest(ProgramTest):
 
     def test_settings_count_where_no_run_has_begun(self):
         (self.folder / "many").mkdir()
+        self.write("many/plan.json", "{}")
         self.write("many/settings.toml", "")
         self.refuse([*small(**TINY), "--seeds", "1"], "many/settings.toml: made with",
                     "choose another --out")
@@ -208,7 +209,7 @@ class SeedsTest(ProgramTest):
     def test_a_folder_of_something_else_is_refused(self):
         self.succeed(*small(**TINY))
         self.refuse([*small(**TINY), "--seeds", "2"], "many: expected a new or empty folder",
-                    "no settings.toml")
+                    "no plan.json")
 
     def test_bad_seeds(self):
         for text, words in (("0", "1 to 10000"), ("-3", "1 to 10000"), ("0-", "3,5,8-12"),

@@ -13,15 +13,11 @@
 #include "os/host.h"
 #include "runs/many_runs.h"
 #include "runs/seeds.h"
-#include "runs/study_file.h"
-#include "runs/study_worker.h"
 
 namespace upswing {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr const char* kStudyName = "study.toml";  // in a study's folder
 
 /// The arguments of `study`.
 struct StudyArguments {
@@ -34,18 +30,16 @@ struct StudyArguments {
   }
 };
 
-/// Throws if the folder belongs to another study, which this one would replace: another title, or a
-/// variant that this study lacks. TrainMany compares the settings.
-void CheckSameStudy(const StudyPlan& plan, const std::string& title) {
-  const fs::path file = plan.folder / kStudyName;
-  const std::string where = file.string();
-  if (!IsFile(file)) return;
-  const StudyOutline before = ParseStudyOutline(ReadOwnFile(file), where);
-  if (before.title != title) {
+/// Throws if the folder's plan is that of another study, which this one would replace: another
+/// title, or a variant that this study lacks. TrainMany compares the settings.
+void CheckSameStudy(const StudyPlan& before, const StudyPlan& plan) {
+  const std::string where = (plan.folder / kPlanName).string();
+  if (!before.title.empty() && before.title != plan.title) {
     throw BadInput(Concat(where, ": made with title \"", before.title, "\", but the study has \"",
-                          title, "\"; choose another --out"));
+                          plan.title, "\"; choose another --out"));
   }
-  for (const std::string& name : before.variants) {
+  for (const Variant& variant : before.variants) {
+    const std::string& name = variant.name;
     if (std::ranges::find(plan.variants, name, &Variant::name) != plan.variants.end()) continue;
     throw BadInput(Concat(where, ": made with a variant \"", name,
                           "\", which the study lacks; choose another --out"));
@@ -54,23 +48,17 @@ void CheckSameStudy(const StudyPlan& plan, const std::string& title) {
 
 ManyRuns ReadStudy(const StudyArguments& arguments) {
   const fs::path file = arguments.file;
-  const std::string text = ReadOwnFile(file);
-  StudyFile study = ParseStudy(text, file.string());
-
+  const std::optional<StudyPlan> before = PlanBefore(arguments.folder());
   ManyRuns many;
-  many.what = study.title.empty() ? file.stem().string() : Concat("\"", study.title, "\"");
-  many.mark_file = kStudyName;
-  many.mark_text = text;
+  many.study_file = ReadOwnFile(file);
   many.more_steps = true;
   StudyPlan& plan = many.plan;
+  plan = ParseStudy(many.study_file, file.string(), before ? before->keep : Keep::kAll);
   plan.folder = arguments.folder();
-  plan.variants = std::move(study.variants);
-  plan.keep = !arguments.keep.empty() ? ParseKeep(arguments.keep, "--keep")
-              : study.keep            ? *study.keep
-                                      : KeepOf(plan.folder);
-  CheckSameStudy(plan, study.title);
-  plan.seeds =
-      arguments.seeds.empty() ? std::move(study.seeds) : ParseSeeds(arguments.seeds, "--seeds");
+  many.what = plan.title.empty() ? file.stem().string() : Concat("\"", plan.title, "\"");
+  if (before) CheckSameStudy(*before, plan);
+  if (!arguments.keep.empty()) plan.keep = ParseKeep(arguments.keep, "--keep");
+  if (!arguments.seeds.empty()) plan.seeds = ParseSeeds(arguments.seeds, "--seeds");
   if (plan.seeds.empty()) {
     throw BadInput(
         Concat(file.string(), ": expected a line such as seeds = 10, or --seeds, got neither"));
@@ -121,25 +109,15 @@ int RunStudy(const StudyArguments& arguments) {
 }
 
 /// Throws if the arguments contradict each other.
-void CheckArguments(const CommandLine& line, const StudyArguments& arguments) {
+void CheckArguments(const StudyArguments& arguments) {
   if (arguments.work.empty() == arguments.file.empty()) {
     throw BadInput(arguments.file.empty()
                        ? "study: expected FILE.toml or --work FOLDER, got neither"
                        : "--work: expected no FILE.toml with it");
   }
-  const auto alone = [&](bool given, const char* what, std::initializer_list<const char*> others) {
-    for (const std::string other : others) {
-      if (given && line.Has(other)) {
-        throw BadInput(Concat(what, ": expected no ", other, " with it"));
-      }
-    }
-  };
-  alone(!arguments.work.empty(), "--work",
-        {"--out", "--seeds", "--jobs", "--keep", "--status", "--prepare"});
   if (arguments.as_json && !arguments.status) {
     throw BadInput("--json: expected --status with it; `compare FOLDER --json` prints the results");
   }
-  alone(arguments.status, "--status", {"--seeds", "--jobs", "--keep", "--prepare"});
 }
 
 }  // namespace
@@ -185,7 +163,9 @@ void AddStudy(CommandLine& line) {
       "same command resumes stopped and killed runs; finished runs stay unchanged.\n"
       "Exit code 0: done; 1: a run failed; 2: bad usage or input; 130 or 143: stopped. A\n"
       "worker that a signal stops has exit code 75; any worker can resume its run.\n");
-  line.Check([&line, &arguments] { CheckArguments(line, arguments); });
+  line.Check([&arguments] { CheckArguments(arguments); });
+  line.Excludes("--work", {"--out", "--seeds", "--jobs", "--keep", "--status", "--prepare"});
+  line.Excludes("--status", {"--seeds", "--jobs", "--keep", "--prepare"});
 }
 
 }  // namespace upswing

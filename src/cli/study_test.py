@@ -142,7 +142,7 @@ class StudyTest(ProgramTest):
         process = self.start("study", self.write("little.toml", endless), "--out", "x")
         self.assertEqual(self.end(process, signal.SIGINT)[0], 130)
         for old, new, *words in (
-                ('"Little"', '"Large"', 'x/study.toml: made with title "Little"', 'has "Large"'),
+                ('"Little"', '"Large"', 'x/plan.json: made with title "Little"', 'has "Large"'),
                 ('title = "Little"', "", 'made with title "Little"', 'has ""'),
                 ("[variants.with]", "", 'made with a variant "with"'),
                 ("gamma = 0.9", "gamma = 0.8", "x/but", "made with agent.gamma = 0.9", "has 0.8")):
@@ -164,7 +164,7 @@ class StudyTest(ProgramTest):
         self.write("little.toml", STUDY)
         self.succeed(*small(**FLAGS | {"out": "run"}))
         self.refuse(["study", "little.toml", "--out", "run"], "run: expected a new or empty folder",
-                    "no study.toml")
+                    "no plan.json")
 
     def test_without_gnuplot_there_are_only_tables(self):
         self.write("little.toml", STUDY)

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <list>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -16,15 +17,19 @@
 #include "cli/train_view.h"
 #include "os/file.h"
 #include "runs/lease.h"
-#include "runs/study_worker.h"
+#include "runs/many_runs.h"
+#include "runs/run_folder.h"
+#include "runs/study_plan.h"
 
 namespace upswing {
 namespace {
 
+namespace fs = std::filesystem;
+
 /// Appends standard output and error to a file during its lifetime.
 class PrintedTo {
  public:
-  explicit PrintedTo(const std::filesystem::path& path)
+  explicit PrintedTo(const fs::path& path)
       : file_(path), output_(dup(STDOUT_FILENO)), error_(dup(STDERR_FILENO)) {
     std::fflush(stdout);
     dup2(file_.descriptor(), STDOUT_FILENO);
@@ -43,13 +48,64 @@ class PrintedTo {
   Descriptor output_, error_;
 };
 
-/// Trains a study's run, and writes the output of `train` to its log.
-bool TrainLogged(const SeedRun& run, const std::function<std::unique_ptr<TrainingRun>()>& make,
-                 const std::function<bool()>& ours) {
+/// Removes the files of a finished run that `keep` does not keep.
+void Reduce(const SeedRun& run, Keep keep) {
+  if (keep == Keep::kAll) return;
+  fs::remove(run.log());
+  if (keep == Keep::kTables) return RemoveFolder(run.path);
+  for (const auto& entry : fs::directory_iterator(run.path)) {
+    const std::string name = entry.path().filename().string();
+    const bool kept = name == RunFolder::kConfig || name == RunFolder::kPolicy ||
+                      name == RunFolder::kEvaluations || name == RunFolder::kLog ||
+                      name == RunFolder::kModel;
+    if (!kept) fs::remove(entry.path());
+  }
+}
+
+/// Writes the result file of a run and removes the files that are not kept. The caller must hold
+/// the claim.
+void Finish(const SeedRun& run, Keep keep) {
+  const Config& config = run.variant->config;
+  const auto at_end = ReadTrainState(run.path, config.Spec());
+  if (!at_end)
+    throw Failure(Concat(run.path.string(),
+                         ": expected the run's folder, which was removed during the training"));
+  const FinishedRun result{*at_end,
+                           run.settings,
+                           config.train.steps,
+                           config.train.stop_when_solved,
+                           UPSWING_VERSION,
+                           RunConditions::Of(run.path),
+                           ReadOwnFile(run.path / RunFolder::kEvaluations)};
+  result.Write(run.done());
+  Reduce(run, keep);
+}
+
+/// Begins a run, or resumes one that a worker left.
+std::unique_ptr<TrainingRun> MakeOrResume(const SeedRun& run) {
+  const TrainConfig& train = run.variant->config.train;
+  // Training again gives the same bits.
+  if (run.IsReduced() && fs::exists(run.path)) RemoveFolder(run.path);
+  if (fs::exists(run.path / RunFolder::kConfig)) {
+    return TrainingRun::Resume(
+        run.path,
+        {{"steps", std::to_string(train.steps), "steps"},
+         {"threads", std::to_string(train.threads), "threads"},
+         {"checkpoint_every", std::to_string(train.checkpoint_every), "checkpoint_every"},
+         {"stop_when_solved", train.stop_when_solved ? "true" : "false", "stop_when_solved"}});
+  }
+  Config config = run.variant->config;
+  config.train.seed = run.seed;
+  return TrainingRun::Make(run.path, std::move(config));
+}
+
+/// Trains a run until its end or a stop signal, and writes the output of `train` to its log.
+/// Throws, and writes nothing more, once the claim is lost. Returns whether the training has ended.
+bool TrainLogged(const SeedRun& run, const Lease& lease) {
   const PrintedTo log(run.log());
   try {
-    return TrainAndShow(*make(), [&] {
-      if (!ours())
+    return TrainAndShow(*MakeOrResume(run), [&] {
+      if (!lease.held())
         throw Failure("another worker may have claimed the run while this one was halted");
     });
   } catch (const std::exception& error) {
@@ -58,12 +114,106 @@ bool TrainLogged(const SeedRun& run, const std::function<std::unique_ptr<Trainin
   }
 }
 
+/// Result of a worker.
+struct WorkerOutcome {
+  int64_t done = 0, failed = 0;   // number of runs
+  int64_t claimed_by_others = 0;  // runs that other workers train
+  bool stopped = false;
+};
+
+/// Worker that trains the unfinished runs of a plan one after the other. Any number of workers on
+/// this host and others can do so at the same time: each claims a run before it works on it.
+///
+/// Resumes a run that another worker left from its checkpoint. If a run fails, writes the reason
+/// next to it; no worker tries that run again until the study is started again. A run that is done
+/// twice does no harm, because its bits are the same.
+class Worker {
+ public:
+  explicit Worker(const StudyPlan& plan) : plan_(plan) {}
+
+  /// Ends when no run is left to claim, or at a stop signal. Throws Failure if several runs in a
+  /// row fail here, or if nothing can be written.
+  WorkerOutcome Run() {
+    std::vector<SeedRun> runs = RunsOf(plan_);
+    std::list<SeedRun*> open;
+    for (SeedRun& run : runs) open.push_back(&run);
+    // Repeat while a round trains a run, because another worker may have lost a run meanwhile.
+    for (bool tried = true; tried && !open.empty() && !outcome_.stopped;) {
+      tried = false;
+      outcome_.claimed_by_others = 0;
+      for (auto it = open.begin(); it != open.end() && !outcome_.stopped;) {
+        const Turn turn = Try(**it);
+        tried = tried || turn == Turn::kTried;
+        if (turn == Turn::kClaimedByOthers) ++outcome_.claimed_by_others;
+        it = turn == Turn::kClaimedByOthers ? std::next(it) : open.erase(it);
+      }
+    }
+    return outcome_;
+  }
+
+ private:
+  enum class Turn { kNothingToDo, kClaimedByOthers, kTried };
+
+  Turn Try(SeedRun& run) {
+    outcome_.stopped = StopSignal() != 0;
+    if (outcome_.stopped) return Turn::kNothingToDo;
+    std::optional<Lease> lease;
+    try {
+      const bool ended = run.HasFailed() || run.ReadIfFinished();
+      if (ended && !fs::exists(run.claim())) return Turn::kNothingToDo;
+      if (auto taken = Lease::Take(run.claim(), "trains it")) lease.emplace(std::move(*taken));
+      if (ended) return Turn::kNothingToDo;  // its worker died before it gave the claim back
+      if (!lease) return Turn::kClaimedByOthers;
+      // Another worker ended it meanwhile.
+      if (run.HasFailed() || run.ReadIfFinished()) return Turn::kNothingToDo;
+      Train(run, *lease);
+    } catch (const FolderBusy&) {  // a worker that lost the claim is still running there
+      return Turn::kClaimedByOthers;
+    } catch (const std::exception& error) {
+      if (lease && !lease->held()) return Turn::kClaimedByOthers;
+      CountFailure(run, error);
+    }
+    return Turn::kTried;
+  }
+
+  /// Writes the reason of a run's failure. Throws Failure if that fails, or after several failures
+  /// in a row, because a broken host must not fail all other runs.
+  void CountFailure(const SeedRun& run, const std::exception& error) {
+    constexpr int kMostInARow = 3;
+    try {
+      run.WriteFailed(error.what());
+    } catch (const Error&) {
+      throw Failure(Concat(run.name, ": ", error.what()));
+    }
+    ++outcome_.failed;
+    if (++failed_in_a_row_ < kMostInARow) return;
+    throw Failure(Concat(kMostInARow, " runs in a row failed on this worker; last ", run.name, ": ",
+                         error.what()));
+  }
+
+  void Train(SeedRun& run, const Lease& lease) {
+    run.Read();
+    if (!run.AtEnd() && !TrainLogged(run, lease)) {
+      outcome_.stopped = true;
+      return;
+    }
+    if (!lease.held()) throw Failure("another worker has claimed the run");
+    Finish(run, plan_.keep);
+    ++outcome_.done;
+    failed_in_a_row_ = 0;
+  }
+
+  const StudyPlan& plan_;
+  WorkerOutcome outcome_;
+  int failed_in_a_row_ = 0;
+};
+
 }  // namespace
 
-int WorkOnStudy(const std::filesystem::path& folder) {
+int WorkOnStudy(const fs::path& folder) {
   InstallSignalHandlers(kStoppingTraining);
   const StudyPlan plan = ReadPlan(folder);
-  const WorkerOutcome outcome = WorkOn(plan, TrainLogged, [] { return StopSignal() != 0; });
+  const WorkerOutcome outcome = Worker(plan).Run();
   Say("{}: this worker finished {}, {} failed{}{}\n", Printable(folder.string()), outcome.done,
       outcome.failed,
       outcome.claimed_by_others > 0
@@ -74,7 +224,7 @@ int WorkOnStudy(const std::filesystem::path& folder) {
   return outcome.failed > 0 ? 1 : 0;
 }
 
-int PrintStudyStatus(const std::filesystem::path& folder, bool as_json) {
+int PrintStudyStatus(const fs::path& folder, bool as_json) {
   const char* const states[] = {"done",   "solved",  "running", "lost",
                                 "failed", "stopped", "waiting"};
   const StudyPlan plan = ReadPlan(folder);

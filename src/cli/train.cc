@@ -80,17 +80,6 @@ int RunTrain(const TrainArguments& arguments) {
   return TrainAndShow(*run) ? 0 : 128 + StopSignal();
 }
 
-/// Throws if flags for many runs are combined with flags for a single one.
-void CheckManyArguments(const CommandLine& line) {
-  if (line.Has("--seeds")) {
-    for (const std::string other : {"--seed", "--resume"}) {
-      if (line.Has(other)) throw BadInput(Concat("--seeds: expected no ", other, " with it"));
-    }
-  } else if (line.Has("--jobs")) {
-    throw BadInput("--jobs: expected --seeds with it, got none");
-  }
-}
-
 /// Lets --help show the defaults of the given agent and file, or of the given run.
 void ShowChosenDefaults(const CommandLine& line, const CommandLine::ShowOptions& show) {
   std::vector<FlagValue> flags;
@@ -158,13 +147,12 @@ void AddTrain(CommandLine& line) {
               "\nSIGINT and SIGTERM write a checkpoint and end the program with exit code 130 or\n"
               "143. SIGUSR1 writes a checkpoint, and the training continues. Other exit codes:\n"
               "0: done; 1: failed; 2: bad usage or input.\n");
-  line.Check([&line] {
-    for (const std::string other : {"--out", "--config", "--plant"}) {
-      if (!line.Has("--resume") || !line.Has(other)) continue;
-      throw BadInput(Concat("--resume: expected no ", other,
-                            " with it: the run has its own settings and folder"));
-    }
-    CheckManyArguments(line);
+  line.Excludes("--resume", {"--out", "--config", "--plant"},
+                ": the run has its own settings and folder");
+  line.Excludes("--seeds", {"--seed", "--resume"});
+  line.Check([&arguments] {
+    if (arguments.jobs == 0 || !arguments.seeds.empty()) return;
+    throw BadInput("--jobs: expected --seeds with it, got none");
   });
 }
 

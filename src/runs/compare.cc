@@ -178,12 +178,6 @@ std::vector<Job> JobsOf(const std::vector<LoadedPolicy>& policies, bool redesign
 
 }  // namespace
 
-int NumTasks(const Comparison& comparison) {
-  return std::ranges::max_element(comparison.groups, {}, &RunGroup::task)->task + 1;
-}
-
-std::string CurvesName(int task) { return task == 0 ? "curves" : Concat("curves-", task + 1); }
-
 Comparison Compare(const CompareRequest& request) {
   Comparison comparison = GroupRuns(request);
   std::vector<RunGroup>& groups = comparison.groups;
@@ -230,7 +224,7 @@ std::vector<std::string> WriteComparison(const Comparison& comparison, const fs:
   };
   write("summary.csv", SummaryCsv(comparison.groups));
   write("runs.csv", RunsCsv(comparison.groups));
-  for (int task = 0; task < NumTasks(comparison); ++task) {
+  for (int task = 0; task < std::ssize(comparison.task_texts); ++task) {
     std::vector<RunGroup> groups;
     std::ranges::copy_if(comparison.groups, std::back_inserter(groups),
                          [&](const RunGroup& group) { return group.task == task; });
@@ -240,7 +234,8 @@ std::vector<std::string> WriteComparison(const Comparison& comparison, const fs:
       levels.push_back(
           {policy.title, policy.figures.success_rate(), policy.figures.reward_sum.mean});
     }
-    std::ranges::move(DrawIfPossible(LearningCurves(groups, levels), folder / CurvesName(task)),
+    const fs::path name = folder / (task == 0 ? "curves" : Concat("curves-", task + 1));
+    std::ranges::move(DrawIfPossible(LearningCurves(groups, levels), name),
                       std::back_inserter(files));
   }
   return files;

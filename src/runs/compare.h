@@ -40,19 +40,15 @@ struct AgainstPolicy {
 
 /// Figures of groups of runs, of pairs of groups and of policies.
 struct Comparison {
-  std::vector<RunGroup> groups;         // in the order of discovery
-  std::vector<PairSummary> pairs;       // each group with each earlier one
-  std::vector<std::string> task_texts;  // of each task: the settings that differ between tasks
-  std::vector<std::string> notes;       // remarks, one line each
+  std::vector<RunGroup> groups;    // in the order of discovery
+  std::vector<PairSummary> pairs;  // each group with each earlier one
+  // Of each task: the settings that differ between tasks. CompareRequest::different_tasks: only
+  // one.
+  std::vector<std::string> task_texts;
+  std::vector<std::string> notes;  // remarks, one line each
   std::vector<JudgedPolicy> policies;
   std::vector<AgainstPolicy> against;  // each group with each policy on its task
 };
-
-/// Number of tasks that the groups are evaluated on.
-int NumTasks(const Comparison& comparison);
-
-/// The name, without ending, of the files with a task's learning curves: `curves`, `curves-2`, …
-std::string CurvesName(int task);
 
 /// Compares runs. Notes and leaves out folders without a run, and runs that are unreadable,
 /// unfinished (unless requested), without an evaluation, or the same training as another. Throws
@@ -67,8 +63,8 @@ void AddPolicies(const std::vector<LoadedPolicy>& policies, bool redesign, Threa
                  const Progress& progress, Comparison& comparison);
 
 /// Writes summary.csv (a row for each group), runs.csv (a row for each run), and each task's
-/// learning curves as CurvesName(task).svg and .png, if possible. Replaces existing files. Returns
-/// the files. Throws Failure if it cannot write.
+/// learning curves as curves.svg and .png, curves-2.svg, …, if possible. Replaces existing files.
+/// Returns the files. Throws Failure if it cannot write.
 std::vector<std::string> WriteComparison(const Comparison& comparison,
                                          const std::filesystem::path& folder);
 

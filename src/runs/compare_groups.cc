@@ -242,6 +242,7 @@ Comparison GroupRuns(const CompareRequest& request) {
   for (const std::string& line : found.left_out) comparison.notes.push_back(line + ": left out");
   if (request.different_tasks) {
     for (RunGroup& group : groups) group.task = 0;
+    comparison.task_texts.resize(1);
   }
   return comparison;
 }

@@ -199,18 +199,13 @@ void DropDuplicates(Found& found) {
   const auto key = [](const RunRecord& run) {
     return std::pair(run.config.train.seed, run.settings);
   };
-  struct Furthest {
-    fs::path path;
-    int64_t step;
-  };
-  std::map<std::pair<int64_t, std::string>, Furthest> furthest;
+  std::map<std::pair<int64_t, std::string>, std::pair<int64_t, fs::path>> longest;
   for (const RunRecord& run : found.runs) {
-    const int64_t step = LastStep(run);
-    const auto [at, is_new] = furthest.try_emplace(key(run), Furthest{run.path, step});
-    if (!is_new && step > at->second.step) at->second = {run.path, step};
+    std::pair<int64_t, fs::path>& kept = longest.try_emplace(key(run), -1, "").first->second;
+    if (LastStep(run) > kept.first) kept = {LastStep(run), run.path};
   }
   std::erase_if(found.runs, [&](const RunRecord& run) {
-    const fs::path& kept = furthest.at(key(run)).path;
+    const fs::path& kept = longest.at(key(run)).second;
     if (run.path == kept) return false;
     found.LeaveOut(run.path, Concat("the same training as ", kept.string(),
                                     " (all settings and seed ", run.config.train.seed, ")"));

@@ -2,10 +2,12 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "agents/config.h"
+#include "base/policy_info.h"
 
 /// Training settings and models in files.
 namespace upswing {
@@ -47,5 +49,13 @@ std::string SettingsMark(const Config& config);
 /// in `set` ("mass2=1.2"). Writes the model's text to `mjcf`. Throws BadInput.
 Plant ChangedPlant(const Plant& base, const std::string& model, const std::vector<std::string>& set,
                    std::string& mjcf);
+
+/// The shell command that trains a policy like this: its agent, its seed, and a flag per setting
+/// that differs from the named agent's.
+///
+/// Nothing if the policy's file lacks a setting, as files of other versions may, or if its agent
+/// was removed. Nothing if a setting's text does not fit on a command line. Throws BadInput that
+/// begins with `where`.
+std::optional<std::string> TrainCommand(const PolicyInfo& info, const std::string& where);
 
 }  // namespace upswing

@@ -32,9 +32,17 @@ std::string BytesOfNumber(T number) {
   return bytes;
 }
 
-double WallTime() {
+tensorboard::Event EventNow() {
   const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return std::chrono::duration<double>(now).count();
+  tensorboard::Event event;
+  event.set_wall_time(std::chrono::duration<double>(now).count());
+  return event;
+}
+
+std::string RecordOf(const tensorboard::Event& event) {
+  const std::string payload = event.SerializeAsString();
+  const std::string length = BytesOfNumber<uint64_t>(payload.size());
+  return length + BytesOfNumber(MaskedCrc(length)) + payload + BytesOfNumber(MaskedCrc(payload));
 }
 
 }  // namespace
@@ -47,31 +55,22 @@ uint32_t Crc32c(std::string_view bytes) {
   return ~crc;
 }
 
-void EventFile::CutTo(int64_t size) {
-  file_.CutTo(size);
-  if (size > 0) return;
-  tensorboard::Event event;
-  event.set_wall_time(WallTime());
-  event.set_file_version("brain.Event:2");
-  AppendRecord(event.SerializeAsString());
-}
-
-void EventFile::Append(int64_t step, const std::vector<std::pair<std::string, double>>& scalars) {
-  tensorboard::Event event;
-  event.set_wall_time(WallTime());
+void AppendEvent(AppendFile& file, int64_t step,
+                 const std::vector<std::pair<std::string, double>>& scalars) {
+  std::string records;
+  if (file.size() == 0) {
+    tensorboard::Event version = EventNow();
+    version.set_file_version("brain.Event:2");
+    records = RecordOf(version);
+  }
+  tensorboard::Event event = EventNow();
   event.set_step(step);
   for (const auto& [tag, scalar] : scalars) {
     auto* value = event.mutable_summary()->add_value();
     value->set_tag(tag);
     value->set_simple_value(static_cast<float>(scalar));
   }
-  AppendRecord(event.SerializeAsString());
-}
-
-void EventFile::AppendRecord(const std::string& payload) {
-  const std::string length = BytesOfNumber<uint64_t>(payload.size());
-  file_.Append(length + BytesOfNumber(MaskedCrc(length)) + payload +
-               BytesOfNumber(MaskedCrc(payload)));
+  file.Append(records + RecordOf(event));
 }
 
 }  // namespace upswing

@@ -213,8 +213,6 @@ std::string EndOfPath(const LoadedPolicy& loaded, int parts) {
 
 }  // namespace
 
-std::string TitleOf(const LoadedPolicy& loaded) { return EndOfPath(loaded, 1); }
-
 std::vector<std::string> TitlesOf(const std::vector<LoadedPolicy>& policies) {
   constexpr int kMostParts = 20;
   std::vector<std::string> titles;

@@ -46,10 +46,9 @@ LoadedPolicy LoadPolicy(const std::filesystem::path& path);
 /// Makes the policy of a file that has been read. Throws as LoadPolicy does.
 LoadedPolicy ReadPolicy(const Tensors& file);
 
-/// A short title for a picture: the folder's name of a run, or the stem of another file.
-std::string TitleOf(const LoadedPolicy& loaded);
-/// Titles of several policies. Parent folders are added until the titles differ, and a long title
-/// keeps only its end.
+/// Short titles of several policies for pictures: the folder's name of a run, or the stem of
+/// another file. Parent folders are added until the titles differ, and a long title keeps only its
+/// end.
 std::vector<std::string> TitlesOf(const std::vector<LoadedPolicy>& policies);
 
 }  // namespace upswing

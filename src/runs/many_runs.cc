@@ -15,7 +15,6 @@
 #include "runs/config_files.h"
 #include "runs/lease.h"
 #include "runs/run_folder.h"
-#include "runs/study_worker.h"
 
 namespace upswing {
 namespace {
@@ -36,12 +35,6 @@ std::string LastLine(const fs::path& path) {
 }
 
 // ---- Checks before anything runs.
-
-/// Throws BadInput unless the folder is free or has the file `mark`.
-void CheckFolder(const fs::path& folder, const fs::path& mark) {
-  if (IsFile(folder / mark)) return;
-  CheckFree(folder, Concat("it has no ", mark.string(), " to resume from; choose another --out"));
-}
 
 /// Throws BadInput if `what`, made with the settings `before`, cannot be resumed with the settings
 /// `now`.
@@ -84,7 +77,7 @@ std::vector<SeedRun> ListRuns(const StudyPlan& plan) {
   std::vector<SeedRun> runs = RunsOf(plan);
   for (SeedRun& run : runs) {
     run.Refresh();
-    if (!run.problem.empty() && !run.HasFailed()) WriteFailed(run, run.problem);
+    if (!run.problem.empty() && !run.HasFailed()) run.WriteFailed(run.problem);
   }
   return runs;
 }
@@ -161,7 +154,7 @@ class LocalWorkers {
       const auto lease = ReadLease(run->claim());
       if (!lease || !lease->holder.starts_with(holder)) continue;
       if (++deaths_[run] < kMostDeaths) return;
-      if (Lease::Take(run->claim(), "reports its end")) WriteFailed(*run, how(run->log()));
+      if (Lease::Take(run->claim(), "reports its end")) run->WriteFailed(how(run->log()));
       return;
     }
     if (++deaths_[nullptr] < kMostDeaths) return;  // the worker died between two runs
@@ -232,8 +225,10 @@ class LocalWorkers {
 FolderLock Prepare(const ManyRuns& many, const std::function<void()>& checked) {
   // Touch nothing before all checks have passed, nor while another process works there.
   const StudyPlan& plan = many.plan;
-  const bool is_study = !many.mark_file.empty();
-  CheckFolder(plan.folder, is_study ? fs::path(many.mark_file) : fs::path(kSettingsName));
+  if (!IsFile(plan.folder / kPlanName)) {
+    CheckFree(plan.folder,
+              Concat("it has no ", kPlanName, " to resume from; choose another --out"));
+  }
   std::optional<FolderLock> lock;
   if (Exists(plan.folder)) lock.emplace(plan.folder);
   for (const Variant& variant : plan.variants) {
@@ -243,7 +238,7 @@ FolderLock Prepare(const ManyRuns& many, const std::function<void()>& checked) {
   }
   checked();
   WritePlan(plan);
-  if (is_study) WriteIfOther(plan.folder / many.mark_file, many.mark_text);
+  if (!many.study_file.empty()) WriteIfOther(plan.folder / "study.toml", many.study_file);
   for (const SeedRun& run : RunsOf(plan)) {
     fs::remove(run.failed());  // so that it is tried again
     if (fs::exists(run.claim())) (void)Lease::Take(run.claim(), "tidies up");  // if it is lost

@@ -11,13 +11,16 @@
 
 namespace upswing {
 
+/// Exit code of a worker that was told to stop: "try again later" in sysexits.h.
+inline constexpr int kTryAgain = 75;
+
 /// A plan that runs on this machine.
 struct ManyRuns {
   StudyPlan plan;
-  std::string what;                  // name of the work, such as `d3qn` or a study's title
-  std::string mark_file, mark_text;  // file that marks the folder; empty: settings.toml
-  int64_t jobs = 1;                  // simultaneous runs
-  bool more_steps = false;           // whether runs with fewer steps may be resumed
+  std::string what;         // name of the work, such as `d3qn` or a study's title
+  std::string study_file;   // text for study.toml; empty: no such file
+  int64_t jobs = 1;         // simultaneous runs
+  bool more_steps = false;  // whether runs with fewer steps may be resumed
 };
 
 /// Observer of many runs. It also says when to stop.

@@ -13,7 +13,6 @@
 #include "os/streams.h"
 #include "pendulum/posterior.h"
 #include "runs/covariance.h"
-#include "runs/shipped_plants.h"
 
 namespace upswing {
 namespace {
@@ -73,8 +72,6 @@ std::vector<FlagValue> PlantFile::PlantFlags() const {
   return flags;
 }
 
-std::vector<std::string> ShippedPlants() { return NamesOf(EmbeddedPlants()); }
-
 PlantFile ParsePlantFile(std::string_view toml, const std::string& where) {
   toml::table table = ParseToml(toml, where);
   TakeOwnTables(table, where);
@@ -102,7 +99,7 @@ PlantDocument ReadPlantDocument(const std::string& name, const std::string& flag
   const auto shipped = std::ranges::find(plants, name, &ShippedPlant::name);
   if (shipped != plants.end()) return {std::string(shipped->toml), Concat("plant ", name)};
   if (!std::filesystem::exists(name)) {
-    const std::vector<std::string> names = ShippedPlants();
+    const std::vector<std::string> names = NamesOf(plants);
     throw BadInput(Concat(flag, ": expected ", else_taken, "a plant file (TOML) or one of ",
                           Join(names, ", "), ", got \"", Printable(name), "\"",
                           DidYouMean(name, names)));

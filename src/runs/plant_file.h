@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,8 +23,14 @@ struct PlantFile {
   std::string name;  // for messages
 };
 
-/// Names of the shipped plants, configs/plants/NAME.toml.
-std::vector<std::string> ShippedPlants();
+/// A file of configs/plants/, compiled into the program.
+struct ShippedPlant {
+  std::string_view name;
+  std::string_view toml;
+};
+
+/// All plants of configs/plants/, sorted by name.
+std::span<const ShippedPlant> EmbeddedPlants();
 
 /// Parses a plant file. Tables that describe other parts of a machine are ignored. `where` names
 /// the file in messages. Throws BadInput.

@@ -156,8 +156,8 @@ TEST(PlantFile, IsALayerBetweenAgentAndFlags) {
 }
 
 TEST(PlantFile, EveryShippedPlantIsValid) {
-  EXPECT_FALSE(ShippedPlants().empty());
-  for (const std::string& name : ShippedPlants())
+  EXPECT_FALSE(EmbeddedPlants().empty());
+  for (const std::string& name : NamesOf(EmbeddedPlants()))
     EXPECT_NO_THROW((void)ReadPlantFile(name)) << name;
 }
 

@@ -3,14 +3,12 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
-#include <fstream>
-#include <limits>
 
 #include "base/archive.h"
 #include "base/error.h"
 #include "base/text.h"
+#include "runs/event_file.h"
 #include "runs/tensor_file.h"
 
 namespace upswing {
@@ -21,39 +19,17 @@ namespace fs = std::filesystem;
 constexpr std::string_view kEventsName = "events.out.tfevents.0.upswing";
 constexpr int64_t kLargestTable = int64_t{1} << 60;
 
-// Files that grow during a run. The checkpoint contains their sizes.
-constexpr std::array kTables{"metrics", "episodes", "evals", "events"};
+// Names of the sizes in the checkpoint of the files that grow during a run.
+constexpr std::array kSizes{"run/size/metrics", "run/size/episodes", "run/size/evals",
+                            "run/size/events"};
 
-/// The name of a table's size in the checkpoint.
-std::string SizeName(std::string_view table) { return Concat("run/size/", table); }
-
-/// Adds the sizes of kTables to a checkpoint.
-void AddSizes(Tensors& checkpoint, const std::array<int64_t, kTables.size()>& sizes) {
-  for (size_t i = 0; i < sizes.size(); ++i) {
-    checkpoint.AddScalar(SizeName(kTables.at(i)), sizes.at(i));
-  }
-}
-
-/// The size of a table in the checkpoint. Throws BadInput if the table, which has `size` bytes now,
-/// is shorter.
-int64_t KnownSize(const Tensors& checkpoint, std::string_view table, const fs::path& path,
-                  int64_t size) {
+/// The size of a file in the checkpoint. Throws BadInput if the file is shorter.
+int64_t KnownSize(const Tensors& checkpoint, const char* name, const AppendFile& file) {
   int64_t known = 0;
-  Archive::Loader(checkpoint).Scalar(SizeName(table), known, {0, kLargestTable});
-  if (size >= known) return known;
-  throw BadInput(Concat(path.string(), ": expected at least the ", known,
-                        " bytes that its checkpoint records, got ", size));
-}
-
-/// Column names in a table's first line; none if the file is empty.
-std::vector<std::string> ColumnsOf(const AppendFile& file) {
-  if (file.size() == 0) return {};
-  std::string begin(std::min<int64_t>(file.size(), 1 << 16), '\0');  // no line of names is longer
-  std::ifstream(file.path()).read(begin.data(), std::ssize(begin));
-  std::string_view rest = begin;
-  std::vector<std::string> columns;
-  for (const std::string_view name : Split(TakeLine(rest), ',')) columns.emplace_back(name);
-  return columns;
+  Archive::Loader(checkpoint).Scalar(name, known, {0, kLargestTable});
+  if (file.size() >= known) return known;
+  throw BadInput(Concat(file.path().string(), ": expected at least the ", known,
+                        " bytes that its checkpoint records, got ", file.size()));
 }
 
 /// `path` without trailing slashes.
@@ -89,7 +65,7 @@ void RunFolder::Create(const fs::path& given,
     if (place.has_parent_path()) MakeFolder(place.parent_path());
     Making folder(place, Making::Kind::kFolder);
     for (const auto& [name, text] : files) WriteFileAtomically(folder.path() / name, text);
-    AddSizes(checkpoint, {0, 0, 0, 0});
+    for (const char* size : kSizes) checkpoint.AddScalar(size, int64_t{0});
     SaveTensors(checkpoint, CheckpointPath(folder.path()));
     folder.Publish();
   } catch (const Error& failure) {
@@ -100,24 +76,17 @@ void RunFolder::Create(const fs::path& given,
 
 RunFolder::RunFolder(fs::path path, const Tensors& checkpoint)
     : path_(std::move(path)),
-      metrics_{"train/", AppendFile(path_ / kMetrics), {}, {}},
-      episodes_{"episode/", AppendFile(path_ / kEpisodes), {}, {}},
-      evals_{"evaluation/", AppendFile(path_ / kEvaluations), {}, {}},
+      metrics_{"train/", AppendFile(path_ / kMetrics), {}},
+      episodes_{"episode/", AppendFile(path_ / kEpisodes), {}},
+      evals_{"evaluation/", AppendFile(path_ / kEvaluations), {}},
       events_(path_ / kEventsName),
       log_(path_ / kLog) {
   // Check all sizes before any file is cut.
-  const auto known = [&](std::string_view name, const auto& file) {
-    return KnownSize(checkpoint, name, file.path(), file.size());
-  };
-  const int64_t metrics = known("metrics", metrics_.file);
-  const int64_t episodes = known("episodes", episodes_.file);
-  const int64_t evals = known("evals", evals_.file);
-  const int64_t events = known("events", events_);
-  metrics_.file.CutTo(metrics);
-  episodes_.file.CutTo(episodes);
-  evals_.file.CutTo(evals);
-  events_.CutTo(events);
-  for (Table* table : {&metrics_, &episodes_, &evals_}) table->columns = ColumnsOf(table->file);
+  std::array<int64_t, kSizes.size()> known{};
+  for (size_t i = 0; i < known.size(); ++i) {
+    known.at(i) = KnownSize(checkpoint, kSizes.at(i), *Growing().at(i));
+  }
+  for (size_t i = 0; i < known.size(); ++i) Growing().at(i)->CutTo(known.at(i));
 }
 
 RunFolder::~RunFolder() {
@@ -151,22 +120,17 @@ void RunFolder::LogEvaluation(const Row& row) {
 }
 
 void RunFolder::AppendRow(Table& table, const Row& row) {
-  std::string text;
-  if (table.columns.empty()) {
-    for (const auto& [name, value] : row) table.columns.push_back(name);
-    text = Join(table.columns, ",") + '\n';
+  std::vector<std::string> names, cells;
+  for (const auto& [name, value] : row) {
+    names.push_back(name);
+    cells.push_back(FormatNumber(value));
   }
-  for (const std::string& column : table.columns) {
-    const auto cell = std::ranges::find(row, column, &Row::value_type::first);
-    const double value =
-        cell == row.end() ? std::numeric_limits<double>::quiet_NaN() : cell->second;
-    text += Concat(&column == &table.columns.front() ? "" : ",", FormatNumber(value));
-  }
-  table.pending += text + '\n';
+  if (table.file.size() == 0 && table.pending.empty()) table.pending = Join(names, ",") + '\n';
+  table.pending += Join(cells, ",") + '\n';
 
   Row scalars(row.begin() + 1, row.end());
   for (auto& [name, value] : scalars) name.insert(0, table.tag);
-  events_.Append(static_cast<int64_t>(row.front().second), scalars);
+  AppendEvent(events_, static_cast<int64_t>(row.front().second), scalars);
 }
 
 void RunFolder::Log(std::string_view line) {
@@ -178,11 +142,43 @@ void RunFolder::Log(std::string_view line) {
 void RunFolder::SaveCheckpoint(Tensors& checkpoint) {
   episodes_.Flush();
   // The tables must be on disk before the checkpoint with their sizes.
-  for (const Table* table : {&metrics_, &episodes_, &evals_}) table->file.Sync();
-  events_.Sync();
-  AddSizes(checkpoint,
-           {metrics_.file.size(), episodes_.file.size(), evals_.file.size(), events_.size()});
+  for (size_t i = 0; i < kSizes.size(); ++i) {
+    Growing().at(i)->Sync();
+    checkpoint.AddScalar(kSizes.at(i), Growing().at(i)->size());
+  }
   SaveTensors(checkpoint, CheckpointPath(path_));
+}
+
+Row EpisodeRow(const TrainState& s, const FinishedEpisode& episode, const EnvSpec& spec) {
+  Row row{{"step", s.steps},
+          {"episode", s.episodes},
+          {"return", episode.reward_sum},
+          {"length", episode.length},
+          {"terminated", episode.terminated ? 1 : 0}};
+  const std::vector<std::string>& names = spec.term_names;
+  for (size_t k = 0; k < names.size(); ++k) row.emplace_back(names[k], episode.terms[k]);
+  return row;
+}
+
+Row MetricsRow(const TrainState& s, const Metrics& metrics) {
+  Row row{{"step", s.steps}, {"episodes", s.episodes}};
+  row.insert(row.end(), metrics.begin(), metrics.end());
+  row.emplace_back("mean_return", s.mean_return());
+  row.emplace_back("success_rate", s.last_success_rate);
+  row.emplace_back("seconds", s.seconds);
+  return row;
+}
+
+Row EvaluationCells(const TrainState& s, const Evaluation& e) {
+  Row row{{"step", s.steps},
+          {"success_rate", e.success_rate()},
+          {"success_low", e.success_interval.low},
+          {"success_high", e.success_interval.high}};
+  for (const EvaluationFigure& figure : EvaluationFigures()) {
+    if (figure.column != nullptr) row.emplace_back(figure.column, figure.Of(e));
+  }
+  row.emplace_back("seconds", s.seconds);
+  return row;
 }
 
 }  // namespace upswing

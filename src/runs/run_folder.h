@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -8,12 +9,23 @@
 
 #include "base/tensors.h"
 #include "os/file.h"
-#include "runs/event_file.h"
+#include "rl/trainer.h"
 
 namespace upswing {
 
 /// A row of a table: column names and values in order. The first column is the step.
 using Row = std::vector<std::pair<std::string, double>>;
+
+// Rows of a run's tables (docs/reference/run-folder.md).
+
+/// Row of episodes.csv for a training episode that has ended.
+Row EpisodeRow(const TrainState& s, const FinishedEpisode& episode, const EnvSpec& spec);
+
+/// Row of metrics.csv: the agent's metrics and the training's progress.
+Row MetricsRow(const TrainState& s, const Metrics& metrics);
+
+/// Row of evals.csv for an evaluation.
+Row EvaluationCells(const TrainState& s, const Evaluation& e);
 
 /// A run on disk:
 ///   config.toml             every setting; `train --config` repeats the run
@@ -78,17 +90,20 @@ class RunFolder {
   struct Table {
     std::string tag;  // prefix of its columns in TensorBoard
     AppendFile file;
-    std::vector<std::string> columns;  // column names of the first line; empty: no line yet
-    std::string pending;               // rows that are not in the file yet
+    std::string pending;  // rows that are not in the file yet
     void Flush();
   };
-  /// Appends a row in the order of the table's own columns. Another version may have begun the
-  /// table.
+  /// Appends a row. All rows of a table have the same columns.
   void AppendRow(Table& table, const Row& row);
+
+  /// The files whose sizes are in the checkpoint.
+  std::array<AppendFile*, 4> Growing() {
+    return {&metrics_.file, &episodes_.file, &evals_.file, &events_};
+  }
 
   std::filesystem::path path_;
   Table metrics_, episodes_, evals_;
-  EventFile events_;
+  AppendFile events_;
   AppendFile log_;
 };
 

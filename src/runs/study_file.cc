@@ -1,5 +1,3 @@
-#include "runs/study_file.h"
-
 #include <toml++/toml.h>
 
 #include <algorithm>
@@ -11,6 +9,7 @@
 #include "base/text.h"
 #include "runs/config_files.h"
 #include "runs/seeds.h"
+#include "runs/study_plan.h"
 
 namespace upswing {
 namespace {
@@ -124,27 +123,18 @@ std::string ReadText(const toml::table& study, const std::string& key, const std
 
 }  // namespace
 
-StudyFile ParseStudy(std::string_view text, const std::string& where) {
+StudyPlan ParseStudy(std::string_view text, const std::string& where, Keep keep) {
   const toml::table table = ParseToml(text, where);
   CheckKeys(table, where);
-  StudyFile study{ReadText(table, "title", where), ReadVariants(table, where), {}, {}};
-  if (const toml::node* keep = table.get("keep")) {
-    study.keep = ParseKeep(ReadText(table, "keep", where), Concat(PlaceOf(*keep, where), ": keep"));
+  StudyPlan study{"", ReadText(table, "title", where), ReadVariants(table, where), {}, keep};
+  if (const toml::node* kept = table.get("keep")) {
+    study.keep = ParseKeep(ReadText(table, "keep", where), Concat(PlaceOf(*kept, where), ": keep"));
   }
   const std::string seeds = ReadText(table, "seeds", where);
   if (!seeds.empty()) {
     study.seeds = ParseSeeds(seeds, Concat(PlaceOf(*table.get("seeds"), where), ": seeds"));
   }
   return study;
-}
-
-StudyOutline ParseStudyOutline(std::string_view text, const std::string& where) {
-  const toml::table table = ParseToml(text, where);
-  StudyOutline outline{ReadText(table, "title", where), {}};
-  if (const auto* variants = table["variants"].as_table()) {
-    for (const auto& [key, node] : *variants) outline.variants.emplace_back(key.str());
-  }
-  return outline;
 }
 
 }  // namespace upswing

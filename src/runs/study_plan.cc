@@ -78,6 +78,10 @@ void SeedRun::Refresh() {
   }
 }
 
+void SeedRun::WriteFailed(const std::string& why) const {
+  WriteFileAtomically(failed(), Concat(Printable(why), "\n"));
+}
+
 bool SeedRun::IsReduced() const {
   return fs::exists(done()) && !fs::exists(RunFolder::CheckpointPath(path));
 }
@@ -110,6 +114,7 @@ void WritePlan(const StudyPlan& plan) {
     variants.push_back({{"name", variant.name}, {"settings", SettingsMark(variant.config)}});
   }
   const ordered_json j{{"version", UPSWING_VERSION},
+                       {"title", plan.title},
                        {"keep", kKeeps.at(static_cast<size_t>(plan.keep))},
                        {"seeds", Concat("[", SeedsText(plan.seeds), "]")},
                        {"variants", variants}};
@@ -118,6 +123,7 @@ void WritePlan(const StudyPlan& plan) {
 
 StudyPlan PlanIn(const json& j, std::vector<std::string>& marks) {
   StudyPlan plan;
+  if (j.contains("title")) plan.title = JsonText(j, "title");  // not in plans of 0.5.0
   plan.keep = ParseKeep(JsonText(j, "keep"), "keep");
   plan.seeds = ParseSeeds(JsonText(j, "seeds"), "seeds");
   for (const json& one : JsonList(j, "variants", kMostVariants)) {
@@ -168,13 +174,38 @@ StudyPlan ReadPlan(const fs::path& folder) {
   return plan;
 }
 
-Keep KeepOf(const fs::path& folder) {
+std::optional<StudyPlan> PlanBefore(const fs::path& folder) {
   try {
-    const json j = ParseJsonObject(ReadOwnFile(folder / kPlanName, kMostPlanBytes), 4);
-    return ParseKeep(JsonText(j, "keep"), "keep");
+    std::vector<std::string> marks;
+    return PlanIn(ParseJsonObject(ReadOwnFile(folder / kPlanName, kMostPlanBytes), 4), marks);
   } catch (const Error&) {
-    return Keep::kAll;
+    return std::nullopt;
   }
+}
+
+void WriteEvaluations(const StudyPlan& plan) {
+  std::string columns, table;
+  for (const SeedRun& run : RunsOf(plan)) {
+    const auto result = FinishedRun::Read(run.done());
+    if (!result) continue;
+    bool is_first = true;
+    for (std::string_view rest = result->evaluations; !rest.empty();) {
+      const std::string_view line = TakeLine(rest);
+      if (line.empty()) continue;
+      if (!is_first) {
+        table += Concat(run.variant->name, ',', run.seed, ',', Printable(line), '\n');
+      } else if (columns.empty()) {
+        columns = Printable(line);
+      } else if (columns != Printable(line)) {
+        throw Failure(
+            Concat(run.done().string(),
+                   ": expected evaluations with the columns of the other runs, got others"));
+      }
+      is_first = false;
+    }
+  }
+  WriteFileAtomically(plan.folder / "evaluations.csv",
+                      Concat("variant,seed,", columns, "\n", table));
 }
 
 void CheckVariantName(const std::string& name, const std::string& place) {

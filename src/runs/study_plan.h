@@ -5,6 +5,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "agents/config.h"
@@ -33,10 +34,16 @@ inline constexpr size_t kMostVariants = 10'000;
 /// Many trainings: each variant with each seed, in FOLDER/VARIANT/seedN.
 struct StudyPlan {
   std::filesystem::path folder;
+  std::string title;  // may be empty
   std::vector<Variant> variants;
   std::vector<int64_t> seeds;
   Keep keep = Keep::kAll;
 };
+
+/// Parses the text of a study file: a plan without a folder; without seeds if the file has none.
+/// `keep` counts if the file has no such line. `where` is the path of the file, and the path of a
+/// model is relative to its folder. Throws BadInput with the line.
+StudyPlan ParseStudy(std::string_view text, const std::string& where, Keep keep = Keep::kAll);
 
 /// A run of a plan. Its state is in files next to its folder. Any process on any host with access
 /// to the folder can therefore continue it.
@@ -68,6 +75,8 @@ struct SeedRun {
   void Read();
   /// Reads state and problem. An error becomes the run's problem.
   void Refresh();
+  /// Writes the reason of its failure to the file failed().
+  void WriteFailed(const std::string& why) const;
 
  private:
   std::filesystem::path With(const char* ending) const { return path.string() + ending; }
@@ -89,8 +98,12 @@ StudyPlan PlanIn(const nlohmann::json& plan, std::vector<std::string>& marks);
 /// if a variant's settings no longer match the plan.
 StudyPlan ReadPlan(const std::filesystem::path& folder);
 
-/// The `keep` of the plan in a folder; kAll if there is no readable plan.
-Keep KeepOf(const std::filesystem::path& folder);
+/// The plan in a folder as PlanIn reads it; nothing if there is no readable one.
+std::optional<StudyPlan> PlanBefore(const std::filesystem::path& folder);
+
+/// Writes evaluations.csv into the folder of a plan: the rows of evals.csv of all finished runs,
+/// with variant and seed.
+void WriteEvaluations(const StudyPlan& plan);
 
 /// Names of the files.
 inline constexpr const char* kPlanName = "plan.json";

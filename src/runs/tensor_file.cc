@@ -10,18 +10,6 @@
 #include "os/host.h"
 
 namespace upswing {
-namespace {
-
-/// Throws BadInput for anything except a regular file, because a pipe may never end. A missing file
-/// is left to the reader, which reports it.
-void CheckRegular(const std::filesystem::path& path) {
-  std::error_code error;
-  if (!std::filesystem::exists(path, error) || std::filesystem::is_regular_file(path, error))
-    return;
-  throw BadInput(Concat("cannot read ", path.string(), ": expected a regular file"));
-}
-
-}  // namespace
 
 void SaveTensors(const Tensors& tensors, const std::filesystem::path& path) {
   const Safetensors written = WriteSafetensors(tensors);
@@ -39,7 +27,9 @@ Tensors LoadTensors(const std::filesystem::path& path, size_t most_bytes) {
 
 Tensors LoadPartOfTensors(const std::filesystem::path& path, std::string_view prefix) {
   Tensors part(path.string());
-  CheckRegular(path);
+  // Anything else, such as a pipe, may never end.
+  if (!IsFile(path))
+    throw BadInput(Concat("cannot read ", part.where(), ": expected a regular file"));
   std::ifstream file(path, std::ios::binary);
   std::error_code error;
   const uint64_t file_size = std::filesystem::file_size(path, error);

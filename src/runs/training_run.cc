@@ -11,7 +11,6 @@
 #include "os/host.h"
 #include "runs/config_files.h"
 #include "runs/run_conditions.h"
-#include "runs/run_rows.h"
 #include "runs/tensor_file.h"
 #include "runs/this_host.h"
 

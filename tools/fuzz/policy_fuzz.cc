@@ -9,8 +9,8 @@
 #include "base/safetensors.h"
 #include "base/text.h"
 #include "extras/deploy/export.h"
+#include "runs/config_files.h"
 #include "runs/find_policy.h"
-#include "runs/train_command.h"
 #include "tools/fuzz/target.h"
 
 namespace upswing {
