@@ -34,23 +34,34 @@ std::vector<Cycle> CyclesOf(Pieces pieces) {
   return cycles;
 }
 
+std::vector<double> SortedSeconds(const std::vector<Cycle>& cycles) {
+  std::vector<double> seconds;
+  for (const Cycle& cycle : cycles) seconds.push_back(cycle.seconds);
+  std::ranges::sort(seconds);
+  return seconds;
+}
+
+double UsualOf(std::span<const double> sorted) {
+  const size_t quarter = sorted.size() / 4;
+  return MomentsOf(sorted.subspan(quarter, sorted.size() - 2 * quarter)).mean;
+}
+
 LogRows RangeOf(const Cycle& cycle) {
   return machine::RangeOf(*cycle.piece, cycle.row - 1, cycle.row);
 }
 
-void CheckClockUnit(double usual, Findings& findings) {
+void CheckClockUnit(double usual, const Reporter& report) {
   constexpr double kSlow = 0.5, kVerySlow = 50;  // s
   if (usual < kSlow) return;
-  findings.push_back({Aspect::kClock, 0, Severity::kFault,
-                      fmt::format("cycles of {:.4g} s: suspect a clock in {} (key unit){}", usual,
-                                  usual < kVerySlow ? "ms" : "µs",
-                                  usual == 1 ? ", or numbers of rows (key factor)" : "")});
+  report(Severity::kFault, fmt::format("cycles of {:.4g} s: suspect a clock in {} (key unit){}",
+                                       usual, usual < kVerySlow ? "ms" : "µs",
+                                       usual == 1 ? ", or numbers of rows (key factor)" : ""));
 }
 
 /// Cycles that are longer count as gaps, s.
 double GapOf(double usual) { return std::max(0.05, 20 * usual); }
 
-void CheckLostCycles(const std::vector<Cycle>& cycles, double usual, Findings& findings) {
+void CheckLostCycles(const std::vector<Cycle>& cycles, double usual, const Reporter& report) {
   constexpr double kLate = 1.5;  // usual cycles; a longer cycle lost at least one
   int places = 0, standing = 0;
   double lost = 0;
@@ -65,45 +76,33 @@ void CheckLostCycles(const std::vector<Cycle>& cycles, double usual, Findings& f
   if (standing > 0) {
     constexpr double kMuch = 0.1;  // share of cycles
     const bool is_fault = standing > kMuch * static_cast<double>(cycles.size());
-    findings.push_back(
-        {Aspect::kClock,
-         0,
-         is_fault ? Severity::kFault : Severity::kWarning,
-         fmt::format("the clock stands still in {} row{}{}", standing, standing > 1 ? "s" : "",
-                     is_fault       ? ": suspect rows that are there twice, or times with "
-                                      "too few digits"
-                     : standing > 1 ? ", first"
-                                    : ""),
-         RangeOf(*first_standing),
-         {{"standing", standing}}});
+    report(is_fault ? Severity::kFault : Severity::kWarning,
+           fmt::format("the clock stands still in {}{}", Counted(standing, "row"),
+                       is_fault       ? ": suspect rows that are there twice, or times with "
+                                        "too few digits"
+                       : standing > 1 ? ", first"
+                                      : ""),
+           RangeOf(*first_standing), {{"standing", standing}});
   }
   if (longest == nullptr) return;
   constexpr double kMuch = 0.01;  // share of cycles
   const double share = lost / (lost + static_cast<double>(cycles.size()));
-  findings.push_back({Aspect::kClock,
-                      0,
-                      share > kMuch ? Severity::kWarning : Severity::kNote,
-                      fmt::format("{} ({:.2g}%) lost at {}, longest {:.3g} ms",
-                                  Counted(std::lround(std::min(lost, 1e15)), "cycle"), 100 * share,
-                                  Counted(places, "place"), 1e3 * longest->seconds),
-                      RangeOf(*longest),
-                      {{"lost", lost}, {"places", places}}});
+  report(share > kMuch ? Severity::kWarning : Severity::kNote,
+         fmt::format("{} ({:.2g}%) lost at {}, longest {:.3g} ms",
+                     Counted(std::lround(std::min(lost, 1e15)), "cycle"), 100 * share,
+                     Counted(places, "place"), 1e3 * longest->seconds),
+         RangeOf(*longest), {{"lost", lost}, {"places", places}});
 }
 
-void CheckGaps(const std::vector<Cycle>& cycles, double usual, Findings& findings) {
+void CheckGaps(const std::vector<Cycle>& cycles, double usual, const Reporter& report) {
   constexpr int kMostGaps = 10;  // with a line each
   int gaps = 0;
   for (const Cycle& cycle : cycles) {
     if (cycle.seconds <= GapOf(usual) || ++gaps > kMostGaps) continue;
-    findings.push_back({Aspect::kClock,
-                        0,
-                        Severity::kFault,
-                        fmt::format("a gap of {:.4g} s", cycle.seconds),
-                        RangeOf(cycle),
-                        {{"gap", cycle.seconds}}});
+    report(Severity::kFault, fmt::format("a gap of {:.4g} s", cycle.seconds), RangeOf(cycle),
+           {{"gap", cycle.seconds}});
   }
-  if (gaps <= kMostGaps) return;
-  findings.push_back({Aspect::kClock, 0, Severity::kFault, Counted(gaps - kMostGaps, "more gap")});
+  if (gaps > kMostGaps) report(Severity::kFault, Counted(gaps - kMostGaps, "more gap"));
 }
 
 }  // namespace
@@ -122,13 +121,7 @@ LogRows RangeOf(const MachineLog& piece, int first, int last) {
   return {piece.first_row + first, piece.first_row + last, piece.time[first], piece.time[last]};
 }
 
-double UsualCycle(Pieces pieces) {
-  std::vector<double> seconds;
-  for (const Cycle& cycle : CyclesOf(pieces)) seconds.push_back(cycle.seconds);
-  std::ranges::sort(seconds);
-  const size_t quarter = seconds.size() / 4;
-  return MomentsOf(std::span(seconds).subspan(quarter, seconds.size() - 2 * quarter)).mean;
-}
+double UsualCycle(Pieces pieces) { return UsualOf(SortedSeconds(CyclesOf(pieces))); }
 
 double CentralDifference(const MachineLog& log, int k, int joint) {
   const double seconds = log.time[k + 1] - log.time[k - 1];
@@ -147,27 +140,21 @@ double AngleRange(Pieces pieces, int joint) {
 }
 
 void CheckClock(Pieces pieces, Findings& findings) {
+  const Reporter report{findings, Aspect::kClock};
   const std::vector<Cycle> cycles = CyclesOf(pieces);
-  std::vector<double> seconds;
-  for (const Cycle& cycle : cycles) seconds.push_back(cycle.seconds);
-  std::ranges::sort(seconds);
-  const double usual = UsualCycle(pieces), p99 = Quantile(seconds, 0.99);
+  const std::vector<double> seconds = SortedSeconds(cycles);
+  const double usual = UsualOf(seconds), p99 = Quantile(seconds, 0.99);
   if (usual <= 0) {
-    findings.push_back({Aspect::kClock, 0, Severity::kFault,
-                        "the clock hardly ever advances: suspect times with too few digits"});
-    return;
+    return report(Severity::kFault,
+                  "the clock hardly ever advances: suspect times with too few digits");
   }
-  findings.push_back({Aspect::kClock,
-                      0,
-                      Severity::kNote,
-                      fmt::format("{:.4g} Hz, cycles of {:.4g} ms (usual), {:.4g} ms (99%), "
-                                  "{:.4g} ms (longest)",
-                                  1 / usual, 1e3 * usual, 1e3 * p99, 1e3 * seconds.back()),
-                      {},
-                      {{"usual", usual}, {"p99", p99}, {"longest", seconds.back()}}});
-  CheckClockUnit(usual, findings);
-  CheckLostCycles(cycles, usual, findings);
-  CheckGaps(cycles, usual, findings);
+  report(Severity::kNote,
+         fmt::format("{:.4g} Hz, cycles of {:.4g} ms (usual), {:.4g} ms (99%), {:.4g} ms (longest)",
+                     1 / usual, 1e3 * usual, 1e3 * p99, 1e3 * seconds.back()),
+         {}, {{"usual", usual}, {"p99", p99}, {"longest", seconds.back()}});
+  CheckClockUnit(usual, report);
+  CheckLostCycles(cycles, usual, report);
+  CheckGaps(cycles, usual, report);
 }
 
 bool LogCheck::faulty() const {

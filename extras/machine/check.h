@@ -27,14 +27,17 @@ struct LogRows {
   double begin = 0, end = 0;  // s
 };
 
+/// Numbers of a finding by name, for JSON, in SI units.
+using Numbers = std::vector<std::pair<std::string, double>>;
+
 /// A result of a check. A fault misleads an identification that uses the log as it is.
 struct Finding {
   Aspect aspect = Aspect::kClock;
   int joint = 0;  // 1 or 2; 0: the whole log
   Severity severity = Severity::kNote;
-  std::string text;                                          // one line
-  std::optional<LogRows> rows = {};                          // nothing: all rows
-  std::vector<std::pair<std::string, double>> numbers = {};  // for JSON, in SI units
+  std::string text;             // one line
+  std::optional<LogRows> rows;  // nothing: all rows
+  Numbers numbers;
 };
 
 /// The findings about a file.
@@ -72,6 +75,18 @@ std::vector<MachineLog> ReadCheckedLogs(std::span<const std::string> files,
 // The checks, each of which appends its findings.
 using Findings = std::vector<Finding>;
 using Pieces = std::span<const MachineLog>;
+
+/// Appends findings about an aspect of a joint (1 or 2; 0: the whole log).
+struct Reporter {
+  Findings& findings;
+  Aspect aspect;
+  int joint = 0;
+
+  void operator()(Severity severity, const std::string& text, std::optional<LogRows> rows = {},
+                  const Numbers& numbers = {}) const {
+    findings.push_back({aspect, joint, severity, text, rows, numbers});
+  }
+};
 
 /// Rate, jitter, lost cycles and gaps.
 void CheckClock(Pieces pieces, Findings& findings);

@@ -38,6 +38,14 @@ std::optional<double> QuantumOf(Pieces pieces, int joint) {
   return quantum;
 }
 
+/// |speed| of a joint from row k - 1 to row k, rad/s; 0 beyond the piece's ends and if the clock
+/// stands still.
+double SpeedTo(const MachineLog& log, int joint, int k) {
+  if (k < 1 || k >= log.rows()) return 0;
+  const double seconds = log.time[k] - log.time[k - 1];
+  return seconds > 0 ? std::abs(log.angle[k][joint] - log.angle[k - 1][joint]) / seconds : 0;
+}
+
 /// Adjacent rows of a piece with the same angle.
 struct Repeat {
   const MachineLog* piece;
@@ -52,12 +60,7 @@ std::vector<Repeat> RepeatsOf(Pieces pieces, int joint) {
   constexpr int kRows = 5;
   std::vector<Repeat> repeats;
   for (const MachineLog& piece : pieces) {
-    const auto difference = [&](int k) {  // |speed| from row k - 1 to row k, rad/s
-      if (k < 1 || k >= piece.rows()) return 0.0;
-      const double seconds = piece.time[k] - piece.time[k - 1];
-      const double change = std::abs(piece.angle[k][joint] - piece.angle[k - 1][joint]);
-      return seconds > 0 ? change / seconds : 0;
-    };
+    const auto difference = [&](int k) { return SpeedTo(piece, joint, k); };
     for (int first = 0; first < piece.rows();) {
       int last = first;
       while (last + 1 < piece.rows() && piece.angle[last + 1][joint] == piece.angle[first][joint]) {
@@ -88,7 +91,7 @@ bool IsSudden(const Repeat& repeat, double quantum) {
 }
 
 /// Finds repeats within motion: at the end of the range the encoder saturates, elsewhere it sticks.
-void CheckRepeats(Pieces pieces, int joint, double quantum, Findings& findings) {
+void CheckRepeats(Pieces pieces, int joint, double quantum, const Reporter& report) {
   double low = 0, high = 0;
   for (const MachineLog& piece : pieces) {
     for (const Joints& q : piece.angle) {
@@ -111,15 +114,11 @@ void CheckRepeats(Pieces pieces, int joint, double quantum, Findings& findings) 
   for (const int stuck : {0, 1}) {
     if (count[stuck] == 0) continue;
     const Repeat& r = *longest[stuck];
-    findings.push_back(
-        {Aspect::kAngle,
-         joint + 1,
-         Severity::kFault,
-         fmt::format("{} at {:.4g} rad while the joint moves{}",
-                     stuck ? "the encoder sticks" : "saturates", r.piece->angle[r.first][joint],
-                     count[stuck] > 1 ? fmt::format("; {} times, longest", count[stuck]) : ""),
-         RangeOf(*r.piece, r.first, r.last),
-         {{"times", count[stuck]}}});
+    report(Severity::kFault,
+           fmt::format("{} at {:.4g} rad while the joint moves{}",
+                       stuck ? "the encoder sticks" : "saturates", r.piece->angle[r.first][joint],
+                       count[stuck] > 1 ? fmt::format("; {} times, longest", count[stuck]) : ""),
+           RangeOf(*r.piece, r.first, r.last), {{"times", count[stuck]}});
   }
 }
 
@@ -135,11 +134,9 @@ double SpeedAt(const MachineLog& log, int joint, int row, bool ends) {
   std::vector<double> speeds;
   for (int k = ends ? row - 2 : row + 1; k <= (ends ? row : row + 3); ++k) {
     if (k < 1 || k >= log.rows()) continue;
-    const double seconds = log.time[k] - log.time[k - 1];
-    const double move = std::abs(log.angle[k][joint] - log.angle[k - 1][joint]);
-    if (seconds > 0) speeds.push_back(move / seconds);
+    if (log.time[k] > log.time[k - 1]) speeds.push_back(SpeedTo(log, joint, k));
   }
-  return speeds.empty() ? 0 : QuartilesOf(std::move(speeds)).median;
+  return QuartilesOf(std::move(speeds)).median;
 }
 
 std::vector<Jump> JumpsOf(Pieces pieces, int joint) {
@@ -171,7 +168,7 @@ std::vector<Jump> JumpsOf(Pieces pieces, int joint) {
 }
 
 /// Reports wrapped angles, wrong samples, and encoders that slip.
-void CheckJumps(Pieces pieces, int joint, Findings& findings) {
+void CheckJumps(Pieces pieces, int joint, const Reporter& report) {
   constexpr int kShort = 3;      // rows of a wrong sample
   constexpr double kNear = 0.5;  // rad
   constexpr double kTurn = 2 * std::numbers::pi;
@@ -185,33 +182,29 @@ void CheckJumps(Pieces pieces, int joint, Findings& findings) {
     (is_turn ? wraps : returns ? wrong : slips).push_back(jumps[i]);
     if (!is_turn && returns) ++i;
   }
-  const auto report = [&](const std::vector<Jump>& found, const std::string& text) {
+  const auto add = [&](const std::vector<Jump>& found, const auto& text_of) {
     if (found.empty()) return;
     const Jump& first = found.front();
-    findings.push_back(
-        {Aspect::kAngle,
-         joint + 1,
-         Severity::kFault,
-         found.size() == 1 ? text : fmt::format("{}; {} times, first", text, found.size()),
-         RangeOf(*first.piece, first.row - 1, first.row),
-         {{"times", static_cast<double>(found.size())}, {"jump", first.size}}});
+    const std::string text = text_of(first), times = fmt::format("; {} times, first", found.size());
+    report(Severity::kFault, found.size() == 1 ? text : text + times,
+           RangeOf(*first.piece, first.row - 1, first.row),
+           {{"times", static_cast<double>(found.size())}, {"jump", first.size}});
   };
-  report(wraps,
-         "jumps by a turn: suspect a wrapped angle; name the turn by the key wrap of its column");
-  if (!wrong.empty()) {
-    const Jump& first = wrong.front();
-    report(wrong, fmt::format("a wrong sample: {:.4g} rad after {:.4g} rad",
-                              first.piece->angle[first.row][joint],
-                              first.piece->angle[first.row - 1][joint]));
-  }
-  if (!slips.empty()) {
-    report(slips, fmt::format("jumps by {:.3g} rad: suspect an encoder that slips or loses counts",
-                              slips.front().size));
-  }
+  add(wraps, [](const Jump&) {
+    return "jumps by a turn: suspect a wrapped angle; name the turn by the key wrap of its column";
+  });
+  add(wrong, [&](const Jump& jump) {
+    return fmt::format("a wrong sample: {:.4g} rad after {:.4g} rad",
+                       jump.piece->angle[jump.row][joint], jump.piece->angle[jump.row - 1][joint]);
+  });
+  add(slips, [](const Jump& jump) {
+    return fmt::format("jumps by {:.3g} rad: suspect an encoder that slips or loses counts",
+                       jump.size);
+  });
 }
 
 /// Reports speeds that no pendulum reaches.
-void CheckSpeeds(Pieces pieces, int joint, Findings& findings) {
+void CheckSpeeds(Pieces pieces, int joint, const Reporter& report) {
   std::vector<double> speeds;
   for (const MachineLog& piece : pieces) {
     for (int k = 1; k + 1 < piece.rows(); ++k) {
@@ -223,32 +216,26 @@ void CheckSpeeds(Pieces pieces, int joint, Findings& findings) {
   constexpr double kFast = 60;  // rad/s
   const double speed = Quantile(speeds, 0.99);
   if (speed <= kFast) return;
-  findings.push_back(
-      {Aspect::kAngle,
-       joint + 1,
-       Severity::kFault,
-       fmt::format("moves at {:.4g} rad/s: suspect degrees or counts (key unit)", speed),
-       {},
-       {{"speed", speed}}});
+  report(Severity::kFault,
+         fmt::format("moves at {:.4g} rad/s: suspect degrees or counts (key unit)", speed), {},
+         {{"speed", speed}});
 }
 
 }  // namespace
 
 void CheckAngles(Pieces pieces, Findings& findings) {
   for (const int joint : {0, 1}) {
+    const Reporter report{findings, Aspect::kAngle, joint + 1};
     const std::optional<double> quantum = QuantumOf(pieces, joint);
     if (quantum) {
-      findings.push_back({Aspect::kAngle,
-                          joint + 1,
-                          Severity::kNote,
-                          fmt::format("steps of {:.3g} rad ({:.0f} per turn)", *quantum,
-                                      2 * std::numbers::pi / *quantum),
-                          {},
-                          {{"quantum", *quantum}}});
+      report(Severity::kNote,
+             fmt::format("steps of {:.3g} rad ({:.0f} per turn)", *quantum,
+                         2 * std::numbers::pi / *quantum),
+             {}, {{"quantum", *quantum}});
     }
-    CheckRepeats(pieces, joint, quantum.value_or(0), findings);
-    CheckJumps(pieces, joint, findings);
-    CheckSpeeds(pieces, joint, findings);
+    CheckRepeats(pieces, joint, quantum.value_or(0), report);
+    CheckJumps(pieces, joint, report);
+    CheckSpeeds(pieces, joint, report);
   }
 }
 

@@ -298,12 +298,12 @@ bool InProportion(const std::vector<Window>& windows) {
 
 void Report(const Explanation& e, bool in_proportion, Findings& findings) {
   const auto add = [&](Aspect aspect, int joint, const std::string& text) {
-    findings.push_back(
-        {aspect, joint, Severity::kFault,
-         fmt::format("suspect {}: with it the motion is that of a pendulum{}", text,
-                     in_proportion ? "; or another sign, joint or zero of angles or torques: the "
-                                     "joints move in proportion"
-                                   : "")});
+    Reporter{findings, aspect, joint}(
+        Severity::kFault,
+        fmt::format("suspect {}: with it the motion is that of a pendulum{}", text,
+                    in_proportion ? "; or another sign, joint or zero of angles or torques: the "
+                                    "joints move in proportion"
+                                  : ""));
   };
   const Reading& r = e.reading;
   if (r.swapped && e.torques_swapped) add(Aspect::kMotion, 0, "swapped columns of both joints");
@@ -340,11 +340,9 @@ void CheckEquations(Pieces pieces, Findings& findings) {
   if (!(UsualCycle(pieces) > 0)) return;
   const std::vector<Window> windows = WindowsOf(pieces);
   if (windows.size() < kEnough) return;
-  std::array<bool, 2> has_torque{};
+  std::array<bool, 2> has_torque{HasCommand(pieces, 0), HasCommand(pieces, 1)};
   for (const MachineLog& log : pieces) {
-    for (const int j : {0, 1}) {
-      has_torque[j] = has_torque[j] || HasTorque(log.commanded, j) || HasTorque(log.push, j);
-    }
+    for (const int j : {0, 1}) has_torque[j] = has_torque[j] || HasTorque(log.push, j);
   }
   const bool in_proportion = InProportion(windows);
   if (in_proportion && !has_torque[0] && !has_torque[1]) return;

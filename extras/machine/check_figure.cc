@@ -77,9 +77,8 @@ std::string CaptionOf(const LogCheck& check) {
   std::vector<std::string> texts;
   for (const Finding& finding : check.findings) {
     if (finding.severity == Severity::kNote) continue;
-    const std::string joint = finding.joint > 0 ? Concat(" ", finding.joint) : "";
-    texts.push_back(Concat(NameOf(finding.aspect), joint, ": ", finding.text, " (",
-                           NameOf(finding.severity), ")"));
+    texts.push_back(
+        Concat(AboutText(finding), ": ", finding.text, " (", NameOf(finding.severity), ")"));
   }
   return texts.empty() ? "no warning and no fault" : Join(texts, "; ");
 }

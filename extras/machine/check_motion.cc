@@ -54,7 +54,7 @@ Extent ExtentOf(const MachineLog& piece, int first, int last) {
   return extent;
 }
 
-void CheckGrowth(const MachineLog& piece, Findings& findings) {
+void CheckGrowth(const MachineLog& piece, const Reporter& report) {
   constexpr double kLongEnough = 2;           // s
   constexpr double kHeight = 0.3;             // of a swing within 45°
   constexpr double kRest = 0.002, kGrow = 4;  // heights: amplitude 0.06 rad, and its double
@@ -69,14 +69,11 @@ void CheckGrowth(const MachineLog& piece, Findings& findings) {
                      after.speed > 2 * before.speed + 0.3;
   if (!grows) return;
   const bool known = !piece.commanded.empty() || !piece.measured.empty();
-  findings.push_back(
-      {Aspect::kMotion,
-       0,
-       known ? Severity::kFault : Severity::kWarning,
-       fmt::format("the swing grows from {:.2g} to {:.2g} rad/s {}", before.speed, after.speed,
-                   known ? "without torque" : "and the log has no torque"),
-       RangeOf(piece, rows.first, rows.last),
-       {{"speed_before", before.speed}, {"speed_after", after.speed}}});
+  report(known ? Severity::kFault : Severity::kWarning,
+         fmt::format("the swing grows from {:.2g} to {:.2g} rad/s {}", before.speed, after.speed,
+                     known ? "without torque" : "and the log has no torque"),
+         RangeOf(piece, rows.first, rows.last),
+         {{"speed_before", before.speed}, {"speed_after", after.speed}});
 }
 
 /// Distance between two angles on the circle, rad.
@@ -104,29 +101,30 @@ Rows RestOf(const MachineLog& piece) {
   return {};
 }
 
-/// Reports a rest where gravity would move a link: an angle with another zero or meaning.
-void CheckRest(const MachineLog& piece, Findings& findings) {
+/// Reports a rest where gravity would move a link: an angle with another zero or meaning. Returns
+/// whether there is one.
+bool CheckRest(const MachineLog& piece, const Reporter& report) {
   constexpr double kHeld = 0.35, kUpright = 0.1;  // rad; dry friction holds a link within
   const Rows rest = RestOf(piece);
-  if (rest.last < rest.first) return;
+  if (rest.last < rest.first) return false;
   const auto [q1, q2] = piece.angle[rest.first];
   const double links[] = {q1, q1 + q2};
   const auto near = [&](double from, double limit) {
     return [=](double link) { return Distance(link, from) < limit; };
   };
-  if (std::ranges::all_of(links, near(0, kHeld))) return;
+  if (std::ranges::all_of(links, near(0, kHeld))) return false;
   const bool upright = std::ranges::all_of(links, [&](double link) {
     return near(0, kHeld)(link) || near(std::numbers::pi, kUpright)(link);
   });
   const bool known = !piece.commanded.empty();
-  findings.push_back(
-      {Aspect::kMotion, 0, known && !upright ? Severity::kFault : Severity::kWarning,
-       fmt::format(
-           "rests at {:.3g} and {:.3g} rad {}, {}: suspect another zero (key hanging) or an "
-           "angle against the vertical (key absolute)",
-           q1, q2, known ? "without torque" : "and the log has no torque",
-           upright ? "with a link upright" : "where gravity moves a link"),
-       RangeOf(piece, rest.first, rest.last)});
+  report(
+      known && !upright ? Severity::kFault : Severity::kWarning,
+      fmt::format("rests at {:.3g} and {:.3g} rad {}, {}: suspect another zero (key hanging) or an "
+                  "angle against the vertical (key absolute)",
+                  q1, q2, known ? "without torque" : "and the log has no torque",
+                  upright ? "with a link upright" : "where gravity moves a link"),
+      RangeOf(piece, rest.first, rest.last));
+  return true;
 }
 
 }  // namespace
@@ -135,17 +133,14 @@ void CheckMotion(Pieces pieces, Findings& findings) {
   for (const int joint : {0, 1}) {
     constexpr double kStill = 0.01;  // rad
     if (AngleRange(pieces, joint) > kStill || AngleRange(pieces, 1 - joint) < kMoves) continue;
-    findings.push_back({Aspect::kMotion, joint + 1, Severity::kWarning,
-                        fmt::format("does not move although joint {} does: dry friction holds it, "
-                                    "or its encoder is dead",
-                                    2 - joint)});
+    Reporter{findings, Aspect::kMotion, joint + 1}(
+        Severity::kWarning, fmt::format("does not move although joint {} does: dry friction holds "
+                                        "it, or its encoder is dead",
+                                        2 - joint));
   }
-  for (const MachineLog& piece : pieces) CheckGrowth(piece, findings);
-  for (const MachineLog& piece : pieces) {
-    const size_t before = findings.size();
-    CheckRest(piece, findings);
-    if (findings.size() > before) break;
-  }
+  const Reporter report{findings, Aspect::kMotion};
+  for (const MachineLog& piece : pieces) CheckGrowth(piece, report);
+  (void)std::ranges::any_of(pieces, [&](const auto& piece) { return CheckRest(piece, report); });
   CheckEquations(pieces, findings);
 }
 

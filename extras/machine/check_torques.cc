@@ -76,18 +76,14 @@ std::string DelayText(const std::vector<Response>& responses, const Response& be
 }
 
 /// Reports a gain that no motor has; false if the gain is plausible.
-bool CheckTorqueGain(const Response& best, int joint, Findings& findings) {
+bool CheckTorqueGain(const Response& best, const Reporter& report) {
   const double gain = best.pairs.gain();
   if (gain > 1.0 / 3 && gain < 3) return false;
   const char* meaning = gain > 300 && gain < 3000    ? "suspect measured torque in mN·m"
                         : gain > 3e-4 && gain < 3e-3 ? "suspect commanded torque in mN·m"
                                                      : "suspect the unit or a gear";
-  findings.push_back({Aspect::kTorque,
-                      joint + 1,
-                      Severity::kFault,
-                      fmt::format("measured {:.3g} times commanded: {}", gain, meaning),
-                      {},
-                      {{"gain", gain}, {"correlation", best.pairs.correlation()}}});
+  report(Severity::kFault, fmt::format("measured {:.3g} times commanded: {}", gain, meaning), {},
+         {{"gain", gain}, {"correlation", best.pairs.correlation()}});
   return true;
 }
 
@@ -101,19 +97,14 @@ double RmsMeasured(Pieces pieces, int joint) {
   return n > 0 ? std::sqrt(squares / n) : 0;
 }
 
-void CheckTorque(Pieces pieces, int joint, Findings& findings) {
+void CheckTorque(Pieces pieces, int joint, const Reporter& report) {
   const std::vector<Response> responses = ResponsesOf(pieces, joint, joint);
   const Response best = BestOf(responses);
   constexpr double kFollows = 0.6, kClear = 0.9, kBetter = 0.02;  // correlations
   const double r = best.pairs.correlation(), gain = best.pairs.gain();
   const auto add = [&](Severity severity, const std::string& text) {
-    findings.push_back(
-        {Aspect::kTorque,
-         joint + 1,
-         severity,
-         text,
-         {},
-         {{"delay_rows", best.rows}, {"lag", best.lag}, {"gain", gain}, {"correlation", r}}});
+    report(severity, text, {},
+           {{"delay_rows", best.rows}, {"lag", best.lag}, {"gain", gain}, {"correlation", r}});
   };
   if (!(best.pairs.Sxx() > 1e-9 * best.pairs.n)) {
     if (ActsWithoutCommand(pieces, joint)) {
@@ -142,9 +133,7 @@ void CheckTorque(Pieces pieces, int joint, Findings& findings) {
                fmt::format("commanded follows measured after {}: suspect swapped columns",
                            Counted(back.rows, "row")));
   }
-  const bool is_commanded = std::ranges::any_of(
-      pieces, [&](const MachineLog& piece) { return HasTorque(piece.commanded, joint); });
-  if (r < kFollows && !is_commanded) return;  // pushed by hand
+  if (r < kFollows && !HasCommand(pieces, joint)) return;  // pushed by hand
   if (r < kFollows) {
     const double now = responses.front().pairs.correlation();
     if (now < -kFollows) {
@@ -153,7 +142,7 @@ void CheckTorque(Pieces pieces, int joint, Findings& findings) {
     return add(Severity::kWarning,
                fmt::format("measured torque does not follow the command (correlation {:.2f})", r));
   }
-  if (CheckTorqueGain(best, joint, findings)) return;
+  if (CheckTorqueGain(best, report)) return;
   constexpr double kProportional = 0.95, kLow = 0.6, kHigh = 1.6;  // correlation, gains
   const bool is_odd = r > kProportional && (gain < kLow || gain > kHigh);
   add(is_odd ? Severity::kWarning : Severity::kNote,
@@ -164,11 +153,12 @@ void CheckTorque(Pieces pieces, int joint, Findings& findings) {
 }
 
 /// Reports torques that no pendulum of this kind has, and commands that end at 1 exactly.
-void CheckTorqueSize(Pieces pieces, int joint, Findings& findings) {
-  const bool known = std::ranges::any_of(findings, [&](const Finding& finding) {
+void CheckTorqueSize(Pieces pieces, int joint, const Reporter& report) {
+  const bool known = std::ranges::any_of(report.findings, [&](const Finding& finding) {
     return finding.aspect == Aspect::kTorque && finding.joint == joint + 1 &&
            finding.severity == Severity::kFault;
   });
+  if (known) return;
   double largest = 0;
   int ones = 0;
   for (const MachineLog& piece : pieces) {
@@ -181,14 +171,14 @@ void CheckTorqueSize(Pieces pieces, int joint, Findings& findings) {
   }
   constexpr double kLarge = 100;  // N·m
   constexpr int kOften = 3;
-  const auto add = [&](Severity severity, const std::string& text) {
-    findings.push_back({Aspect::kTorque, joint + 1, severity, text, {}, {{"largest", largest}}});
-  };
-  if (!known && largest > kLarge) {
-    add(Severity::kFault, fmt::format("up to {:.4g} N·m: suspect mN·m", largest));
-  } else if (!known && largest == 1 && ones >= kOften) {
-    add(Severity::kWarning,
-        "ends at 1 exactly: suspect a command between -1 and 1, whose factor is the torque limit");
+  const Numbers numbers{{"largest", largest}};
+  if (largest > kLarge) {
+    report(Severity::kFault, fmt::format("up to {:.4g} N·m: suspect mN·m", largest), {}, numbers);
+  } else if (largest == 1 && ones >= kOften) {
+    report(
+        Severity::kWarning,
+        "ends at 1 exactly: suspect a command between -1 and 1, whose factor is the torque limit",
+        {}, numbers);
   }
 }
 
@@ -197,18 +187,17 @@ void CheckTorqueSize(Pieces pieces, int joint, Findings& findings) {
 bool ActsWithoutCommand(Pieces pieces, int joint) {
   constexpr double kActs = 0.5;   // N·m, rms
   constexpr double kShare = 0.5;  // of the other joint's
-  const bool has_command = std::ranges::any_of(
-      pieces, [&](const MachineLog& piece) { return HasTorque(piece.commanded, joint); });
-  return !has_command &&
+  return !HasCommand(pieces, joint) &&
          RmsMeasured(pieces, joint) > std::max(kActs, kShare * RmsMeasured(pieces, 1 - joint));
 }
 
 void CheckTorques(Pieces pieces, Findings& findings) {
   for (const int joint : {0, 1}) {
+    const Reporter report{findings, Aspect::kTorque, joint + 1};
     if (!pieces.front().commanded.empty() && !pieces.front().measured.empty()) {
-      CheckTorque(pieces, joint, findings);
+      CheckTorque(pieces, joint, report);
     }
-    CheckTorqueSize(pieces, joint, findings);
+    CheckTorqueSize(pieces, joint, report);
   }
 }
 

@@ -74,7 +74,7 @@ std::string DifferenceOf(Pieces pieces, int joint) {
 }
 
 /// Finds the largest velocity where the angle moves faster.
-void CheckVelocityLimit(Pieces pieces, int joint, Findings& findings) {
+void CheckVelocityLimit(Pieces pieces, int joint, const Reporter& report) {
   double limit = 0;
   for (const MachineLog& piece : pieces) {
     for (const Joints& v : piece.velocity) limit = std::max(limit, std::abs(v[joint]));
@@ -98,23 +98,15 @@ void CheckVelocityLimit(Pieces pieces, int joint, Findings& findings) {
     }
   }
   if (!longest) return;
-  findings.push_back({Aspect::kVelocity,
-                      joint + 1,
-                      Severity::kFault,
-                      fmt::format("saturates at {:.4g} rad/s{}", limit,
-                                  times > 1 ? fmt::format("; {} times, longest", times) : ""),
-                      longest,
-                      {{"limit", limit}, {"times", times}}});
+  report(Severity::kFault,
+         fmt::format("saturates at {:.4g} rad/s{}", limit,
+                     times > 1 ? fmt::format("; {} times, longest", times) : ""),
+         longest, {{"limit", limit}, {"times", times}});
 }
 
-void CheckVelocity(Pieces pieces, int joint, Findings& findings) {
+void CheckVelocity(Pieces pieces, int joint, const Reporter& report) {
   const auto add = [&](Severity severity, const std::string& text, const Pairs& pairs) {
-    findings.push_back({Aspect::kVelocity,
-                        joint + 1,
-                        severity,
-                        text,
-                        {},
-                        {{"gain", pairs.gain()}, {"correlation", pairs.correlation()}}});
+    report(severity, text, {}, {{"gain", pairs.gain()}, {"correlation", pairs.correlation()}});
   };
   const Pairs own = VelocityPairs(pieces, joint, joint);
   const double r = own.correlation(), gain = own.gain();
@@ -156,8 +148,9 @@ void CheckVelocity(Pieces pieces, int joint, Findings& findings) {
 void CheckVelocities(Pieces pieces, Findings& findings) {
   if (pieces.front().velocity.empty()) return;
   for (const int joint : {0, 1}) {
-    CheckVelocity(pieces, joint, findings);
-    CheckVelocityLimit(pieces, joint, findings);
+    const Reporter report{findings, Aspect::kVelocity, joint + 1};
+    CheckVelocity(pieces, joint, report);
+    CheckVelocityLimit(pieces, joint, report);
   }
 }
 

@@ -341,10 +341,13 @@ bool HasTorque(const std::vector<Joints>& torque, int joint) {
   return std::ranges::any_of(torque, [joint](const Joints& u) { return u[joint] != 0; });
 }
 
+bool HasCommand(std::span<const MachineLog> logs, int joint) {
+  return std::ranges::any_of(
+      logs, [&](const MachineLog& log) { return HasTorque(log.commanded, joint); });
+}
+
 bool HasCommands(std::span<const MachineLog> logs) {
-  return std::ranges::any_of(logs, [](const MachineLog& log) {
-    return HasTorque(log.commanded, 0) || HasTorque(log.commanded, 1);
-  });
+  return HasCommand(logs, 0) || HasCommand(logs, 1);
 }
 
 LogColumns ParseLogColumns(std::string_view text, const std::string& where) {

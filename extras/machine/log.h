@@ -36,7 +36,9 @@ struct MachineLog {
 /// Whether the torques of a log, which may lack them, are ever other than 0 at a joint (0 or 1).
 bool HasTorque(const std::vector<Joints>& torque, int joint);
 
-/// Whether the commanded torques of any of these logs are ever other than 0.
+/// Whether the commanded torques of any of these logs are ever other than 0 at a joint (0 or 1), or
+/// at any joint.
+bool HasCommand(std::span<const MachineLog> logs, int joint);
 bool HasCommands(std::span<const MachineLog> logs);
 
 /// A column of a file and its unit.
