@@ -200,14 +200,13 @@ class AdverseLink : public MachineLink {
 };
 
 /// A controller whose torques jump, exceed their limits and are not always finite.
-class WildController : public MachineController {
+class WildController {
  public:
   explicit WildController(Chooser choose) : choose_(std::move(choose)) {}
-  int64_t hz() const override { return 500; }
-  double Torque(int64_t /*step*/, const PendulumState& /*state*/) override {
+  double operator()(int64_t /*step*/, const PendulumState& /*state*/) {
     constexpr std::array kTorques{-1e300, -5.0, -1.0, 0.0, 2.0, 5.0, 1e300};
-    if (choose_(20) == 0) torque_ = kTorques[choose_(kTorques.size())];
-    return choose_(5000) == 0 ? std::nan("") : torque_;
+    if (choose_(2) == 0) torque_ = kTorques[choose_(kTorques.size())];
+    return choose_(500) == 0 ? std::nan("") : torque_;
   }
 
  private:
@@ -229,7 +228,7 @@ inline AdverseRun RunAdversely(bool with_twin, uint32_t rarity, int64_t most,
   bench.config.seconds = 0.2 + 0.3 * choose(7);
   bench.differences = !with_twin;
   if (choose(4) > 0) {
-    bench.machine_controller = std::make_unique<WildController>(choose);
+    bench.machine_controller = WildController(choose);
   }
   bench.link = std::make_unique<AdverseLink>(bench.twin, Joints{5, 0.5}, rarity, choose);
   const auto& link = dynamic_cast<const AdverseLink&>(*bench.link);

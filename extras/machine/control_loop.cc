@@ -2,10 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
-
-#include "base/error.h"
-#include "base/text.h"
 
 namespace upswing::machine {
 namespace {
@@ -14,18 +10,11 @@ constexpr double kAnswerShare = 0.5;  // share of a cycle that waits for the ans
 
 }  // namespace
 
-LoopController::LoopController(std::unique_ptr<MachineController> controller, int64_t hz)
-    : controller_(std::move(controller)), hz_(hz) {
-  if (hz % controller_->hz() != 0) {
-    throw BadInput(Concat("--hz: expected a multiple of ", controller_->hz(),
-                          ", the controller's steps per second, got ", hz));
-  }
-}
-
 double LoopController::Act(int64_t cycle, const PendulumState& s) {
   // After missed cycles only the last of the missed actions is made up.
-  const int64_t step = cycle * controller_->hz() / hz_;
-  if (step != step_) torque_ = controller_->Torque(step, s);
+  static_assert(kControlPeriod * kControllerHz == 1);
+  const int64_t step = cycle * kControllerHz / hz_;
+  if (step != step_) torque_ = controller_(step, s);
   step_ = step;
   return torque_;
 }
@@ -125,10 +114,12 @@ bool ControlLoop::Cycle() {
     summary_.longest_act = std::max(summary_.longest_act, took);
   }
   torque_ = supervisor_.Torque(wanted, facts);
-  enabled_ = state != LoopState::kIdle && supervisor_.state() != LoopState::kFault;
+  const LoopState after = supervisor_.state();
+  enabled_ = state != LoopState::kIdle && after != LoopState::kFault;
+  summary_.moving += after == LoopState::kRunning || after == LoopState::kBraking ? 1 : 0;
   if (reading) {
     const LoopRow row{reading->time, reading->angle,  {facts.state.w1, facts.state.w2},
-                      torque_,       reading->torque, static_cast<int>(supervisor_.state()),
+                      torque_,       reading->torque, static_cast<int>(after),
                       now - deadline};
     log_.Add(row, link_.simulated());
   }

@@ -3,29 +3,35 @@
 #include <array>
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <string>
+#include <utility>
 
-#include "extras/machine/controller.h"
 #include "extras/machine/estimator.h"
 #include "extras/machine/link.h"
 #include "extras/machine/log_writer.h"
 #include "extras/machine/supervisor.h"
+#include "pendulum/task.h"
 
 /// The control loop on a machine.
 namespace upswing::machine {
 
-/// A controller at the rate of the loop. It keeps its own period: a policy of 20 ms holds its
-/// torque for several cycles.
+/// A controller of one machine: the motor's torque (N·m) in a step of 20 ms, from the state.
+/// Steps count from 0, and can be left out.
+using MachineController = std::function<double(int64_t step, const PendulumState& state)>;
+
+/// A controller at the rate of the loop. It holds each torque for a step.
 class LoopController {
  public:
-  /// Throws BadInput unless the rate `hz` of the loop is a multiple of the controller's.
-  LoopController(std::unique_ptr<MachineController> controller, int64_t hz);
+  /// `hz`: cycles of the loop per second, a multiple of kControllerHz.
+  LoopController(MachineController controller, int64_t hz)
+      : controller_(std::move(controller)), hz_(hz) {}
   /// The motor's torque (N·m) in a cycle; number 0 is the first one.
   double Act(int64_t cycle, const PendulumState& state);
 
+  static constexpr int64_t kControllerHz = 50;
+
  private:
-  std::unique_ptr<MachineController> controller_;
+  MachineController controller_;
   int64_t hz_;
   int64_t step_ = -1;  // the controller's last step
   double torque_ = 0;  // N·m
@@ -45,6 +51,7 @@ struct LoopSummary {
   static constexpr double kBin = 1e-5;       // s
 
   int64_t cycles = 0;
+  int64_t moving = 0;                // cycles in which the controller drove or the loop braked
   int64_t on_time = 0;               // cycles that began within kOnTime of their deadlines
   int64_t missed = 0;                // cycles that were left out because others took too long
   int64_t unanswered = 0;            // cycles without a new reading, once there were readings

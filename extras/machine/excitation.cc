@@ -14,7 +14,7 @@ constexpr double kSlow = 0.5;                    // rad/s
 
 }  // namespace
 
-double Excitation::Torque(int64_t /*step*/, const PendulumState& state) {
+double Excitation::operator()(int64_t /*step*/, const PendulumState& state) {
   const double level = level_(state), w = joint_ == 1 ? state.w1 : state.w2;
   if (held_-- <= 0) {
     held_ = kShortest + static_cast<int>(rng_.Uniform(0, kLongest - kShortest));

@@ -3,13 +3,13 @@
 #include <functional>
 
 #include "base/rng.h"
-#include "extras/machine/controller.h"
+#include "pendulum/task.h"
 
 namespace upswing::machine {
 
 /// Torques that show how a machine moves: random steps, which grow until the links move enough.
 /// Some of them push along with the motion, so that a weak motor swings heavy links, too.
-class Excitation : public MachineController {
+class Excitation {
  public:
   /// The share of the permitted motion that a state has; the torques keep it below 1.
   using Level = std::function<double(const PendulumState&)>;
@@ -22,8 +22,8 @@ class Excitation : public MachineController {
         level_(std::move(level)),
         rng_(seed, "machine: excitation") {}
 
-  int64_t hz() const override { return 50; }
-  double Torque(int64_t step, const PendulumState& state) override;
+  /// The motor's torque (N·m) in a step of 20 ms; see MachineController.
+  double operator()(int64_t step, const PendulumState& state);
 
  private:
   static constexpr double kFirst = 0.01;  // first amplitude, as a share of the limit

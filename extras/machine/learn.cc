@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
-#include <memory>
 #include <numbers>
 #include <ranges>
 #include <utility>
@@ -131,11 +130,10 @@ class Learner {
                      e.seconds));
     Run({.limits = l, .seconds = e.seconds},
         has_twin ? Estimator(twin_, 1 / c_.hz) : Estimator(twin_.sensors, 1 / c_.hz),
-        std::make_unique<Excitation>(l.torque, c_.actuated_joint, level, c_.seed));
+        Excitation(l.torque, c_.actuated_joint, level, c_.seed));
   }
 
-  RunOutcome Run(RunRules rules, const Estimator& estimator,
-                 std::unique_ptr<MachineController> controller) {
+  RunOutcome Run(RunRules rules, const Estimator& estimator, MachineController controller) {
     ExpectBudget();
     rules.seconds = std::min(rules.seconds, c_.motion - result_.motion);
     rules.log = (out_ / fmt::format("log-{:02}.csv", logs_.size() + 1)).string();

@@ -186,8 +186,7 @@ TEST(FirstTwin, FindsTheEquationsOfMotion) {
   const MachineLog log =
       RunLoop(truth, {.seconds = 6, .actuated_joint = 1}, [&](const CycleInput& in) -> Joints {
         if (step++ % 10 == 0) {
-          torque =
-              excitation.Torque(step, {in.angle[0], in.angle[1], in.velocity[0], in.velocity[1]});
+          torque = excitation(step, {in.angle[0], in.angle[1], in.velocity[0], in.velocity[1]});
         }
         return {torque, 0};
       });

@@ -11,7 +11,7 @@ constexpr double kMostTurn = 7.5;  // of a joint in a try, rad
 }  // namespace
 
 RunOutcome RunCycles(const LearnConfig& c, const RunRules& rules, const MachineSensors& sensors,
-                     Estimator estimator, std::unique_ptr<MachineController> own, MachineLink& link,
+                     Estimator estimator, MachineController own, MachineLink& link,
                      const std::function<bool()>& stop) {
   const int64_t hz = std::llround(c.hz);
   LoopController controller(std::move(own), hz);
@@ -40,23 +40,13 @@ RunOutcome RunCycles(const LearnConfig& c, const RunRules& rules, const MachineS
   LogWriter log(rules.log);
   ControlLoop loop(config, link, estimator, supervisor, controller, log);
   summary = &loop.summary();
-  int64_t moving = 0;
   const auto run = [&] {
     if (!link.simulated()) EnterRealTime();
-    try {
-      while (loop.Cycle()) {
-        const LoopState state = supervisor.state();
-        moving += state == LoopState::kRunning || state == LoopState::kBraking ? 1 : 0;
-      }
-    } catch (...) {
-      loop.SwitchOff();
-      throw;
-    }
-    loop.SwitchOff();
+    loop.Run();
   };
   std::async(std::launch::async, run).get();
   log.Finish();
-  return {loop.summary(), static_cast<double>(moving) / c.hz, supervisor.reason()};
+  return {loop.summary(), static_cast<double>(summary->moving) / c.hz, supervisor.reason()};
 }
 
 }  // namespace upswing::machine

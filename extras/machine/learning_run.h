@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <functional>
-#include <memory>
 #include <string>
 
 #include "extras/machine/control_loop.h"
@@ -34,7 +33,7 @@ struct RunOutcome {
 /// Runs the control loop until it ends. A run in real time has its own thread, because fits with
 /// real-time priority would starve the computer. `sensors`: range and step of the encoders.
 RunOutcome RunCycles(const LearnConfig& c, const RunRules& rules, const MachineSensors& sensors,
-                     Estimator estimator, std::unique_ptr<MachineController> own, MachineLink& link,
+                     Estimator estimator, MachineController own, MachineLink& link,
                      const std::function<bool()>& stop);
 
 }  // namespace upswing::machine

@@ -12,25 +12,16 @@
 namespace upswing::machine {
 
 /// Swings the motor's joint by a sine of the time.
-class SineController : public MachineController {
- public:
-  explicit SineController(double amplitude, int64_t hz = 50) : amplitude_(amplitude), hz_(hz) {}
-  int64_t hz() const override { return hz_; }
-  double Torque(int64_t step, const PendulumState& /*state*/) override {
-    return amplitude_ * std::sin(6 * static_cast<double>(step) / static_cast<double>(hz_));
-  }
-
- private:
-  double amplitude_;  // N·m
-  int64_t hz_;
-};
+inline double SineTorque(int64_t step, const PendulumState& /*state*/) {
+  return 1.5 * std::sin(6 * kControlPeriod * static_cast<double>(step));
+}
 
 /// A loop on a link, cycle by cycle.
 struct LoopBench {
   Twin twin = TestTwin();
   Limits limits;
   LoopConfig config{.seconds = 2};
-  std::unique_ptr<MachineController> machine_controller = std::make_unique<SineController>(1.5);
+  MachineController machine_controller = SineTorque;
   std::unique_ptr<MachineLink> link;
   std::string log_path;
   bool differences = false;  // whether the estimator goes without the twin

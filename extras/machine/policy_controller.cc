@@ -11,11 +11,8 @@
 namespace upswing::machine {
 namespace {
 
-constexpr int64_t kPolicyHz = 50;
-static_assert(kControlPeriod * kPolicyHz == 1);
-
 /// Controller made by ControllerOf.
-class PolicyController : public MachineController {
+class PolicyController {
  public:
   explicit PolicyController(MachinePolicy policy)
       : policy_(std::move(policy)),
@@ -25,9 +22,7 @@ class PolicyController : public MachineController {
         builder_(1, policy_->memory(),
                  policy_->identifies() ? std::optional(policy_->plant) : std::nullopt) {}
 
-  int64_t hz() const override { return kPolicyHz; }
-
-  double Torque(int64_t step, const PendulumState& state) override {
+  double Torque(int64_t step, const PendulumState& state) {
     const Plant& plant = policy_->plant;
     if (step == 0) {
       builder_.Begin(0, plant, state, obs_);
@@ -85,8 +80,9 @@ MachinePolicy GetMachinePolicy(PolicyArguments a, const std::string& robot,
   return policy;
 }
 
-std::unique_ptr<MachineController> ControllerOf(MachinePolicy policy) {
-  return std::make_unique<PolicyController>(std::move(policy));
+MachineController ControllerOf(MachinePolicy policy) {
+  return [controller = std::make_shared<PolicyController>(std::move(policy))](
+             int64_t step, const PendulumState& state) { return controller->Torque(step, state); };
 }
 
 }  // namespace upswing::machine

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "agents/loaded_policy.h"
-#include "extras/machine/controller.h"
+#include "extras/machine/control_loop.h"
 #include "extras/machine/twin.h"
 #include "runs/find_policy.h"
 
@@ -34,6 +34,6 @@ MachinePolicy GetMachinePolicy(PolicyArguments a, const std::string& robot,
 
 /// A policy as the controller of one machine. It acts every 20 ms, on PendulumEnv's observations of
 /// the policy's design plant.
-std::unique_ptr<MachineController> ControllerOf(MachinePolicy policy);
+MachineController ControllerOf(MachinePolicy policy);
 
 }  // namespace upswing::machine

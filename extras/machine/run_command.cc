@@ -79,7 +79,7 @@ int Drive(const RunArguments& a, const MachinePolicy& policy, const std::optiona
   const auto hz = std::llround(a.hz);
   const double period = 1 / a.hz;
   // A first call of another controller touches memory that is not there yet.
-  ControllerOf(policy)->Torque(0, {});
+  ControllerOf(policy)(0, {});
   LoopController controller(ControllerOf(policy), hz);
   Estimator estimator = twin && !a.differences
                             ? Estimator(*twin, period)
