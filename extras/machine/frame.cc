@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <concepts>
 #include <cstring>
 
 #include "os/gzip.h"
@@ -10,73 +9,56 @@
 namespace upswing::machine {
 namespace {
 
-constexpr uint32_t kMagic = 0x57535055;  // "UPSW"
-constexpr uint8_t kVersion = 1;
-constexpr size_t kChecked = kFrameBytes - sizeof(uint32_t);  // bytes under the checksum
-
-/// Writes little-endian numbers one after another.
-class Writer {
- public:
-  explicit Writer(std::byte* to) : to_(to) {}
-  template <std::unsigned_integral T>
-  void operator()(T value) {
-    for (size_t i = 0; i < sizeof(T); ++i) *to_++ = static_cast<std::byte>(value >> (8 * i));
-  }
-  void operator()(double value) { (*this)(std::bit_cast<uint32_t>(static_cast<float>(value))); }
-
- private:
-  std::byte* to_;
+/// The bytes of a frame. All numbers are little-endian.
+struct [[gnu::packed]] Layout {
+  uint32_t magic = 0x57535055;  // "UPSW"
+  uint8_t version = 1;
+  uint8_t kind = 0;
+  uint16_t flags = 0;
+  uint32_t sequence = 0, answers = 0;
+  uint64_t microseconds = 0;
+  float torque1 = 0, torque2 = 0, angle1 = 0, angle2 = 0;
+  uint32_t checksum = 0;
 };
+static_assert(sizeof(Layout) == kFrameBytes && std::endian::native == std::endian::little);
 
-/// Reads little-endian numbers one after another.
-class Reader {
- public:
-  explicit Reader(const std::byte* from) : from_(from) {}
-  template <std::unsigned_integral T>
-  T Get() {
-    uint64_t value = 0;
-    for (size_t i = 0; i < sizeof(T); ++i) value |= static_cast<uint64_t>(*from_++) << (8 * i);
-    return static_cast<T>(value);
-  }
-  double GetFloat() { return std::bit_cast<float>(Get<uint32_t>()); }
-
- private:
-  const std::byte* from_;
-};
+/// The checksum of all bytes before it.
+uint32_t ChecksumOf(const FrameBytes& bytes) {
+  return Crc32(std::span(bytes).first<kFrameBytes - sizeof(uint32_t)>());
+}
 
 }  // namespace
 
 FrameBytes Encode(const Frame& frame) {
-  FrameBytes bytes{};
-  Writer write(bytes.data());
-  write(kMagic);
-  write(kVersion);
-  write(static_cast<uint8_t>(frame.kind));
-  write(frame.flags);
-  write(frame.sequence);
-  write(frame.answers);
-  write(frame.microseconds);
-  for (const double torque : frame.torque) write(torque);
-  for (const double angle : frame.angle) write(angle);
-  write(Crc32(std::span(bytes).first<kChecked>()));
-  return bytes;
+  Layout layout{.kind = static_cast<uint8_t>(frame.kind),
+                .flags = frame.flags,
+                .sequence = frame.sequence,
+                .answers = frame.answers,
+                .microseconds = frame.microseconds,
+                .torque1 = static_cast<float>(frame.torque[0]),
+                .torque2 = static_cast<float>(frame.torque[1]),
+                .angle1 = static_cast<float>(frame.angle[0]),
+                .angle2 = static_cast<float>(frame.angle[1])};
+  layout.checksum = ChecksumOf(std::bit_cast<FrameBytes>(layout));
+  return std::bit_cast<FrameBytes>(layout);
 }
 
 std::optional<Frame> Decode(std::span<const std::byte, kFrameBytes> bytes) {
-  Reader read(bytes.data());
-  if (read.Get<uint32_t>() != kMagic || read.Get<uint8_t>() != kVersion) return {};
-  const auto kind = read.Get<uint8_t>();
-  if (kind != 1 && kind != 2) return {};
-  if (Reader(bytes.data() + kChecked).Get<uint32_t>() != Crc32(bytes.first<kChecked>())) return {};
-  Frame frame;
-  frame.kind = static_cast<Frame::Kind>(kind);
-  frame.flags = read.Get<uint16_t>();
-  frame.sequence = read.Get<uint32_t>();
-  frame.answers = read.Get<uint32_t>();
-  frame.microseconds = read.Get<uint64_t>();
-  for (double& torque : frame.torque) torque = read.GetFloat();
-  for (double& angle : frame.angle) angle = read.GetFloat();
-  return frame;
+  FrameBytes copy;
+  std::ranges::copy(bytes, copy.begin());
+  const auto got = std::bit_cast<Layout>(copy);
+  const Layout known;
+  if (got.magic != known.magic || got.version != known.version || got.kind < 1 || got.kind > 2 ||
+      got.checksum != ChecksumOf(copy)) {
+    return {};
+  }
+  return Frame{static_cast<Frame::Kind>(got.kind),
+               got.flags,
+               got.sequence,
+               got.answers,
+               got.microseconds,
+               {got.torque1, got.torque2},
+               {got.angle1, got.angle2}};
 }
 
 void FrameReader::Skip(size_t bytes) {
