@@ -140,12 +140,19 @@ LogColumn ColumnIn(const toml::node& node, std::string_view quantity, const std:
   return column;
 }
 
+/// Calls `f(key, column, quantity of its units)` for each column of numbers.
+void ForEachColumn(auto& columns, const auto& f) {
+  f("time", columns.time, "time");
+  for (const JointQuantity& q : kJointQuantities) {
+    for (int j = 0; j < 2; ++j) f(Concat(q.key, j + 1), (columns.*q.columns)[j], q.unit_of);
+  }
+}
+
 /// Sets one key of a TOML file; false if there is no such key.
 bool SetColumn(LogColumns& columns, std::string_view key, const toml::node& node,
                const std::string& place) {
-  if (key == "time") {
-    columns.time = ColumnIn(node, "time", place);
-  } else if (key == "piece") {
+  bool is_known = true;
+  if (key == "piece") {
     columns.piece = TextIn(node, place);
   } else if (key == "hanging") {
     throw BadInput(Concat(
@@ -156,21 +163,19 @@ bool SetColumn(LogColumns& columns, std::string_view key, const toml::node& node
     }
     columns.absolute = node.as_boolean()->get();
   } else {
-    for (const JointQuantity& q : kJointQuantities) {
-      for (int joint = 0; joint < 2; ++joint) {
-        if (key != Concat(q.key, joint + 1)) continue;
-        (columns.*q.columns)[joint] = ColumnIn(node, q.unit_of, place);
-        return true;
-      }
-    }
-    return false;
+    is_known = false;
+    ForEachColumn(columns, [&](const std::string& name, LogColumn& column, const char* quantity) {
+      if (name != key) return;
+      column = ColumnIn(node, quantity, place);
+      is_known = true;
+    });
   }
-  return true;
+  return is_known;
 }
 
 /// Throws BadInput if a column of the file stands for two keys.
 void CheckOwnColumns(const LogColumns& columns, const std::string& where) {
-  std::map<std::string, std::string> keys{{columns.time.name, "time"}};
+  std::map<std::string, std::string> keys;
   const auto add = [&](const std::string& name, const std::string& key) {
     if (name.empty()) return;
     const auto [found, is_new] = keys.emplace(name, key);
@@ -178,19 +183,17 @@ void CheckOwnColumns(const LogColumns& columns, const std::string& where) {
     throw BadInput(Concat(where, ": expected a column for each key, got \"", Printable(name),
                           "\" for ", found->second, " and ", key));
   };
-  for (const JointQuantity& q : kJointQuantities) {
-    for (int joint = 0; joint < 2; ++joint) {
-      add((columns.*q.columns)[joint].name, Concat(q.key, joint + 1));
-    }
-  }
+  ForEachColumn(columns, [&](const std::string& key, const LogColumn& column, const char*) {
+    add(column.name, key);
+  });
   add(columns.piece, "piece");
 }
 
 std::vector<std::string> KnownKeys() {
-  std::vector<std::string> keys{"time", "piece", "absolute"};
-  for (const JointQuantity& q : kJointQuantities) {
-    for (const int joint : {1, 2}) keys.push_back(Concat(q.key, joint));
-  }
+  std::vector<std::string> keys;
+  const LogColumns columns;
+  ForEachColumn(columns, [&](const auto& key, const auto&...) { keys.push_back(key); });
+  keys.insert(keys.end(), {"piece", "absolute"});
   return keys;
 }
 
@@ -244,14 +247,10 @@ WholeLog ReadRows(std::string_view csv, const LogColumns& columns, const std::st
         Concat(where, ": expected the velocities of both joints or of neither, got one"));
   }
   std::vector<std::string> names;
-  const auto add = [&](const std::string& name) {
-    if (!name.empty() && std::ranges::count(names, name) == 0) names.push_back(name);
-  };
-  add(columns.time.name);
-  add(columns.piece);
-  for (const JointQuantity& q : kJointQuantities) {
-    for (const LogColumn& column : columns.*q.columns) add(column.name);
-  }
+  if (!columns.piece.empty()) names.push_back(columns.piece);
+  ForEachColumn(columns, [&](const auto&, const LogColumn& column, const char*) {
+    if (!column.name.empty()) names.push_back(column.name);
+  });
   std::map<std::string, CsvColumn> table;
   for (CsvColumn& column : ReadCsv(csv, names, where)) {
     std::string name = column.name;
@@ -366,9 +365,6 @@ LogColumns ParseLogColumns(std::string_view text, const std::string& where) {
   expect(columns.angle[0], "angle1");
   expect(columns.angle[1], "angle2");
   CheckOwnColumns(columns, where);
-  if (columns.absolute && columns.velocity[0].name.empty() != columns.velocity[1].name.empty()) {
-    throw BadInput(Concat(where, ": expected velocity1 and velocity2, or neither, with absolute"));
-  }
   return columns;
 }
 

@@ -318,8 +318,6 @@ TEST(MachineLog, BadColumnFilesGetOneLineWithThePlace) {
             "\"-1\"");
   EXPECT_EQ(ComplaintAboutColumns(good + "velocity1 = \"\"\n"),
             "columns.toml:4: velocity1: expected the name of a column in quotes, got \"\"");
-  EXPECT_EQ(ComplaintAboutColumns(good + "absolute = true\nvelocity1 = \"w\"\n"),
-            "columns.toml: expected velocity1 and velocity2, or neither, with absolute");
   EXPECT_EQ(ComplaintAboutColumns(good + "hanging = 3\n"),
             "columns.toml:4: hanging: expected it with an angle, such as angle1 = {column = \"a\", "
             "hanging = 180}");
