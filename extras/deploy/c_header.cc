@@ -32,13 +32,12 @@ std::string Expanded(std::string_view name) {
 }
 
 std::string ArrayText(const CArray& array, const std::string& prefix) {
-  std::vector<std::string> words;
-  for (const float value : array.values) words.push_back(CLiteral(value) + ",");
-  words.back().back() = '}';
-  words.back() += ';';
+  std::string numbers;
+  for (const float value : array.values) numbers += CLiteral(value) + ", ";
+  numbers.replace(numbers.size() - 2, 2, "};");
   const std::string comment = array.comment.empty() ? "" : Concat(" /* ", array.comment, " */");
   return Concat("static const float ", prefix, '_', array.name, '[', array.values.size(), "] = {",
-                comment, "\n  ", Wrapped(words, "  ", 2), "\n");
+                comment, "\n  ", WrapText(numbers, kWidth, 2), "\n");
 }
 
 /// The C text of the constant arrays, in order, with the list that the checksum uses.

@@ -2,7 +2,6 @@
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <memory>
 #include <numbers>
 
 #include "base/error.h"
@@ -45,40 +44,18 @@ std::vector<double> Evaluate(const std::vector<LayerView>& layers, std::span<con
   return x;
 }
 
-/// Observations of the samples' states, each with a memory of the earlier ones.
-class Observer {
- public:
-  explicit Observer(const ExportedPolicy& policy) : policy_(policy) {
-    if (policy.is_foreign()) return;
-    PendulumEnvConfig config;
-    config.plants = {policy.loaded->plant};
-    env_ = std::make_unique<PendulumEnv>(config);
-  }
-
-  /// The observation of a state (S) that consists of floats.
-  std::vector<float> Observe(std::span<const double> s) const {
-    if (policy_.is_foreign()) return {s.begin(), s.end()};
-    env_->SetState(0, {s[0], s[1], s[2], s[3]});
-    const auto now = env_->obs().row(0);
-    std::vector<float> obs(now.begin(), now.end());
-    obs.resize(static_cast<size_t>(policy_.obs_size()));
-    const int steps = policy_.loaded->memory();
-    if (steps > 0 && !before_.empty()) upswing::Remember(before_, torque_, steps, obs);
-    return obs;
-  }
-
-  /// Records the torque that the policy chose at this observation.
-  void Remember(std::span<const float> obs, double torque) {
-    before_.assign(obs.begin(), obs.end());
-    torque_ = torque;
-  }
-
- private:
-  const ExportedPolicy& policy_;
-  std::unique_ptr<PendulumEnv> env_;  // without memory; none for a foreign task
-  std::vector<float> before_;         // (D) previous observation; empty: none
-  double torque_ = 0;                 // torque chosen at it
-};
+/// The observation of a state (S) that consists of floats. `before` is the previous observation, at
+/// which the policy chose the torque; empty: none.
+std::vector<float> ObservationOf(const ExportedPolicy& policy, std::span<const double> s,
+                                 std::span<const float> before, double torque) {
+  if (policy.is_foreign()) return {s.begin(), s.end()};
+  const auto now = Observe(policy.loaded->plant, {s[0], s[1], s[2], s[3]});
+  std::vector<float> obs(now.begin(), now.end());
+  obs.resize(static_cast<size_t>(policy.obs_size()));
+  const int steps = policy.loaded->memory();
+  if (steps > 0 && !before.empty()) Remember(before, torque, steps, obs);
+  return obs;
+}
 
 /// Whether rounding cannot change which output is the largest.
 bool IsClear(std::vector<double> outputs) {
@@ -92,10 +69,10 @@ CSamples DrawSamples(const ExportedPolicy& policy, const std::vector<LayerView>&
   constexpr double kPi = std::numbers::pi, kVelocity = 4;  // rad/s
   CSamples samples;
   samples.count = kSamples;
-  Observer observer(policy);
   Rng rng(0, "samples of a C header");
   const auto memory = policy.loaded->policy->Start(1);
-  double largest = 0;
+  std::vector<float> before;  // (D)
+  double largest = 0, torque = 0;
   bool all_clear = true;
   int draws = 0;
   for (int i = 0; i < kSamples; ++i) {
@@ -107,7 +84,7 @@ CSamples DrawSamples(const ExportedPolicy& policy, const std::vector<LayerView>&
         const double bound = k < state.size() / 2 ? kPi : kVelocity;
         state[k] = static_cast<float>(rng.Uniform(-bound, bound) * 0.999);
       }
-      obs = observer.Observe(state);
+      obs = ObservationOf(policy, state, before, torque);
       outputs = Evaluate(layers, obs);
     } while (!IsClear(outputs) && ++draws < kMostDraws);
     for (const double output : outputs) {
@@ -116,9 +93,8 @@ CSamples DrawSamples(const ExportedPolicy& policy, const std::vector<LayerView>&
                             ": expected outputs within the range of float, got ", output));
     }
     all_clear = all_clear && IsClear(outputs);
-    double torque = 0;
     policy.loaded->policy->Act({obs.data(), 1, policy.obs_size()}, {&torque, 1, 1}, *memory);
-    observer.Remember(obs, torque);
+    before = obs;
     samples.states.insert(samples.states.end(), state.begin(), state.end());
     samples.outputs.insert(samples.outputs.end(), outputs.begin(), outputs.end());
     samples.torques.push_back(static_cast<float>(torque));

@@ -8,8 +8,6 @@
 namespace upswing::deploy {
 namespace {
 
-constexpr size_t kWidth = 100;
-
 bool IsPlain(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
          std::string_view(" .,:;()+-=_").find(c) != std::string_view::npos;
@@ -49,28 +47,8 @@ std::string Cleaned(std::string_view text, char separator) {
   return cleaned;
 }
 
-std::string Wrapped(const std::vector<std::string>& words, const std::string& indent,
-                    size_t column) {
-  std::string text;
-  for (const std::string& word : words) {
-    const bool first = &word == &words.front();
-    if (!first && column + 1 + word.size() > kWidth) {
-      text += "\n" + indent;
-      column = indent.size();
-    } else if (!first) {
-      text += ' ';
-      ++column;
-    }
-    text += word;
-    column += word.size();
-  }
-  return text;
-}
-
 std::string Paragraph(std::string_view text) {
-  std::vector<std::string> words;
-  for (const std::string_view word : Split(text, ' ')) words.emplace_back(word);
-  return " * " + Wrapped(words, " * ", 3);
+  return " * " + Replaced(WrapText(text, kWidth - 3), "\n", "\n * ");
 }
 
 }  // namespace upswing::deploy

@@ -2,7 +2,6 @@
 
 #include <string>
 #include <string_view>
-#include <vector>
 
 /// Helpers that write C source code.
 namespace upswing::deploy {
@@ -20,12 +19,10 @@ std::string UpperCase(std::string text);
 /// characters between them.
 std::string Cleaned(std::string_view text, char separator);
 
-/// `words` on lines of at most 100 characters; lines after the first begin with `indent`. The first
-/// line already has `column` characters.
-std::string Wrapped(const std::vector<std::string>& words, const std::string& indent,
-                    size_t column = 0);
+/// Number of characters of a line.
+inline constexpr size_t kWidth = 100;
 
-/// A comment paragraph: `text` on lines of at most 100 characters, each after " * ".
+/// A comment paragraph: `text` on lines of at most kWidth characters, each after " * ".
 std::string Paragraph(std::string_view text);
 
 }  // namespace upswing::deploy
