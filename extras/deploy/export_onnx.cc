@@ -1,9 +1,14 @@
-#include <nlohmann/json.hpp>
+#include <onnx.pb.h>  // generated from extras/deploy/onnx.proto
 
+#include <bit>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <variant>
+
+#include "base/error.h"
 #include "base/text.h"
 #include "extras/deploy/export.h"
 #include "extras/deploy/exported_policy.h"
-#include "extras/deploy/onnx.h"
 #include "nn/gaussian.h"
 #include "nn/linear.h"
 
@@ -11,6 +16,101 @@ namespace upswing::deploy {
 namespace {
 
 using nlohmann::ordered_json;
+
+constexpr int64_t kOpset = 17;     // first opset with LayerNormalization
+constexpr int64_t kIrVersion = 8;  // IR version of opset 17
+
+static_assert(std::endian::native == std::endian::little, "raw_data is little-endian");
+
+/// A model in the ONNX format (https://onnx.ai), built node by node. Inputs and outputs are float
+/// matrices (batch × size) with any number of rows. Texts must be UTF-8.
+class OnnxModel {
+ public:
+  explicit OnnxModel(const std::string& description) {
+    model_.set_ir_version(kIrVersion);
+    model_.set_producer_name("upswing");
+    model_.set_producer_version(UPSWING_VERSION);
+    model_.set_doc_string(description);
+    graph_.set_name("policy");
+    auto& opset = *model_.add_opset_import();
+    opset.set_domain("");
+    opset.set_version(kOpset);
+  }
+
+  /// Adds an input, or an output that is made by the node of the same name.
+  void AddInput(const std::string& name, int size, const std::string& description) {
+    SetMatrix(*graph_.add_input(), name, size, description);
+  }
+  void AddOutput(const std::string& name, int size, const std::string& description) {
+    SetMatrix(*graph_.add_output(), name, size, description);
+  }
+
+  /// Adds a row-major array of constants and returns its name.
+  std::string AddConstant(const std::string& name, std::span<const float> values,
+                          const std::vector<int64_t>& shape) {
+    auto& tensor = *graph_.add_initializer();
+    tensor.set_name(name);
+    tensor.set_data_type(onnx::TensorProto::FLOAT);
+    for (const int64_t size : shape) tensor.add_dims(size);
+    tensor.set_raw_data(values.data(), values.size_bytes());
+    return name;
+  }
+
+  using Attribute = std::variant<int64_t, float, std::vector<int64_t>>;
+  using Attributes = std::vector<std::pair<std::string, Attribute>>;
+  /// Adds an operator on the arrays called `inputs`. Returns `name`, the name of its result.
+  std::string AddNode(const std::string& name, const std::string& op,
+                      const std::vector<std::string>& inputs, const Attributes& attributes = {}) {
+    auto& node = *graph_.add_node();
+    node.set_name(name);
+    node.set_op_type(op);
+    for (const std::string& input : inputs) node.add_input(input);
+    node.add_output(name);
+    for (const auto& [key, value] : attributes) {
+      auto& attribute = *node.add_attribute();
+      attribute.set_name(key);
+      if (const auto* i = std::get_if<int64_t>(&value)) {
+        attribute.set_type(onnx::AttributeProto::INT);
+        attribute.set_i(*i);
+      } else if (const auto* f = std::get_if<float>(&value)) {
+        attribute.set_type(onnx::AttributeProto::FLOAT);
+        attribute.set_f(*f);
+      } else {
+        attribute.set_type(onnx::AttributeProto::INTS);
+        for (const int64_t i : std::get<std::vector<int64_t>>(value)) attribute.add_ints(i);
+      }
+    }
+    return name;
+  }
+
+  void AddMetadata(const std::string& key, const std::string& text) {
+    auto& entry = *model_.add_metadata_props();
+    entry.set_key(key);
+    entry.set_value(text);
+  }
+
+  /// The bytes of the file. Throws BadInput if they exceed protobuf's limit of 2 GiB.
+  std::string Bytes() const {
+    if (model_.ByteSizeLong() > size_t{std::numeric_limits<int32_t>::max()}) {
+      throw BadInput("ONNX: expected a policy of less than 2 GiB");
+    }
+    return model_.SerializeAsString();
+  }
+
+ private:
+  static void SetMatrix(onnx::ValueInfoProto& value, const std::string& name, int size,
+                        const std::string& description) {
+    value.set_name(name);
+    value.set_doc_string(description);
+    auto& tensor = *value.mutable_type()->mutable_tensor_type();
+    tensor.set_elem_type(onnx::TensorProto::FLOAT);
+    tensor.mutable_shape()->add_dim()->set_dim_param("batch");
+    tensor.mutable_shape()->add_dim()->set_dim_value(size);
+  }
+
+  onnx::ModelProto model_;
+  onnx::GraphProto& graph_ = *model_.mutable_graph();
+};
 
 constexpr const char* kInput = "observation";
 /// The output with the action.
@@ -183,8 +283,7 @@ void AddMetadata(OnnxModel& model, const ExportedPolicy& policy) {
 
 std::string OnnxModelOf(const LoadedPolicy& loaded) {
   const ExportedPolicy policy = ViewForExport(loaded);
-  OnnxModel model("policy", UPSWING_VERSION,
-                  Concat("Upswing, ", loaded.task, ": ", loaded.policy->description()));
+  OnnxModel model(Concat("Upswing, ", loaded.task, ": ", loaded.policy->description()));
   model.AddInput(kInput, policy.obs_size(),
                  "as the task's environment gives it; order and units: metadata `observation`");
   if (policy.rule() == ActionRule::kLevels) {
