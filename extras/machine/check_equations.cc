@@ -10,7 +10,6 @@
 #include <numbers>
 
 #include "extras/machine/check.h"
-#include "extras/machine/pairs.h"
 
 namespace upswing::machine {
 namespace {

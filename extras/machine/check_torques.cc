@@ -7,7 +7,6 @@
 
 #include "base/text.h"
 #include "extras/machine/check.h"
-#include "extras/machine/pairs.h"
 
 namespace upswing::machine {
 namespace {

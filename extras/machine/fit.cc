@@ -185,14 +185,10 @@ class Problem {
         if (v.session == s) session.values.emplace_back(v.name, NumberIn(own, v.name));
       }
     }
-    std::vector<double> errors, torque_errors;
-    for (const Share& s : shares) {
-      errors.push_back(std::sqrt(s.angle.mean));
-      if (s.torque.mean > 0) torque_errors.push_back(std::sqrt(s.torque.mean));
-    }
+    std::vector<double> errors;
+    for (const Share& s : shares) errors.push_back(std::sqrt(s.angle.mean));
     result.windows = windows();
     result.error = Median(errors);
-    result.torque_error = Median(torque_errors);
     return result;
   }
 

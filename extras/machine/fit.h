@@ -36,8 +36,7 @@ struct FitConfig {
 struct FitResult {
   Twin twin;  // with its sessions; the covariance includes the variance between them
   int windows = 0;
-  double error = 0;         // median over the windows of the rms of both angles' error, rad
-  double torque_error = 0;  // median rms error of the reported torques, N·m; NaN without them
+  double error = 0;  // median over the windows of the rms of both angles' error, rad
 };
 
 /// Identifies the values of a structure. `first` is the initial guess, and has all other values.
