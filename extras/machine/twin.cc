@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <functional>
 #include <numbers>
 #include <optional>
 #include <utility>
@@ -30,23 +29,20 @@ Matrix Factor(const Twin& twin, const std::string& where) {
   const Eigen::Map<const Matrix> covariance(twin.covariance.data(), n, n);
   // Scaled to ones on the diagonal, so that the test does not depend on units.
   const Eigen::VectorXd deviation = covariance.diagonal().cwiseMax(0).cwiseSqrt();
-  const auto refuse = [&](const std::string& names, const std::string& expected, double got) {
-    throw BadInput(
-        Concat(where, ": [covariance]: ", names, ": expected ", expected, ", got ", got));
+  const auto refuse = [&](const std::string& of, const std::string& expected, double got) {
+    throw BadInput(Concat(where, ": [covariance]: ", of, ": expected ", expected, ", got ", got));
   };
   Matrix correlation = Matrix::Zero(n, n);
   constexpr double kRounding = 1e-6;
-  const auto name = [&](int i) -> const std::string& {
-    return twin.uncertain[static_cast<size_t>(i)];
-  };
+  const std::vector<std::string>& names = twin.uncertain;
   for (int i = 0; i < n; ++i) {
-    if (covariance(i, i) < 0) refuse(name(i), "a variance of 0 or more", covariance(i, i));
+    if (covariance(i, i) < 0) refuse(names[i], "a variance of 0 or more", covariance(i, i));
   }
   for (int i = 0; i < n; ++i) {
     for (int j = 0; j < n; ++j) {
       const double scale = deviation(i) * deviation(j);
       if (std::abs(covariance(i, j)) > (1 + kRounding) * scale) {
-        refuse(Concat(name(i), " and ", name(j)),
+        refuse(Concat(names[i], " and ", names[j]),
                Concat("a covariance within ", scale, ", the product of their standard deviations"),
                covariance(i, j));
       }
@@ -66,7 +62,12 @@ Matrix Factor(const Twin& twin, const std::string& where) {
 }
 
 /// Reads the table [sessions]: for each session, a table of its values.
-void ReadSessions(const toml::table& table, const std::string& where, Twin& twin) {
+void ReadSessions(const toml::node& sessions, const std::string& where, Twin& twin) {
+  if (!sessions.is_table()) {
+    throw BadInput(
+        Concat(PlaceOf(sessions, where), ": sessions: expected a table, got another type"));
+  }
+  const toml::table& table = *sessions.as_table();
   if (table.size() > kMostSessions) {
     throw BadInput(Concat(PlaceOf(table, where), ": [sessions]: expected at most ", kMostSessions,
                           " sessions, got ", table.size()));
@@ -87,8 +88,11 @@ void ReadSessions(const toml::table& table, const std::string& where, Twin& twin
   }
 }
 
-/// Removes values from the covariance.
-void Forget(Twin& twin, const std::function<bool(const std::string&)>& forgets) {
+/// Removes the values of a session, which are known, from the covariance.
+void Forget(Twin& twin, const Session& session) {
+  const auto forgets = [&](const std::string& name) {
+    return std::ranges::count(session.values, name, &std::pair<std::string, double>::first) > 0;
+  };
   std::vector<std::string> names;
   std::vector<double> covariance;
   const size_t n = twin.uncertain.size();
@@ -190,28 +194,18 @@ Twin ParseTwin(std::string_view text, const std::string& where) {
   Twin twin;
   twin.name.clear();
   const bool has_plant = table.contains("plant");
-  const auto take = [&](std::string_view key, const auto& read) {
-    if (const toml::node* node = table.get(key)) {
-      read(*node, Concat(PlaceOf(*node, where), ": ", key));
-      table.erase(key);
+  if (const toml::node* name = table.get("name")) {
+    if (!name->is_string()) {
+      throw BadInput(Concat(PlaceOf(*name, where), ": name: expected a text, got another type"));
     }
-  };
-  take("name", [&](const toml::node& node, const std::string& place) {
-    if (!node.is_string()) throw BadInput(Concat(place, ": expected a text, got another type"));
-    twin.name = node.as_string()->get();
-  });
-  // By reference: a copy would not know its lines.
-  const auto table_of = [](const toml::node& node, const std::string& place) -> const toml::table& {
-    if (!node.is_table()) throw BadInput(Concat(place, ": expected a table, got another type"));
-    return *node.as_table();
-  };
-  table.erase("disturbance");  // follows from the other values
+    twin.name = name->as_string()->get();
+  }
   Covariance covariance = TakeCovariance(table, where);
   twin.uncertain = std::move(covariance.names);
   twin.covariance = std::move(covariance.values);
-  take("sessions", [&](const toml::node& node, const std::string& place) {
-    ReadSessions(table_of(node, place), where, twin);
-  });
+  if (const toml::node* sessions = table.get("sessions")) ReadSessions(*sessions, where, twin);
+  // The disturbance follows from the other values.
+  for (const char* key : {"name", "sessions", "disturbance"}) table.erase(key);
   ApplyTable(OptionsOf(twin), table, where, /*flat=*/false);
   if (!has_plant) throw BadInput(Concat(where, ": expected a table [plant], got none"));
   if (!twin.uncertain.empty()) Factor(twin, where);
@@ -256,10 +250,7 @@ Twin InSession(const Twin& twin, const MachineLog& log) {
     for (const auto& [value, number] : session.values) {
       *std::get<double*>(options.Get(value)->target) = number;
     }
-    Forget(own, [&](const std::string& uncertain) {
-      return std::ranges::count(session.values, uncertain, &std::pair<std::string, double>::first) >
-             0;
-    });
+    Forget(own, session);
     break;
   }
   return own;
