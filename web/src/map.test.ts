@@ -82,6 +82,20 @@ test('a map is computed in slices, all for the state at its beginning', () => {
   expect(sliced.cells).toEqual(whole.cells);
 });
 
+test('the first map can have larger blocks, and the next one all cells', () => {
+  world.policy = new Policy(readPolicy('fast'));
+  world.reset(STATE);
+  const [coarse, fine, both] = [new ValueMap(2), new ValueMap(8), new ValueMap(8, 8, 4)];
+  for (const map of [coarse, fine, both]) map.work(world, 1e9);
+  const inBlocks = fine.cells!.map((_, i) => {
+    const [row, column] = [Math.floor(i / 8), i % 8];
+    return coarse.cells![2 * Math.floor(row / 4) + Math.floor(column / 4)]!;
+  });
+  expect([both.isCoarse, both.cells]).toEqual([true, inBlocks]);
+  both.work(world, 1e9);
+  expect([both.isCoarse, both.cells]).toEqual([false, fine.cells]);
+});
+
 test('without a policy there is no map', () => {
   world.policy = null;
   const map = new ValueMap(4);

@@ -50,14 +50,21 @@ export class ValueMap {
   /// The last complete map (rows × columns), from below: V in units of the network, or torque (N·m).
   /// Null before there is one.
   cells: Float32Array | null = null;
+  /// Whether `cells` is the first map, in blocks.
+  isCoarse = false;
+  private readonly coarse: number;
   private begun: Float32Array;
-  private next = 0; // cell to compute next
+  private block: number; // cells along a side that get the same value
+  private next = 0; // block to compute next
   private around: State | null = null; // values of the other variables
   private plant: Readonly<Plant> | null = null; // of the map in progress
 
-  constructor(columns: number, rows = columns) {
+  /// `coarse`: cells along a side of a block of the first map, which is there sooner. It divides
+  /// both numbers of cells.
+  constructor(columns: number, rows = columns, coarse = 1) {
     this.columns = columns;
     this.rows = rows;
+    this.coarse = this.block = coarse;
     this.begun = new Float32Array(rows * columns);
   }
 
@@ -70,34 +77,47 @@ export class ValueMap {
   private restart(): void {
     this.around = null;
     this.next = 0;
+    this.block = this.cells ? 1 : this.coarse;
   }
 
-  /// Computes for up to `milliseconds`, at least one cell. Returns the state at which a map was
+  /// Computes for up to `milliseconds`, at least one block. Returns the state at which a map was
   /// begun when that map is complete, else null. A change of the plant starts the map again.
   work(world: World, milliseconds: number): State | null {
     const end = performance.now() + milliseconds;
     if (this.plant !== world.plant) this.restart();
     this.plant = world.plant;
     this.around ??= this.atRest ? { ...world.state, w1: 0, w2: 0 } : world.state;
+    const { block } = this;
+    const across = this.columns / block;
+    const blocks = across * (this.rows / block);
     do {
-      const [column, row] = [this.next % this.columns, Math.floor(this.next / this.columns)];
+      const [column, row] = [this.next % across, Math.floor(this.next / across)];
       const decision = world.decisionAt(this.stateAt(column, row, this.around));
       if (!decision) return null;
-      this.begun[this.next] = this.quantity === 'torque' ? decision.torque : valueOf(decision);
-    } while (++this.next < this.begun.length && performance.now() < end);
-    if (this.next < this.begun.length) return null;
+      this.fill(column, row, this.quantity === 'torque' ? decision.torque : valueOf(decision));
+    } while (++this.next < blocks && performance.now() < end);
+    if (this.next < blocks) return null;
     [this.cells, this.begun] = [this.begun, this.cells ?? new Float32Array(this.begun.length)];
+    this.isCoarse = block > 1;
     const { around } = this;
     this.restart();
     return around;
   }
 
-  /// The state in the middle of a cell.
+  private fill(column: number, row: number, value: number): void {
+    const { block, columns } = this;
+    for (let i = row * block; i < (row + 1) * block; ++i) {
+      this.begun.fill(value, i * columns + column * block, i * columns + (column + 1) * block);
+    }
+  }
+
+  /// The state in the middle of a block.
   private stateAt(column: number, row: number, around: State): State {
+    const { block } = this;
     return {
       ...around,
-      [this.x.name]: valueAt(this.x, (column + 0.5) / this.columns),
-      [this.y.name]: valueAt(this.y, (row + 0.5) / this.rows),
+      [this.x.name]: valueAt(this.x, (block * (column + 0.5)) / this.columns),
+      [this.y.name]: valueAt(this.y, (block * (row + 0.5)) / this.rows),
     };
   }
 }

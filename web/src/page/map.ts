@@ -11,7 +11,8 @@ import { element } from './dom';
 
 const CELLS = 72; // along a side
 const MILLISECONDS = 3; // per frame
-const FIRST = 24; // the same while there is no map yet
+const FIRST = 24; // the same while there is no map yet, or one in blocks
+const COARSE = 4; // cells along a side of a block
 const FRAMES = 3; // drawn at each third frame, computed at the others
 const WAY = 4; // s of the trajectory to draw
 const MARKS = 24; // steps of the mark along a side
@@ -24,7 +25,7 @@ const ARROWS: Readonly<Record<string, readonly [number, number]>> = {
 
 /// The panel of the map: its choices, and clicks on it.
 export class MapPanel {
-  private readonly map = new ValueMap(CELLS);
+  private readonly map = new ValueMap(CELLS, CELLS, COARSE);
   private readonly chart = new MapChart();
   private readonly select = {
     quantity: element<HTMLSelectElement>('map-quantity'),
@@ -129,9 +130,9 @@ export class MapPanel {
       this.busy = false;
       return;
     }
-    const begunIn = map.work(world, map.cells ? MILLISECONDS : FIRST);
+    const begunIn = map.work(world, map.cells && !map.isCoarse ? MILLISECONDS : FIRST);
     if (!begunIn) return;
-    this.key = keyOf(begunIn);
+    this.key = map.isCoarse ? '' : keyOf(begunIn);
     const [low, high] = (this.range = this.rangeOf(map.cells!, world));
     const known = Number.isFinite(high - low);
     element('map-value').textContent = known ? this.said(world) : 'not estimated';
