@@ -55,7 +55,7 @@ export function inline(
   );
   if (places !== workers.size) throw new Error(`expected ${workers.size} workers, got ${places}`);
   const style = drawn(text('.css'));
-  const sandbox = readFileSync(join(pictures, 'sandbox.html'), 'utf8');
+  const sandbox = readFileSync(join(pictures, '../src/write/sandbox.html'), 'utf8');
   const [, sandboxed] = /<script>(.*?)<\/script>/s.exec(sandbox)!;
   const watch = script(readFileSync(join(pictures, 'watch.js'), 'utf8'));
   const policy =
@@ -72,10 +72,7 @@ export function inline(
     .replace(/<link[^>]*rel="stylesheet"[^>]*>/, () => `<style>${style}</style>`)
     .replace(/<script[^>]*watch\.js[^>]*><\/script>/, () => `<script>${watch}</script>`)
     .replace(/<script type="module"[^>]*><\/script>\s*/, '')
-    .replace('</body>', () => {
-      const frame = `<template id="sandbox">${sandbox}</template>`;
-      return `${frame}<!-- files --><script type="module">${code}</script>\n</body>`;
-    });
+    .replace('</body>', () => `<!-- files --><script type="module">${code}</script>\n</body>`);
 }
 
 export function single(): Plugin {

@@ -26,6 +26,11 @@ test('after the first visit the page works offline, and online it is never an ol
   await page.evaluate(() => (location.hash = '#learn=fast&seed=1'));
   await expect(page.locator('#learn-updates')).not.toHaveText('0');
   await page.evaluate(() => upswing.learn.stop());
+  await page.evaluate(() => (location.hash = '#write'));
+  await page.locator('#write-run').click();
+  await page.waitForFunction(() => upswing.world.byHand !== 0);
+  await page.locator('#write-score').click();
+  await expect(page.locator('#write-status')).toContainText('Yours balances');
 
   await context.setOffline(false);
   await page.evaluate(async (name) => {

@@ -29,11 +29,15 @@ test.each([
   expect(decodeText(`#${hash}`)).toEqual({ text: null, problems: [problem] });
 });
 
-test("the sandbox's policy allows its own script and nothing else", () => {
-  const page = readFileSync(new URL('../../public/sandbox.html', import.meta.url), 'utf8');
-  const [, script] = /<script>(.*?)<\/script>/s.exec(page)!;
+test("the sandbox's policy allows its own script and nothing else, and the page's allows it", () => {
+  const read = (name: string) => readFileSync(new URL(name, import.meta.url), 'utf8');
+  const sandbox = read('sandbox.html');
+  const [, script] = /<script>(.*?)<\/script>/s.exec(sandbox)!;
   const hash = createHash('sha256').update(script!).digest('base64');
-  expect(page).toContain(
+  expect(sandbox).toContain(
     `content="default-src 'none'; script-src 'sha256-${hash}'; worker-src blob:"`,
+  );
+  expect(read('../../index.html')).toContain(
+    `script-src 'self' 'wasm-unsafe-eval' 'sha256-${hash}';`,
   );
 });

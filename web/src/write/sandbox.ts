@@ -1,13 +1,14 @@
 import { printable } from '../text';
 import { STRANGE } from './asker';
 import PRELUDE from './prelude.js?raw';
+import SANDBOX from './sandbox.html?raw';
 
-/// Runs a visitor's controller in a worker of a sandboxed frame (public/sandbox.html). The page
-/// trusts nothing that comes from there.
+/// Runs a visitor's controller in a worker of a sandboxed frame. The page trusts nothing that comes
+/// from there. The frame's text is a part of this script, because no service worker answers for a
+/// sandboxed frame without a network.
 
 const HEAD = `${PRELUDE}\nfunction torque(q1, q2, w1, w2, t) {\n`;
 const ROWS_BEFORE = HEAD.split('\n').length - 1;
-const PATIENCE = 30_000; // ms until a frame that does not load counts as missing
 const LONGEST_PROBLEM = 160; // characters
 
 /// Why a controller failed, in one line, and its row (from 1 on) if that is known.
@@ -21,7 +22,7 @@ export class Sandbox {
   private readonly port: MessagePort;
   private readonly onProblem: (problem: Problem) => void;
   private readonly frame = document.createElement('iframe');
-  private timer: number;
+  private ready = false; // whether the frame has the text
 
   /// `text`: the lines of a function of the state that returns the motor's torque (N·m). `port`: for
   /// an Asker at its other end. `onProblem`: called at most once; the worker has ended then.
@@ -34,21 +35,12 @@ export class Sandbox {
     frame.hidden = true;
     frame.title = 'Sandbox';
     frame.sandbox.add('allow-scripts');
-    const here = document.querySelector<HTMLTemplateElement>('template#sandbox'); // build/single.ts
-    if (here) frame.srcdoc = here.innerHTML;
-    else frame.src = 'sandbox.html';
+    frame.srcdoc = SANDBOX;
     document.body.append(frame);
-    const offline = 'the device is offline, and the sandbox for it has not been loaded yet';
-    const missing = 'the sandbox for it could not be loaded';
-    this.timer = window.setTimeout(
-      () => this.fail({ text: navigator.onLine ? missing : offline, row: null }),
-      PATIENCE,
-    );
   }
 
   /// Ends the worker.
   close(): void {
-    clearTimeout(this.timer);
     removeEventListener('message', this.hear);
     this.frame.remove();
   }
@@ -63,9 +55,8 @@ export class Sandbox {
   private readonly hear = ({ data, source }: MessageEvent): void => {
     const { contentWindow } = this.frame;
     if (source === null || source !== contentWindow) return;
-    if (data === 'ready' && this.timer !== 0) {
-      clearTimeout(this.timer);
-      this.timer = 0;
+    if (data === 'ready' && !this.ready) {
+      this.ready = true;
       // An opaque origin has no name.
       contentWindow.postMessage(`${HEAD}${this.text}\n}`, '*', [this.port]);
       return;
