@@ -10,8 +10,8 @@ export interface Report {
   finished: boolean;
   bestStep: number; // of the best evaluation; 0: none
   bestSuccess: number;
-  terms?: string[]; // names of the reward's terms (K)
-  episodes: { step: number; return: number; terms?: number[] }[]; // with the sum of each term
+  terms: string[]; // names of the reward's terms (K)
+  episodes: { step: number; return: number; terms: number[] }[]; // with the sum of each term
   evaluations: Test[];
 }
 

@@ -123,8 +123,6 @@ export class LearnPanel {
       this.choose(this.courses[Number((event.target as HTMLInputElement).value)]!);
     });
     this.knobs.show(this.agent.value);
-    const known = this.knobs.settingsOf(this.agent.value);
-    element('reward-details').hidden = !known.some(({ name }) => name === 'reward');
     onThemeChange(() => {
       this.chart.canvas.forgetColors();
       this.draw();

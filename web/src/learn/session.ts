@@ -145,11 +145,11 @@ export class Session implements Course {
     this.onNews();
   }
 
-  private sumTerms({ terms = [], episodes }: Report): void {
+  private sumTerms({ terms, episodes }: Report): void {
     if (this.terms.length === 0) this.terms = terms.map((name) => ({ name, means: [] }));
     if (episodes.length === 0) return;
     this.terms.forEach(({ means }, k) => {
-      const sum = episodes.reduce((all, episode) => all + episode.terms![k]!, 0);
+      const sum = episodes.reduce((all, episode) => all + episode.terms[k]!, 0);
       means.push(sum / episodes.length / TRIAL_STEPS);
     });
   }
