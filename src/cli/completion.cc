@@ -1,5 +1,5 @@
 // The command `completion`: completions for shells. The scripts ask --help when they complete, so
-// that they follow the options.
+// that they follow the commands and options. UPSWING_SETUP=no keeps ./upswing from building then.
 #include <fmt/format.h>
 
 #include "base/error.h"
@@ -9,27 +9,51 @@
 namespace upswing {
 namespace {
 
-// The commands and the flags are the first words of the indented lines in --help. The launcher
-// heads its commands with "Commands:", the program with "Subcommands:".
-constexpr const char* kBash = R"(_upswing() {
-  local word=${COMP_WORDS[COMP_CWORD]} names
-  if [ "$COMP_CWORD" = 1 ]; then
-    names=$("$1" -h 2>/dev/null | sed -n '/ommands:$/,/^$/s/^  \([a-z]*\) .*/\1/p')
-  else
-    names=$("$1" "${COMP_WORDS[1]}" --help 2>/dev/null | sed -n 's/^  \(-[^ ]*\) .*/\1/p' | tr , '\n')
-  fi
-  COMPREPLY=($(compgen -W "$names" -- "$word"))
-}
+// Prints the candidates after the word `last`, from --help: its values if it is a flag with
+// choices, else commands and flags. The launcher heads its commands with "Commands:", the program
+// with "Subcommands:".
+constexpr const char* kAwk = R"(
+    /^Named agents:$/ { named = 1 }
+    /ommands:$/ { list = 1 }
+    /^$/ { list = named = 0 }
+    list && /^  [a-z]/ { names = names $1 "\n" }
+    named && /^  [a-z]/ { agents = agents $1 "\n" }
+    /^  -/ {
+      mine = index("," $1 ",", "," last ",") > 0
+      if (mine && $2 ~ /^[A-Z]+$/) wants = 1
+      gsub(",", "\n", $1)
+      names = names $1 "\n"
+    }
+    mine { about = about " " $0 }
+    END {
+      gsub(" +", " ", about)
+      if (!wants) printf "%s", names
+      else if (last == "--agent") printf "%s", agents
+      else if (match(about, /\([a-z0-9-]+(, [a-z0-9-]+)+[;)]/)) {
+        values = substr(about, RSTART + 1, RLENGTH - 2)
+        gsub(", ", "\n", values)
+        print values
+      }
+    })";
+constexpr const char* kBash = R"sh(_upswing() {{
+  local word=${{COMP_WORDS[COMP_CWORD]}} k help=-h called
+  called=("$1")
+  for ((k = 1; k < COMP_CWORD && k < 3; ++k)); do
+    case ${{COMP_WORDS[k]}} in [a-z]*) called+=("${{COMP_WORDS[k]}}") help=--help ;; esac
+  done
+  COMPREPLY=($(compgen -W "$(UPSWING_SETUP=no "${{called[@]}}" $help 2>/dev/null |
+    awk -v last="${{COMP_WORDS[COMP_CWORD - 1]}}" '{}')" -- "$word"))
+}}
 complete -o default -F _upswing upswing ./upswing
-)";
+)sh";
 constexpr const char* kZsh = "autoload -U +X bashcompinit && bashcompinit\n";
 constexpr const char* kFish = R"(function __upswing_names
   set -l words (commandline -opc)
-  if test (count $words) = 1
-    $words[1] -h 2>/dev/null | sed -n '/ommands:$/,/^$/s/^  \([a-z]*\) .*/\1/p'
-  else
-    $words[1] $words[2] --help 2>/dev/null | sed -n 's/^  \(-[^ ]*\) .*/\1/p' | tr , '\n'
+  set -l called $words[1] (string match -r '^[a-z].*' -- $words[2..3]) -h
+  if set -q called[3]
+    set called[-1] --help
   end
+  UPSWING_SETUP=no $called 2>/dev/null | awk -v last=$words[-1] '{}'
 end
 complete -c upswing -a '(__upswing_names)'
 )";
@@ -38,7 +62,12 @@ int RunCompletion(const std::string& shell) {
   if (shell != "bash" && shell != "zsh" && shell != "fish") {
     throw BadInput(Concat("completion: expected bash, zsh or fish, got ", Printable(shell)));
   }
-  fmt::print("{}{}", shell == "zsh" ? kZsh : "", shell == "fish" ? kFish : kBash);
+  if (shell == "zsh") fmt::print(kZsh);
+  if (shell == "fish") {
+    fmt::print(kFish, kAwk);
+  } else {
+    fmt::print(kBash, kAwk);
+  }
   return 0;
 }
 
