@@ -67,9 +67,10 @@ Estimator::Vector Estimator::Follow(Vector x, double begin, double seconds) cons
   body.f1 = x[kFriction];
   body.f2 = x[kFriction + 1];
   PendulumState state = StateOf(x);
-  Joints acceleration = body.Acceleration(state, model_->drive.At(begin));
+  int cursor = 0;
+  Joints acceleration = body.Acceleration(state, model_->drive.At(begin, cursor));
   for (int i = 0; i < steps; ++i) {
-    state = StepMotion(body, model_->drive, state, begin + i * h, h, acceleration);
+    state = StepMotion(body, model_->drive, state, begin + i * h, h, cursor, acceleration);
   }
   x.head<4>() << state.q1, state.q2, state.w1, state.w2;
   return x;

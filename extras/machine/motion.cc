@@ -48,8 +48,9 @@ JointTangents AccelerationTangents(const Manipulator& m, const PendulumState& s,
 Drive::Drive(double delay, double lag) : delay_(delay), lag_(std::max(lag, kShortestLag)) {}
 
 void Drive::Add(double time, const Joints& command) {
+  int cursor = static_cast<int>(times_.size()) - 1;
   DriveTangents tangents;
-  starts_.push_back(At(time + delay_, &tangents));
+  starts_.push_back(At(time + delay_, cursor, &tangents));
   slopes_.push_back(tangents.by_lag);
   times_.push_back(time);
   commands_.push_back(command);
@@ -87,12 +88,23 @@ Drive Drive::Measured(const MachineLog& log, const Twin& twin) {
   return drive;
 }
 
-Joints Drive::At(double time, DriveTangents* tangents) const {
+int Drive::Find(double time, int& cursor) const {
+  const int n = static_cast<int>(times_.size());
+  // Mostly the same event as before, or the next one.
+  if (cursor < n && times_[cursor] <= time) {
+    while (cursor + 1 < n && times_[cursor + 1] <= time) ++cursor;
+    return cursor;
+  }
+  const auto after = std::ranges::upper_bound(times_, time);
+  const int found = static_cast<int>(after - times_.begin()) - 1;
+  cursor = std::max(found, 0);
+  return found;
+}
+
+Joints Drive::At(double time, int& cursor, DriveTangents* tangents) const {
   if (times_.empty()) return {};
   time -= delay_;
-  // The last event up to this time; -1: before the first.
-  const auto after = std::ranges::upper_bound(times_, time);
-  const int event = static_cast<int>(after - times_.begin()) - 1;
+  const int event = Find(time, cursor);
   if (starts_.empty()) {
     if (event < 0) return commands_.front();
     if (event + 1 == static_cast<int>(times_.size())) return commands_.back();
@@ -125,10 +137,11 @@ int MotionSteps(double seconds) {
 }
 
 PendulumState StepMotion(const Manipulator& body, const Drive& drive, const PendulumState& now,
-                         double time, double h, Joints& acceleration, StepTangents* tangents) {
+                         double time, double h, int& cursor, Joints& acceleration,
+                         StepTangents* tangents) {
   DriveTangents half, full;
-  const Joints u1 = drive.At(time + h / 2, tangents != nullptr ? &half : nullptr);
-  const Joints u2 = drive.At(time + h, tangents != nullptr ? &full : nullptr);
+  const Joints u1 = drive.At(time + h / 2, cursor, tangents != nullptr ? &half : nullptr);
+  const Joints u2 = drive.At(time + h, cursor, tangents != nullptr ? &full : nullptr);
   const auto acceleration_at = [&](const PendulumState& s, double share) {
     return body.Acceleration(s, share < 1 ? u1 : u2);
   };
@@ -179,8 +192,9 @@ void Predict(const Manipulator& body, const Drive& drive, const Joints& zero,
   PendulumState now = start;
   now.q1 -= zero[0];
   now.q2 -= zero[1];
+  int cursor = 0;
   DriveTangents of_torque;
-  Joints k1 = body.Acceleration(now, drive.At(begin, &of_torque));
+  Joints k1 = body.Acceleration(now, drive.At(begin, cursor, &of_torque));
   StepTangents before, t;
   if (tangents != nullptr) {
     before.state.setIdentity();
@@ -192,7 +206,7 @@ void Predict(const Manipulator& body, const Drive& drive, const Joints& zero,
     Joints after = k1;
     if (tangents != nullptr) t = before;
     const PendulumState next =
-        StepMotion(body, drive, now, time, h, after, tangents != nullptr ? &t : nullptr);
+        StepMotion(body, drive, now, time, h, cursor, after, tangents != nullptr ? &t : nullptr);
 
     const bool is_last = step + 1 == steps;
     for (; row < rows && (is_last || log.time[first + row] < time + h); ++row) {

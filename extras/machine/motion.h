@@ -32,10 +32,14 @@ class Drive {
   /// Forgets commands that no longer matter at `time` and later.
   void Forget(double time);
 
-  /// The torques at a time (s). `tangents`, of a drive of commands, are filled unless null.
-  Joints At(double time, DriveTangents* tangents = nullptr) const;
+  /// The torques at a time (s). `cursor`, first 0, speeds up calls with growing times. `tangents`,
+  /// of a drive of commands, are filled unless null.
+  Joints At(double time, int& cursor, DriveTangents* tangents = nullptr) const;
 
  private:
+  /// Index of the last event up to a time; -1: before the first.
+  int Find(double time, int& cursor) const;
+
   double delay_, lag_;            // s
   std::vector<double> times_;     // (n) of the events, s
   std::vector<Joints> commands_;  // (n) from each event on, N·m; or the values at the events
@@ -57,7 +61,7 @@ struct StepTangents {
 /// drive. `acceleration` (rad/s²): in, of the state before the step; out, of the state after it.
 /// `tangents`, unless null, change as both.
 PendulumState StepMotion(const Manipulator& body, const Drive& drive, const PendulumState& now,
-                         double time, double h, Joints& acceleration,
+                         double time, double h, int& cursor, Joints& acceleration,
                          StepTangents* tangents = nullptr);
 
 /// The equations of motion of a twin. `reported`: driven by reported torques instead of commanded

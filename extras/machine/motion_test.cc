@@ -51,13 +51,14 @@ MachineLog LogOfSteps() {
 TEST(Drive, FollowsACommandWithDelayAndLag) {
   const Twin twin = MachineWithLag();
   const Drive drive = Drive::Commanded(LogOfSteps(), twin);
+  int cursor = 0;
   // The command of row 0 is sent with the angles of row 1, at 0.01 s, and acts from 0.013 s on.
-  EXPECT_EQ(drive.At(0.0129)[0], 0);
-  EXPECT_NEAR(drive.At(0.013 + 0.004)[0], 1 - std::exp(-1), 1e-12);
-  EXPECT_NEAR(drive.At(0.4)[0], 1, 1e-12);
+  EXPECT_EQ(drive.At(0.0129, cursor)[0], 0);
+  EXPECT_NEAR(drive.At(0.013 + 0.004, cursor)[0], 1 - std::exp(-1), 1e-12);
+  EXPECT_NEAR(drive.At(0.4, cursor)[0], 1, 1e-12);
   // Joint 1 goes from 1 to -2 at 0.513 s. A search may also go back.
-  EXPECT_NEAR(drive.At(0.513 + 0.004)[0], -2 + 3 * std::exp(-1), 1e-12);
-  EXPECT_NEAR(drive.At(0.013 + 0.004)[0], 1 - std::exp(-1), 1e-12);
+  EXPECT_NEAR(drive.At(0.513 + 0.004, cursor)[0], -2 + 3 * std::exp(-1), 1e-12);
+  EXPECT_NEAR(drive.At(0.013 + 0.004, cursor)[0], 1 - std::exp(-1), 1e-12);
 }
 
 TEST(Drive, LimitsTheJointThatOnlyCompensatesFriction) {
@@ -66,7 +67,8 @@ TEST(Drive, LimitsTheJointThatOnlyCompensatesFriction) {
   log.push.assign(log.commanded.size(), {0.1, 0});
   const Twin twin = MachineWithLag();
   EXPECT_EQ(ActuatedJoint(log, twin), 2);
-  const Joints torque = Drive::Commanded(log, twin).At(0.9);
+  int cursor = 0;
+  const Joints torque = Drive::Commanded(log, twin).At(0.9, cursor);
   EXPECT_NEAR(torque[0], 0.5 + 0.1, 1e-9);  // pushes come after the limit
   EXPECT_NEAR(torque[1], 4, 1e-9);
 }
@@ -79,7 +81,8 @@ TEST(Drive, ForgetsOnlyCommandsThatNoLongerMatter) {
     all.Add(time, command);
     forgetful.Add(time, command);
     forgetful.Forget(time);
-    EXPECT_EQ(all.At(time + 0.001), forgetful.At(time + 0.001));
+    int a = 0, b = 0;
+    EXPECT_EQ(all.At(time + 0.001, a), forgetful.At(time + 0.001, b));
   }
 }
 
@@ -119,7 +122,8 @@ void ExpectPredictionRepeatsTheLog(double delay, double current_delay) {
           log.rows(), twin.actuator.current_delay, motion);
   const Drive drive = Drive::Commanded(log, twin);
   for (int k = 10; k < log.rows() - 2; k += 20) {
-    const Joints torque = drive.At(log.time[k] - current_delay);
+    int cursor = 0;
+    const Joints torque = drive.At(log.time[k] - current_delay, cursor);
     for (int j = 0; j < 2; ++j) {
       EXPECT_NEAR(motion.angle[k][j], log.angle[k][j], 3e-4) << k << " " << delay;
       const double reported = torque[j] - twin.actuator.current_inertia * motion.acceleration[k][j];

@@ -41,12 +41,13 @@ Share ShareOf(const MachineLog& log, const LogWindow& window, const std::array<b
   }
   square(share.angle);
   if (log.measured.empty()) return share;
+  int cursor = 0;
   r.setZero();
   if (linearizes) J.setZero();
   for (int k = 0; k < rows; ++k) {
     DriveTangents of_torque;
     const double time = log.time[first + k] - motor.current_delay;
-    const Joints torque = drive.At(time, linearizes ? &of_torque : nullptr);
+    const Joints torque = drive.At(time, cursor, linearizes ? &of_torque : nullptr);
     for (int j = 0; j < 2; ++j) {
       if (!reported[j]) continue;
       const int i = 2 * k + j;

@@ -17,9 +17,10 @@ void SimulatedMachine::Advance(double time) {
   const int steps = MotionSteps(time - begin);
   const double h = (time - begin) / steps;
   if (h <= 0) return;
+  int cursor = 0;
   for (int i = 0; i < steps; ++i) {
     const double end = i + 1 == steps ? time : begin + (i + 1) * h;
-    moments_.push_back(After(moments_.back(), h, end));
+    moments_.push_back(After(moments_.back(), h, end, cursor));
   }
   const double oldest = time - std::max({twin_.actuator.current_delay, -twin_.actuator.delay, 0.0});
   while (moments_.size() > 2 && moments_[1].time <= oldest) moments_.pop_front();
@@ -27,10 +28,10 @@ void SimulatedMachine::Advance(double time) {
   drive_.Forget(time - kKept);
 }
 
-SimulatedMachine::Moment SimulatedMachine::After(const Moment& moment, double h,
-                                                 double time) const {
+SimulatedMachine::Moment SimulatedMachine::After(const Moment& moment, double h, double time,
+                                                 int& cursor) const {
   Moment next = moment;
-  next.state = StepMotion(body_, drive_, next.state, next.time, h, next.acceleration);
+  next.state = StepMotion(body_, drive_, next.state, next.time, h, cursor, next.acceleration);
   next.time = time;
   return next;
 }
@@ -48,9 +49,10 @@ void SimulatedMachine::Command(const Joints& torque) {
 SimulatedMachine::Moment SimulatedMachine::Ago(double age) const {
   if (age < 0) {
     Moment moment = moments_.back();
+    int cursor = 0;
     const int steps = MotionSteps(-age);
     for (int i = 0; i < steps; ++i) {
-      moment = After(moment, -age / steps, moment.time - age / steps);
+      moment = After(moment, -age / steps, moment.time - age / steps, cursor);
     }
     return moment;
   }
@@ -71,7 +73,8 @@ SimulatedMachine::Moment SimulatedMachine::Ago(double age) const {
 MachineReading SimulatedMachine::Read() const {
   const MachineSensors& sensors = twin_.sensors;
   const Moment late = Ago(twin_.actuator.current_delay);
-  const Joints torque = drive_.At(late.time);
+  int cursor = 0;
+  const Joints torque = drive_.At(late.time, cursor);
   MachineReading reading{{state().q1 + sensors.zero1, state().q2 + sensors.zero2}, {}};
   for (int j = 0; j < 2; ++j) {
     double& angle = reading.angle[j];

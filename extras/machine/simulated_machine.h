@@ -49,7 +49,7 @@ class SimulatedMachine {
     Joints acceleration;  // rad/s²
   };
   /// The moment at `time` (s), after `h` seconds of motion from another.
-  Moment After(const Moment& moment, double h, double time) const;
+  Moment After(const Moment& moment, double h, double time, int& cursor) const;
   /// The moment `age` seconds ago, by interpolation. Negative: ahead, under the torques sent so
   /// far.
   Moment Ago(double age) const;
