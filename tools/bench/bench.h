@@ -11,14 +11,14 @@ namespace upswing {
 
 /// Options of the command line.
 struct BenchOptions {
-  std::vector<std::string> names;   // beginnings of the names of the cases to run; empty: all
-  std::vector<int64_t> threads;     // a case that can use threads runs with each number
-  std::vector<int64_t> hidden;      // for gradient: widths of layers; empty: several
-  int64_t batch = 0;                // for gradient: batch size; 0: several
-  std::string simd;                 // vector instructions; empty: the best
-  std::optional<std::string> json;  // file to write
-  double seconds = 0.2;             // least time of each repetition
-  int64_t repetitions = 1;          // repetitions of each case
+  std::vector<std::string> names;  // beginnings of the names of the cases to run; empty: all
+  std::vector<int64_t> threads;    // a case that can use threads runs with each number
+  std::vector<int64_t> hidden;     // for gradient: widths of layers; empty: several
+  int64_t batch = 0;               // for gradient: batch size; 0: several
+  std::string simd;                // vector instructions; empty: the best
+  std::string json;                // file to write; empty: none
+  double seconds = 0.2;            // least time of each repetition
+  int64_t repetitions = 1;         // repetitions of each case
 };
 
 /// Timed work: one call.

@@ -34,7 +34,8 @@ DqnConfig BareDqn(bool dueling, const Widths& hidden, int64_t batch) {
 double UpdateFlops(const DqnConfig& config) {
   const NetworkShape shape = config.Shape(kObservationSize, kBenchActions);
   double all = 0;  // multiply-adds of a forward pass of one row
-  for (const ParameterBlock& block : Network(shape).blocks()) {
+  const Network network(shape);
+  for (const ParameterBlock& block : network.blocks()) {
     if (block.in > 0) all += static_cast<double>(block.size());
   }
   const double first = static_cast<double>(shape.inputs) * shape.hidden.front();

@@ -90,8 +90,8 @@ void Initialize(const BenchOptions& options) {
   std::vector<std::string> flags{fmt::format("--benchmark_min_time={}", options.seconds),
                                  fmt::format("--benchmark_repetitions={}", options.repetitions)};
   if (options.repetitions > 1) flags.emplace_back("--benchmark_display_aggregates_only=true");
-  if (options.json && !IsStandardStream(*options.json)) {
-    flags.push_back("--benchmark_out=" + *options.json);
+  if (!options.json.empty() && !IsStandardStream(options.json)) {
+    flags.push_back("--benchmark_out=" + options.json);
   }
   std::vector<char*> words{program.data()};
   for (std::string& flag : flags) words.push_back(flag.data());
@@ -100,7 +100,7 @@ void Initialize(const BenchOptions& options) {
 }
 
 int RunBench(BenchOptions options) {
-  if (options.json) CheckWritable("--json", *options.json);
+  if (!options.json.empty()) CheckWritable("--json", options.json);
   if (!options.simd.empty()) UseSimdPath(options.simd);
   if (options.threads.empty()) options.threads = {1, ResolveThreads(0)};
   std::ranges::sort(options.threads);
@@ -128,7 +128,7 @@ int RunBench(BenchOptions options) {
   benchmark::ConsoleReporter table(benchmark::ConsoleReporter::OO_Tabular);
   table.SetErrorStream(&std::cout);  // for the context
   benchmark::BenchmarkReporter* display = &table;
-  if (options.json && IsStandardStream(*options.json)) display = &json;
+  if (IsStandardStream(options.json)) display = &json;
   benchmark::RunSpecifiedBenchmarks(display);
   return 0;
 }
