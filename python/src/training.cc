@@ -185,8 +185,10 @@ Driven Make(const std::vector<FlagValue>& flags, const std::string& config_file,
     driven.run = TrainingRun::Make(out, std::move(config), make_foreign);
     return driven;
   }
+  const std::shared_ptr<const Policy> start = StartPolicy(config);
   const int threads = ResolveThreads(config.train.threads);
   driven.training = std::make_unique<Training>(std::move(config), ThisHost(threads, make_foreign));
+  if (start) driven.training->StartFrom(*start, "start_policy");
   return driven;
 }
 

@@ -234,6 +234,40 @@ class Callbacks(InFolder):
             self.assertEqual(done.stdout, "")
 
 
+    def test_messages_go_to_pythons_logger(self):
+        with self.assertLogs("upswing", "INFO") as caught:
+            upswing.train("fast", **SMALL)
+        self.assertEqual([record.levelname for record in caught.records], ["INFO"] * 3)
+        self.assertRegex(caught.output[0], r"step 2,000: return -?\d+ success \d+%")
+        self.assertIn("step 4,000: training ended, not solved", caught.output[2])
+        # Without a handler they go to standard error, from the level of the training on.
+        code = (f"import upswing; upswing.train('fast', logging='debug', **{SMALL});"
+                f"print(); upswing.train('fast', logging=20, **{SMALL})")
+        done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True,
+                              encoding="utf-8")
+        lines = done.stderr.splitlines()
+        self.assertEqual(lines[-3:], [record.getMessage() for record in caught.records])
+        self.assertRegex(lines[0], "^step 504: episodes .*, loss ")
+
+
+class StartPolicy(InFolder):
+    def test_a_training_starts_with_the_weights_of_a_policy(self):
+        first = upswing.train("fast", seed=1, **SMALL)
+        first.last.save(self.path / "first.safetensors")
+        same = upswing.train("fast", seed=2, start_policy=self.path / "first.safetensors",
+                             **SMALL | {"updates_per_step": 0})
+        obs = np.eye(8, dtype=np.float32)
+        np.testing.assert_array_equal(same.last.values(obs), first.last.values(obs))
+        with self.assertRaisesRegex(upswing.InputError, "start_policy: expected a policy with the"):
+            upswing.train("fast", start_policy="fast", **SMALL)
+
+    def test_a_reward_of_your_own_has_its_terms_in_the_rows(self):
+        rows = []
+        upswing.train("fast", reward="height: h; effort: -0.01*tau^2", on_episode=rows.append,
+                      **SMALL)
+        self.assertEqual(list(rows[0])[-2:], ["height", "effort"])
+
+
 class Paths(InFolder):
     def test_names_that_are_not_utf8(self):
         class Named:
@@ -275,6 +309,9 @@ class BadInput(InFolder, BadInputTest):
         self.refuse_training("epsilon", "sac", epsilon_end=0.1)
         self.refuse_training("nothing.toml", config="nothing.toml")
         self.refuse_training('steps: expected', steps=None)
+        for level in ("loud", 1.5, True):
+            self.refuse_training("logging: expected a level such as 'INFO'", logging=level)
+        self.refuse_training("use start_policy", from_policy="fast")
 
     def test_names_of_others(self):
         for name, instead in (("task", "use env"), ("total_timesteps", "use steps"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import logging as _logging
 import os
 import sys
 import time
@@ -80,6 +81,7 @@ def train(
     config: PathLike | None = None,
     resume: PathLike | None = None,
     progress: bool | None = None,
+    logging: int | str | None = None,
     on_episode: Callable[[Row], Any] | None = None,
     on_metrics: Callable[[Row], Any] | None = None,
     on_evaluation: Callable[[Row], Any] | None = None,
@@ -117,13 +119,18 @@ def train(
             `stop_when_solved` may change. A run with `env` needs the same `env`,
             `max_episode_steps` and `solved_return` again. It continues with new episodes
         progress: show progress on standard error, or as a bar in a notebook (default: in a terminal
-            and in a notebook)
+            and in a notebook, without `logging`)
+        logging: level, such as "INFO" or logging.DEBUG, from which on Python's logger "upswing" gets
+            messages: evaluations and the end are INFO, rows of metrics.csv DEBUG (default: the
+            logger's own level). Without a handler they go to standard error
         on_episode, on_metrics, on_evaluation: functions that get a row of episodes.csv, metrics.csv
             or evals.csv as a dictionary; the training stops if one returns False
         on_best: function that gets the best policy so far, at its evaluation; the training stops if
             it returns False
-        **settings: any setting of the agent, see `upswing.settings(agent)`; also plant, a plant file
-            (TOML with a table [plant]) or a shipped plant, between `config` and these settings
+        **settings: any setting of the agent, see `upswing.settings(agent)`, such as `reward`, an
+            expression, or `start_policy`, the policy to start from: a file, a run folder or a
+            shipped policy. Also plant, a plant file (TOML with a table [plant]) or a shipped plant,
+            between `config` and these settings
 
     Returns:
         Training: result of the training
@@ -136,6 +143,7 @@ def train(
 
     >>> training = upswing.train(agent="fast", seed=1, hidden=[64, 64], mass2=1.1)
     >>> training.best.save("policy.safetensors")
+    >>> upswing.train("fast", start_policy="policy.safetensors", mass2=1.3, reward="E + 5*inverted")
     >>> upswing.train("ppo", env="LunarLander-v3", steps=500_000, num_envs=16, out="runs/lander")
     """
     own = texts_of(dict(settings))
@@ -154,8 +162,9 @@ def train(
         if function is not None and not callable(function):
             raise _upswing.InputError(f"{name}: expected a function, got {function!r}")
     judged = source is None or solved_return is not None
+    log = _Log(logging, judged)
     line: _ProgressLine | None = None
-    if progress or progress is None:
+    if progress or progress is logging is None:
         line = _NotebookBar(judged) if _in_notebook() else _ProgressLine(sys.stderr, judged)
         if progress is None and not line.terminal:
             line = None
@@ -166,13 +175,12 @@ def train(
         """Handles the events of a step; returns whether to continue."""
         wanted = True
         for kind, what in events:
-            if kind == "best":
-                listener: Callable[[Any], Any] | None = on_best
-                what = Policy(what)
-            else:
-                listener = listeners[kind]
+            listener: Callable[[Any], Any] | None = listeners.get(kind, on_best)
             if kind in rows:
                 rows[kind].append(what)
+                log.row(kind, what)
+            elif kind == "best":
+                what = Policy(what)
             if listener is not None:
                 answer = listener(what)
                 if isinstance(answer, (bool, np.bool_)) and not answer:
@@ -210,6 +218,7 @@ def train(
     interrupted = result.pop("interrupted") or (interrupts is not None and interrupts.pending)
     training = Training(best=Policy(last if best is None else best), last=Policy(last),
                         evaluations=rows["evaluation"], metrics=rows["metrics"], **result)
+    log.end(training)
     if not interrupted:
         return training
     what = f"training interrupted at step {training.steps:,}"
@@ -252,6 +261,48 @@ def _source_of(agent: str | None, env: EnvLike | None, num_envs: int | None,
     return source, found
 
 
+def _result(row: Row, judged: bool) -> str:
+    """The result of an evaluation. `judged`: whether episodes can succeed."""
+    success = f"  success {100 * row['success_rate']:>4.0f}%" if judged else ""
+    return f"return {row['mean_return']:>6.0f}{success}"
+
+
+class _Log:
+    """Messages of a training to Python's logger `upswing`."""
+
+    _logger = _logging.getLogger("upswing")
+
+    def __init__(self, level: int | str | None, judged: bool) -> None:
+        known = _logging.getLevelName(level.upper()) if isinstance(level, str) else level
+        if isinstance(known, bool) or not isinstance(known, (int, type(None))):
+            raise _upswing.InputError(
+                f"logging: expected a level such as 'INFO' or logging.DEBUG, got {level!r}")
+        self._level = known
+        self._judged = judged
+
+    def row(self, kind: str, row: Row) -> None:
+        step = f"step {row['step']:,}: "
+        if kind == "evaluation":
+            self._send(_logging.INFO, step + " ".join(_result(row, self._judged).split()))
+        else:
+            self._send(_logging.DEBUG, step + ", ".join(
+                f"{name} {value:.4g}" for name, value in row.items() if name != "step"))
+
+    def end(self, training: Training) -> None:
+        solved = f"solved at step {training.solved_step:,}" if training.solved else "not solved"
+        self._send(_logging.INFO, f"step {training.steps:,}: training ended, {solved}")
+
+    def _send(self, level: int, text: str) -> None:
+        if self._level is None:
+            self._logger.log(level, text)
+        elif level >= self._level:
+            record = self._logger.makeRecord("upswing", level, __file__, 0, text, (), None)
+            if self._logger.hasHandlers():
+                self._logger.handle(record)
+            else:
+                _logging.StreamHandler().handle(record)
+
+
 class _ProgressLine:
     """A line with the progress of a training, and a permanent line per evaluation."""
 
@@ -267,17 +318,13 @@ class _ProgressLine:
             if kind == "evaluation":
                 self.clear()
                 print(f"{what['step']:>12,} steps {state['seconds']:>10.1f} s  "
-                      f"{self._result(what)}", file=self._file, flush=True)
+                      f"{_result(what, self._judged)}", file=self._file, flush=True)
         now = time.monotonic()
         if not self.terminal or now - self._last < 0.2:
             return
         self._last = now
         print(f"\r\033[K{self._status(state)}", end="", file=self._file, flush=True)
         self._shown = True
-
-    def _result(self, row: Row) -> str:
-        success = f"  success {100 * row['success_rate']:>4.0f}%" if self._judged else ""
-        return f"return {row['mean_return']:>6.0f}{success}"
 
     @staticmethod
     def _status(state: Row) -> str:
@@ -309,7 +356,7 @@ class _NotebookBar(_ProgressLine):
     def show(self, events: list[tuple[str, Any]], state: Row) -> None:
         for kind, what in events:
             if kind == "evaluation":
-                self._evaluated = f", {' '.join(self._result(what).split())} at step {what['step']:,}"
+                self._evaluated = f", {' '.join(_result(what, self._judged).split())} at step {what['step']:,}"
         self._value, self._max = state["steps"], state["total_steps"]
         self._text = self._status(state).strip() + self._evaluated
         now = time.monotonic()
@@ -325,6 +372,7 @@ class _NotebookBar(_ProgressLine):
         shown = {"text/plain": self._text, "text/html":
                  f"<progress value={self._value} max={self._max}></progress> {self._text}"}
         if self._handle is None:
-            self._handle = display(shown, raw=True, display_id=True)
+            show: Callable[..., Any] = display
+            self._handle = show(shown, raw=True, display_id=True)
         else:
             self._handle.update(shown, raw=True)
