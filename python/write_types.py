@@ -1,15 +1,20 @@
 #!/usr/bin/env python3
-"""write_types.py FILE: writes the settings as TypedDicts, for type checkers and editors.
+"""write_types.py FOLDER: for type checkers and editors, writes the settings as TypedDicts to
+FOLDER/_types.py, and completes the generic types in FOLDER/_upswing.pyi.
 
 Run by the build with the extension module's folder on the PYTHONPATH.
 """
 
 import keyword
+import re
 import sys
 from pathlib import Path
 
 import _upswing  # pylint: disable=import-error
 
+# The arguments that nanobind leaves out.
+GENERIC = {"dict": "str, typing.Any", "tuple": "typing.Any, ...", "NDArray": "typing.Any",
+           "Callable": "..., typing.Any", "PathLike": "str"}
 PYTHON_TYPES = {"bool": "bool", "int": "int", "float": "float", "str": "str",
                 "list[int]": "Sequence[int]"}
 
@@ -27,7 +32,7 @@ def every_setting():
 def python_type(option):
     if option["choices"]:
         return f"Literal[{', '.join(map(repr, option['choices']))}]"
-    if option["name"] in ("model", "plant"):
+    if option["name"] in ("model", "plant", "start_policy"):
         return "Union[str, bytes, os.PathLike[str], os.PathLike[bytes]]"
     return PYTHON_TYPES[option["type"]]
 
@@ -83,7 +88,14 @@ def main():
     lines += typed_dict("TrialSettings", "Settings of evaluations.", *trial)
     lines += typed_dict("MapSettings", "Settings of maps.", on_map + start,
                         [alias for alias in trial[1] if alias["section"] == "plant"])
-    Path(sys.argv[1]).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    folder = Path(sys.argv[1])
+    (folder / "_types.py").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    module = folder / "_upswing.pyi"
+    text = module.read_text(encoding="utf-8")
+    for name, arguments in GENERIC.items():
+        text = re.sub(rf"(->|[:\[,|]) ?((?:\w+\.)*{name})\b(?![\[(])", rf"\1 \2[{arguments}]", text)
+    module.write_text(text.replace("\nimport os\n", "\nimport os\nimport typing\n"),
+                      encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -159,7 +159,7 @@ class Scene:
         torques = np.zeros(self.model.nv)
         mujoco.mj_applyFT(self.model, self.data, force[:3], force[3:],
                           self.data.xipos[perturb.select], perturb.select, torques)
-        return torques.tolist()
+        return list(torques)
 
     def mark(self, scene: mujoco.MjvScene) -> None:
         """Adds torque, goal and path to a scene of MuJoCo."""
@@ -452,7 +452,7 @@ def _write_gif(job: dict[str, Any], frame: Callable[[int], Any]) -> None:
     # One palette for the whole film keeps the file small, because still parts stay equal.
     some = range(0, job["frames"], -(-job["frames"] // 8))
     palette = Image.fromarray(np.concatenate([frame(k) for k in some])).quantize(256)
-    film: Iterator[Any] = (Image.fromarray(frame(k)).quantize(palette=palette, dither=0)
+    film: Iterator[Any] = (Image.fromarray(frame(k)).quantize(palette=palette, dither=Image.Dither.NONE)
                            for k in range(job["frames"]))
     next(film).save(job["path"], "GIF", save_all=True, append_images=film, loop=0,
                     duration=round(1000 / job["fps"]))

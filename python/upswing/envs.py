@@ -139,7 +139,8 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
     @property
     def state(self) -> npt.NDArray[np.float64]:
         """True state q1, q2 [rad], w1, w2 [rad/s], without sensor errors; (4,)."""
-        return self._core.states()[0]
+        state: npt.NDArray[np.float64] = self._core.states()[0]
+        return state
 
     @property
     def plant(self) -> dict[str, float]:

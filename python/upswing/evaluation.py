@@ -201,7 +201,7 @@ def map(  # pylint: disable=redefined-builtin
 
     >>> result = upswing.map("runs/d3qn-seed1", x="q1=-180:180:73", y="q2=-180:180:73")
     """
-    arguments = {"seed": seed, "threads": threads}
+    arguments: dict[str, Any] = {"seed": seed, "threads": threads}
     if physics is not None:
         arguments["physics"] = physics
     if episodes is not None:

@@ -59,8 +59,10 @@ def make(name):
 
 
 def command(problem, *arguments):
-    """Runs a command to its end; a failure fails the test."""
+    """Runs a command to its end; a failure fails the test. pip would leave out packages that it
+    finds in PYTHONPATH."""
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     done = subprocess.run(arguments, check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                          encoding="utf-8")
+                          encoding="utf-8", env=environment)
     if done.returncode != 0:
         sys.exit(f"{Path(sys.argv[0]).name}: {problem}:\n{done.stdout}")
