@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Runs the notebooks from top to bottom with the built package, as a reader would.
+"""Runs the notebooks from top to bottom with the built package, as a reader would, and two examples in
+Python.
 
   notebooks_test.py                  runs them all
   notebooks_test.py --keep NAME...   runs notebooks and keeps their new outputs in the files
@@ -12,6 +13,7 @@ import base64
 import importlib.util
 import io
 import os
+import subprocess
 import sys
 import sysconfig
 import tempfile
@@ -105,6 +107,26 @@ class Notebooks(unittest.TestCase):
         shown = str(notebook.cells[1].outputs)
         self.assertRegex(shown, "<progress value=[1-9]")
         self.assertRegex(shown, r"interrupted at step [\d,]+; train\(resume='.*run'\) continues")
+
+
+class Loggers(unittest.TestCase):
+    """The examples for Weights & Biases and MLflow, without a network."""
+
+    def run_offline(self, name, pattern):
+        package = name.removeprefix("log_")
+        if not importlib.util.find_spec(package):
+            self.skipTest(f"needs {package}")
+        with tempfile.TemporaryDirectory() as folder:
+            subprocess.run([sys.executable, ROOT / f"examples/python/{name}.py"], check=True, cwd=folder,
+                           env=os.environ | {"WANDB_MODE": "offline", "WANDB_SILENT": "true",
+                                             "MLFLOW_TRACKING_URI": "sqlite:///mlflow.db"})
+            self.assertTrue(list(Path(folder).glob(pattern)))
+
+    def test_wandb(self):
+        self.run_offline("log_wandb", "wandb/offline-run-*/run-*.wandb")
+
+    def test_mlflow(self):
+        self.run_offline("log_mlflow", "mlruns/*/*/artifacts/policy.safetensors")
 
 
 def add(path):
