@@ -6,6 +6,7 @@
 
 #include "agents/config.h"
 #include "agents/loaded_policy.h"
+#include "base/csv.h"
 #include "base/text.h"
 #include "cli/commands.h"
 #include "judge/plot_figures.h"
@@ -14,6 +15,7 @@
 #include "report/figure.h"
 #include "runs/find_policy.h"
 #include "runs/model_info.h"
+#include "runs/run_folder.h"
 
 namespace upswing {
 namespace {
@@ -55,6 +57,39 @@ std::string Caption(const PlotArguments& a, const RolloutConfig& config, const R
   return Join(parts, "; ");
 }
 
+/// The sums of the reward's terms in the training's episodes, each a mean over a hundredth of the
+/// training. Nothing if `run` is no run folder with a finished episode.
+std::optional<Figure> TermsFigure(const fs::path& run) {
+  const fs::path table = run / RunFolder::kEpisodes;
+  if (!fs::is_regular_file(table)) return std::nullopt;
+  const std::string text = ReadInput(table.string());
+  std::vector<std::string> names = CsvNames(text, table.string());
+  if (names.size() < 6) return std::nullopt;
+  names.erase(names.begin() + 1, names.begin() + 5);  // keep step and the terms
+  const std::vector<CsvColumn> columns = ReadCsv(text, names, table.string());
+  const std::vector<double>& step = columns[0].values;
+  if (step.empty()) return std::nullopt;
+  Panel panel;
+  panel.x_label = "step";
+  panel.y_label = "sum of a training episode";
+  for (size_t k = 1; k < names.size(); ++k) {
+    Line line{names[k], {}, {}, {}, {}};
+    for (size_t i = 0, end = 0; i < step.size(); i = end) {
+      double sum = 0;
+      for (; end < step.size() && (end == i || step[end] < step[i] + step.back() / 100); ++end) {
+        sum += columns[k].values[end];
+      }
+      line.x.push_back(step[end - 1]);
+      line.y.push_back(sum / static_cast<double>(end - i));
+    }
+    panel.lines.push_back(std::move(line));
+  }
+  Figure figure;
+  figure.panels = {panel};
+  figure.height = 400;
+  return figure;
+}
+
 int RunPlot(const PlotArguments& a) {
   const LoadedPolicy loaded = GetPolicy(a.policy);
   RolloutConfig config = TrialEpisode(a.trial, &loaded);
@@ -69,10 +104,11 @@ int RunPlot(const PlotArguments& a) {
   MakeNewFolder(folder);
   std::vector<std::pair<std::string, Figure>> figures{
       {"episode", EpisodeFigure(rollout, *loaded.policy)}, {"phase", PhaseFigure(rollout)}};
+  if (auto terms = TermsFigure(a.policy.name)) figures.emplace_back("terms", std::move(*terms));
   std::vector<std::string> files;
   for (auto& [name, figure] : figures) {
     figure.title = WithModel(loaded.name, model);
-    figure.caption = Caption(a, config, rollout, loaded);
+    if (name != "terms") figure.caption = Caption(a, config, rollout, loaded);
     std::ranges::move(DrawIfPossible(figure, folder / name), std::back_inserter(files));
   }
   fmt::print("{}\n", Printable(loaded.name));
@@ -108,6 +144,7 @@ void AddPlot(CommandLine& line) {
       "episode.svg and .png show angles, velocities, energy, torque, reward terms and the\n"
       "policy's estimates over time: Q-values, or the actor's mean torque with its central\n"
       "68% interval, and V. phase.svg and .png show velocity over angle for both joints.\n"
+      "Of a run folder, terms.svg and .png show the sums of the reward's terms over training.\n"
       "`simulate` writes the same episode as a table.\n\n"
       "Without --out, the figures go into plot in the run folder, or into runs/plot-NAME for\n"
       "another policy file; the next figures into plot-2.\n\n"

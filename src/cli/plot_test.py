@@ -10,7 +10,7 @@ import xml.dom.minidom
 
 from testing import REWARD_TERMS, ProgramTest, train_once
 
-FILES = ("episode.svg", "episode.png", "phase.svg", "phase.png")
+FILES = ("episode.svg", "episode.png", "phase.svg", "phase.png", "terms.svg", "terms.png")
 
 
 class PlotTest(ProgramTest):

@@ -15,6 +15,10 @@ class RewardTest(ProgramTest):
         rows = read_csv(self.folder / "run/episodes.csv")
         terms = ["energy", "height", "term3"]
         self.assertEqual(list(rows[0])[5:], terms)
+        self.succeed("plot", "run", "--seconds", 0.1, "--out", "plot")
+        figure = (self.folder / "plot/terms.svg").read_text(encoding="utf-8")
+        for term in terms:
+            self.assertIn(term, figure)
         for row in rows:
             self.assertAlmostEqual(row["return"], sum(row[term] for term in terms), delta=1e-9)
         # Without updates, the policy is the same.
