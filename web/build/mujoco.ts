@@ -36,6 +36,9 @@ const METHOD_CALLER = `(obj, func, destructorsRef, args) => {
 const REPLACEMENTS: [string, string][] = [
   ['new Function(...args, invokerFnBody)(...closureArgs)', INVOKER],
   ['new Function(...params, functionBody)(...args)', METHOD_CALLER],
+  // Messages for those who use what the build leaves out.
+  ['missingLibrarySymbols.forEach(missingLibrarySymbol)', ''],
+  ['unexportedSymbols.forEach(unexportedRuntimeSymbol);', ''],
 ];
 
 /// The module with its sections of names and debugging notes left out (custom sections, id 0).
