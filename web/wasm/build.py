@@ -50,17 +50,17 @@ FAST = ["nn/linear", "nn/product", "pendulum/closed_form", "control/trajectory",
 
 # The needed sources of muParser.
 PARSER = ["", "Base", "Bytecode", "Callback", "Error", "TokenReader"]
+STREAMS = HERE / "muparser_streams.h"  # included first in each
 
 # The needed sources of LLVM's libraries.
 CXXABI = ["abort_message", "cxa_aux_runtime", "cxa_default_handlers", "cxa_exception",
           "cxa_exception_storage", "cxa_guard", "cxa_handlers", "cxa_personality", "cxa_virtual",
           "fallback_malloc", "private_typeinfo", "stdlib_exception", "stdlib_new_delete",
           "stdlib_stdexcept", "stdlib_typeinfo"]
-LOCALES = ["ios", "ios.instantiations", "locale", "ostream", "iostream"]  # for muParser
 CXX = ["algorithm", "call_once", "charconv", "chrono", "error_category", "exception", "functional",
        "hash", "memory", "new", "new_handler", "new_helpers",
        "stdexcept", "string", "system_error", "variant", "vector", "verbose_abort",
-       *LOCALES, "ryu/d2s", "ryu/f2s", "filesystem/path"]
+       "ryu/d2s", "ryu/f2s", "filesystem/path"]
 
 # The tag by which throw and catch find each other. Clang expects it in the run-time library.
 EXCEPTION_TAG = ".globl __cpp_exception\n.tagtype __cpp_exception i32\n__cpp_exception:\n"
@@ -127,7 +127,7 @@ def included(sources):
 def sources_hash():
     """SHA-256 of the sources, headers, named agents, pinned versions, and this file with its flags."""
     text = hashlib.sha256()
-    for path in [*included([*own_sources(), ROOT / "src/agents/named_agents.cc.in"]),
+    for path in [*included([*own_sources(), STREAMS, ROOT / "src/agents/named_agents.cc.in"]),
                  *(path for folder in CONFIGS.values() for path in sorted(folder.glob("*.toml"))),
                  Path(__file__).resolve()]:
         data = path.read_bytes()
@@ -201,7 +201,8 @@ def jobs():
         yield source, [*own, "-O3" if f"{source.parent.name}/{source.stem}" in FAST else "-Oz"]
     for name in PARSER:
         yield (MUPARSER / f"src/muParser{name}.cpp",
-               ["-std=c++20", "-Oz", "-w", "-ffp-contract=off", f"-I{MUPARSER / 'include'}"])
+               ["-std=c++20", "-Oz", "-w", "-ffp-contract=off", f"-I{MUPARSER / 'include'}",
+                "-include", STREAMS])
     cxx = ["-std=c++23", "-Oz", "-w", "-D_LIBCPP_BUILDING_LIBRARY", "-D_LIBCXXABI_BUILDING_LIBRARY",
            "-DLIBCXX_BUILDING_LIBCXXABI", "-DLIBCXXABI_SILENT_TERMINATE",
            "-D_LIBCXXABI_HAS_NO_THREADS",
@@ -209,10 +210,7 @@ def jobs():
                       ("libcxxabi/include", "libcxx/src", "libcxx/libc", "libunwind/include")))]
     for library, names in (("libcxxabi", CXXABI), ("libcxx", CXX)):
         for name in names:
-            # Locales without those of wchar_t take a third less.
-            narrow = ["-U_LIBCPP_HAS_WIDE_CHARACTERS", "-D_LIBCPP_HAS_WIDE_CHARACTERS=0"]
-            yield (ZIG / f"lib/{library}/src/{name}.cpp",
-                   [*cxx, *narrow] if name in LOCALES else cxx)
+            yield ZIG / f"lib/{library}/src/{name}.cpp", cxx
     unwind = ZIG / "lib/libunwind"
     yield unwind / "src/Unwind-wasm.c", ["-Oz", "-w", "-D_LIBUNWIND_HAS_NO_THREADS",
                                          "-D_LIBUNWIND_HIDE_SYMBOLS", *include(unwind / "include")]
