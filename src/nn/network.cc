@@ -198,4 +198,12 @@ Real Network::BackwardWeights(int task, Matrix<const Real> x, const Activations&
   return layers_[layer].BackwardWeights(rows, input, a[layer], gradient);
 }
 
+void Network::Backward(std::span<const Real> parameters, Matrix<const Real> x, Activations& a,
+                       Matrix<const Real> dy, std::span<Real> gradient, Matrix<Real> dx) const {
+  AlignedVector<Real> transposed(num_parameters());
+  for (int task = 0; task < num_tasks(); ++task) TransposeWeights(task, parameters, transposed);
+  BackwardInputs(parameters, transposed, dy, {0, x.rows()}, a, dx);
+  for (int task = 0; task < num_tasks(); ++task) BackwardWeights(task, x, a, gradient);
+}
+
 }  // namespace upswing

@@ -40,8 +40,8 @@ struct NetworkShape {
 ///
 /// A gradient takes three steps that threads can share: TransposeWeights for all tasks; Forward and
 /// BackwardInputs for slices of the batch; BackwardWeights for all tasks. The result has the same
-/// bits for any number of threads. The gradient with respect to the inputs does not need
-/// BackwardWeights.
+/// bits for any number of threads. Backward runs all three steps. The gradient with respect to the
+/// inputs does not need BackwardWeights.
 class Network {
  public:
   /// Throws BadInput if a size is invalid.
@@ -100,6 +100,11 @@ class Network {
   /// over all rows of x. Returns the sum of squares of that share.
   Real BackwardWeights(int task, Matrix<const Real> x, const Activations& a,
                        std::span<Real> gradient) const;
+
+  /// Computes the gradient of sum(dy · y) after Forward on all rows of x. Writes all of `gradient`,
+  /// and `dx` if there is one.
+  void Backward(std::span<const Real> parameters, Matrix<const Real> x, Activations& a,
+                Matrix<const Real> dy, std::span<Real> gradient, Matrix<Real> dx = {}) const;
 
  private:
   /// Some rows of one layer's weight. The first task of a layer also has the layer's vectors.

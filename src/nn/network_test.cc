@@ -64,14 +64,7 @@ struct Objective {
   AlignedVector<Real> Gradient(Matrix<Real> dx = {}) {
     Value();
     AlignedVector<Real> gradient(parameters.size(), kUnwritten);
-    AlignedVector<Real> transposed(parameters.size());
-    for (int task = 0; task < network.num_tasks(); ++task) {
-      network.TransposeWeights(task, parameters, transposed);
-    }
-    network.BackwardInputs(parameters, transposed, DY(), {0, B}, activations, dx);
-    for (int task = 0; task < network.num_tasks(); ++task) {
-      network.BackwardWeights(task, X(), activations, gradient);
-    }
+    network.Backward(parameters, X(), activations, DY(), gradient, dx);
     return gradient;
   }
 
