@@ -324,7 +324,7 @@ class Machine(ProgramTest):
                      ["--out", "twin.toml", "--figure", "a.csv"]):
             self.refuse([*adapt, *more], "expected another file than the argument a.csv")
         self.refuse([*adapt, "--out", "new.svg", "--figure=new.svg"],
-                    "expected another file than --figure new.svg")
+                    "--figure: expected another file than --out new.svg")
         self.refuse(["export", "a.csv", "--onnx", "a.csv"], "expected another file")
         self.assertEqual((self.folder / "a.csv").read_text(encoding="utf-8"), text)
         self.assertFalse((self.folder / "new.svg").exists())
