@@ -1,6 +1,7 @@
 #include "judge/map_grid.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <mutex>
@@ -186,14 +187,21 @@ std::vector<MapCell> RunMap(const MapConfig& config, const Policy& policy, Threa
   std::vector<EpisodeResult> episodes(static_cast<size_t>(total));
   std::mutex mutex;
   double done = 0;
+  std::atomic<bool> failed = false;  // stops the other ranges, as Ctrl-C in Python does
   const int64_t ranges = (total + kTaskEpisodes - 1) / kTaskEpisodes;
   pool.ParallelFor(static_cast<int>(ranges), [&](int range) {
+    if (failed) return;
     const int64_t first = int64_t{range} * kTaskEpisodes;
     const int count = static_cast<int>(std::min<int64_t>(total - first, kTaskEpisodes));
-    std::ranges::copy(RunRange(config, policy, first, count), episodes.begin() + first);
-    const std::lock_guard lock(mutex);
-    done += count;
-    if (progress) progress(done, static_cast<double>(total));
+    try {
+      std::ranges::copy(RunRange(config, policy, first, count), episodes.begin() + first);
+      const std::lock_guard lock(mutex);
+      done += count;
+      if (progress) progress(done, static_cast<double>(total));
+    } catch (...) {
+      failed = true;
+      throw;
+    }
   });
   std::vector<MapCell> map;
   const auto count = static_cast<size_t>(config.episodes);
