@@ -84,11 +84,14 @@ constexpr size_t kLanes = HWY_LANES(Real);
 constexpr size_t kSummed = HWY_TARGET == HWY_WASM ? kLanes : 16;
 constexpr size_t kParts = kSummed / kLanes;  // registers that hold them
 
-/// Sum of the numbers of a register: its halves are added until one number remains.
+/// Sum of the numbers of a register: its halves are added until one number remains. The page keeps
+/// the order of its first version.
 template <class D>
 HWY_INLINE Real SumOfRegister(D d, hn::Vec<D> x) {
 #if HWY_TARGET == HWY_SCALAR
   return (void)d, hn::GetLane(x);
+#elif HWY_TARGET == HWY_WASM
+  return hn::GetLane(hn::SumOfLanes(d, x));
 #else
   if constexpr (hn::MaxLanes(d) * sizeof(Real) > 16) {
     const hn::Half<D> half;
