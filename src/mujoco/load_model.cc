@@ -346,6 +346,7 @@ class Translator {
              {any(m.body_gravcomp, m.nbody), "gravcomp"},
              {any(m.jnt_stiffnesspoly, 2 * mjNPOLY), "a stiffness of several numbers"},
              {any(m.dof_dampingpoly, 2 * mjNPOLY), "a damping of several numbers"},
+             {any(m.actuator_damping, 1), "a motor with damping, which its joint can have"},
              {(m.opt.disableflags & kMovingFlags) != 0,
               "a flag that disables gravity, spring, damper, actuation or clampctrl"}}) {
       if (cause) causes += Concat(causes.empty() ? "" : ", ", name);

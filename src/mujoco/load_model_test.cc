@@ -210,6 +210,7 @@ TEST(LoadModel, NamesTheCauseOfARefusal) {
            {"motor gear=\"0\" ctrlrange=\"-5 5\"", "a motor on a hinge"},
            {"position kp=\"1\"", "expected <motor>, <general> in <actuator>, got \"position\""},
            {"general biastype=\"affine\" biasprm=\"0 -1 0\" ctrlrange=\"-5 5\"", "no bias"},
+           {"motor damping=\"0.5\" ctrlrange=\"-5 5\"", "got a motor with damping"},
            {"general dyntype=\"integrator\" ctrlrange=\"-5 5\"", "got \"integrator\""}}) {
     expect(words, [&text = motor](Form& f) { f.motor = text; });
   }
