@@ -190,7 +190,8 @@ def _symmetric(env: Any) -> Any:
         "acts within -1 and 1: use it with gymnasium.wrappers.RescaleAction(env, -1, 1)",
         stacklevel=6)
     low = np.full(space.shape, -1, space.dtype)
-    return (RescaleVectorAction if isinstance(env, VectorEnv) else RescaleAction)(env, low, -low)
+    rescale: Any = RescaleVectorAction if isinstance(env, VectorEnv) else RescaleAction
+    return rescale(env, low, -low)
 
 
 def _copier(env: EnvLike, made: Any, name: str) -> Callable[[], Any]:

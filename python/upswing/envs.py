@@ -74,8 +74,8 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
             raise _upswing.InputError("threads: expected several environments (gym.make_vec)")
         self._core = Core(1, {"threads": 1, **settings}, actions, levels, False)
         self._pictures = Pictures(self._core, width, height)
-        self.observation_space = self._core.observation_space
-        self.action_space = self._core.action_space
+        self.observation_space: gym.Space[npt.NDArray[np.float32]] = self._core.observation_space
+        self.action_space: gym.Space[Any] = self._core.action_space
         self.render_mode = render_mode
         self._closed = False
         self._ended = False
@@ -231,13 +231,14 @@ class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArra
         self._same_step = mode == AutoresetMode.SAME_STEP
         self._core = Core(num_envs, dict(settings), actions, levels, self._same_step)
         self._pictures = Pictures(self._core, width, height)
-        self.num_envs = self._core.num_envs
+        self.num_envs: int = self._core.num_envs
         self.render_mode = render_mode
         self._copy = copy
-        self.single_observation_space = self._core.observation_space
-        self.single_action_space = self._core.action_space
-        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self.single_observation_space: gym.Space[Any] = self._core.observation_space
+        self.single_action_space: gym.Space[Any] = self._core.action_space
+        self.observation_space: gym.Space[Any] = batch_space(self.single_observation_space,
+                                                             self.num_envs)
+        self.action_space: gym.Space[Any] = batch_space(self.single_action_space, self.num_envs)
         env = self._core.env
         self._obs, self._final_obs, self._reward = env.obs, env.final_obs, env.reward
         self._terminated = env.terminated.view(np.bool_)

@@ -150,12 +150,15 @@ class Map(dict[str, Any]):
     def __init__(self, figures: dict[str, Any], successes: npt.NDArray[np.int64],
                  swing_up_seconds: npt.NDArray[np.float64]):
         super().__init__(figures)
-        self.x, self.y = (np.array(self[axis]["values"]) for axis in "xy")
-        self.x_label, self.y_label = (
-            self[axis]["name"] + (f" ({self[axis]['unit']})" if self[axis]["unit"] else "")
-            for axis in "xy")
+        def label_of(axis: dict[str, Any]) -> str:
+            return str(axis["name"]) + (f" ({axis['unit']})" if axis["unit"] else "")
+
+        self.x: npt.NDArray[np.float64] = np.array(self["x"]["values"])
+        self.y: npt.NDArray[np.float64] = np.array(self["y"]["values"])
+        self.x_label: str = label_of(self["x"])
+        self.y_label: str = label_of(self["y"])
         self.successes = successes
-        self.success_rate = successes / self["episodes_per_cell"]
+        self.success_rate: npt.NDArray[np.float64] = successes / int(self["episodes_per_cell"])
         self.swing_up_seconds = swing_up_seconds
 
     def __repr__(self) -> str:
