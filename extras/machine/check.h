@@ -120,6 +120,10 @@ double CentralDifference(const MachineLog& log, int k, int joint);
 /// Range of a joint's angle over all pieces: largest minus smallest, rad.
 double AngleRange(Pieces pieces, int joint);
 
+/// Step of a joint's encoder, rad: the smallest distance of two values. Nothing if other distances
+/// are not multiples of it.
+std::optional<double> QuantumOf(Pieces pieces, int joint);
+
 /// Sums over pairs (x, y), for the regression y ≈ offset + gain x.
 struct Pairs {
   double n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;

@@ -11,33 +11,6 @@
 namespace upswing::machine {
 namespace {
 
-/// Step of a joint's encoder, rad: the smallest distance of two values. Nothing if other distances
-/// are not multiples of it.
-std::optional<double> QuantumOf(Pieces pieces, int joint) {
-  std::vector<double> values;
-  for (const MachineLog& piece : pieces) {
-    for (const Joints& q : piece.angle) values.push_back(q[joint]);
-  }
-  std::ranges::sort(values);
-  constexpr double kRounding = 1e-9;  // rad
-  std::vector<double> steps;
-  for (size_t i = 1; i < values.size(); ++i) {
-    if (values[i] - values[i - 1] > kRounding) steps.push_back(values[i] - values[i - 1]);
-  }
-  if (steps.size() < 3) return std::nullopt;
-  const double quantum = *std::ranges::min_element(steps);
-  // Larger steps are not tested, because rounding errors grow with them.
-  double near = 0, multiples = 0;
-  for (const double step : steps) {
-    const double ratio = step / quantum;
-    if (ratio > 20) continue;
-    near += 1;
-    multiples += std::abs(ratio - std::round(ratio)) < 0.02;
-  }
-  if (near < 6 || multiples < 0.95 * near) return {};
-  return quantum;
-}
-
 /// |speed| of a joint from row k - 1 to row k, rad/s; 0 beyond the piece's ends and if the clock
 /// stands still.
 double SpeedTo(const MachineLog& log, int joint, int k) {
@@ -222,6 +195,31 @@ void CheckSpeeds(Pieces pieces, int joint, const Reporter& report) {
 }
 
 }  // namespace
+
+std::optional<double> QuantumOf(Pieces pieces, int joint) {
+  std::vector<double> values;
+  for (const MachineLog& piece : pieces) {
+    for (const Joints& q : piece.angle) values.push_back(q[joint]);
+  }
+  std::ranges::sort(values);
+  constexpr double kRounding = 1e-9;  // rad
+  std::vector<double> steps;
+  for (size_t i = 1; i < values.size(); ++i) {
+    if (values[i] - values[i - 1] > kRounding) steps.push_back(values[i] - values[i - 1]);
+  }
+  if (steps.size() < 3) return std::nullopt;
+  const double quantum = *std::ranges::min_element(steps);
+  // Larger steps are not tested, because rounding errors grow with them.
+  double near = 0, multiples = 0;
+  for (const double step : steps) {
+    const double ratio = step / quantum;
+    if (ratio > 20) continue;
+    near += 1;
+    multiples += std::abs(ratio - std::round(ratio)) < 0.02;
+  }
+  if (near < 6 || multiples < 0.95 * near) return {};
+  return quantum;
+}
 
 void CheckAngles(Pieces pieces, Findings& findings) {
   for (const int joint : {0, 1}) {

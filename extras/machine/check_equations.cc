@@ -45,11 +45,16 @@ Window WindowAt(const MachineLog& log, int first, int last, int span, double cyc
   return window;
 }
 
-std::vector<Window> WindowsOf(Pieces pieces) {
-  constexpr double kSpan = 0.01, kLength = 0.08;  // s
-  constexpr int kMost = 800;                      // windows; more would only take longer
-  const double cycle = UsualCycle(pieces);
-  const int span = std::max(1, static_cast<int>(std::lround(kSpan / cycle)));
+/// Rows of a difference of angles to either side.
+int SpanOf(double cycle) {
+  constexpr double kSpan = 0.01;  // s
+  return std::max(1, static_cast<int>(std::lround(kSpan / cycle)));
+}
+
+std::vector<Window> WindowsOf(Pieces pieces, double cycle) {
+  constexpr double kLength = 0.08;  // s
+  constexpr int kMost = 800;        // windows; more would only take longer
+  const int span = SpanOf(cycle);
   const int length = std::max(3, static_cast<int>(std::lround(kLength / cycle)));
   double rows = 0;
   for (const MachineLog& log : pieces) rows += log.rows();
@@ -175,18 +180,18 @@ double Unexplained(const Gram& gram, int row, const Joints& zero, Term target, d
 constexpr double kChange = 1.8;  // by which a change must reduce the misfit
 constexpr double kZero = 0.3;    // rad; a nearer zero is an offset that identification finds
 
-/// The logarithm of an unexplained share; below the noise all are equal.
-double Misfit(double unexplained) { return std::log(std::max(unexplained, 5e-4)); }
-
 /// An explanation of the motion: how to read the angles, and the motors' joints and signs.
 struct Explanation {
   Reading reading;
+  double noise = 0;  // unexplained share of a right explanation
   Joints zero{};
   Joints unexplained{1, 1};  // share, of each joint's inertia
   bool torques_swapped = false;
   Joints torque_sign{1, 1};
   double torque_misfit = 0;
 
+  /// The logarithm of an unexplained share; below the noise all are equal.
+  double Misfit(double share) const { return std::log(std::max(share, noise)); }
   double misfit() const { return Misfit(unexplained[0]) + Misfit(unexplained[1]); }
 
   /// Number of changes to the columns.
@@ -233,8 +238,8 @@ struct Equations {
         const int column = swapped ? 1 - row : row;
         if (!has_torque[column]) continue;
         const Term term = column == 0 ? kTorque1 : kTorque2;
-        const double as_is = Misfit(Unexplained(gram[row], row, e.zero, term, 1));
-        const double turned = Misfit(Unexplained(gram[row], row, e.zero, term, -1));
+        const double as_is = e.Misfit(Unexplained(gram[row], row, e.zero, term, 1));
+        const double turned = e.Misfit(Unexplained(gram[row], row, e.zero, term, -1));
         next.torque_sign[column] = turned < as_is - kChange ? -1 : 1;
         next.torque_misfit += next.torque_sign[column] < 0 ? turned : as_is;
       }
@@ -295,6 +300,23 @@ bool InProportion(const std::vector<Window>& windows) {
   return std::abs(pairs.correlation()) > kProportion;
 }
 
+/// The share of the changes of velocity that the steps of the encoders make, of the joint with
+/// more.
+double NoiseOf(Pieces pieces, const std::vector<Window>& windows, double cycle) {
+  const double apart = 2 * SpanOf(cycle) * cycle;
+  double most = 5e-4;
+  for (const int j : {0, 1}) {
+    double changes = 0;
+    for (const Window& window : windows) {
+      changes += std::pow(window.back().w[j] - window.front().w[j], 2);
+    }
+    // Four rounded angles, each with a variance of a twelfth of the step's square.
+    const double noise = std::pow(QuantumOf(pieces, j).value_or(0) / apart, 2) / 3;
+    most = std::max(most, noise * static_cast<double>(windows.size()) / changes);
+  }
+  return most;
+}
+
 void Report(const Explanation& e, bool in_proportion, Findings& findings) {
   const auto add = [&](Aspect aspect, int joint, const std::string& text) {
     Reporter{findings, aspect, joint}(
@@ -333,11 +355,13 @@ void CheckEquations(Pieces pieces, Findings& findings) {
   constexpr double kMoving = 0.5;  // rad
   constexpr size_t kEnough = 25;   // windows
   constexpr int kMostChanges = 3;
-  constexpr double kGood = 0.1;  // unexplained
+  constexpr double kGood = 0.1, kDriven = 0.03;  // unexplained
+  constexpr double kNoisy = 10;                  // unexplained at most, of the noise
   const Joints range{AngleRange(pieces, 0), AngleRange(pieces, 1)};
   if (range[0] < kMoving || range[1] < kMoving) return;
-  if (!(UsualCycle(pieces) > 0)) return;
-  const std::vector<Window> windows = WindowsOf(pieces);
+  const double cycle = UsualCycle(pieces);
+  if (!(cycle > 0)) return;
+  const std::vector<Window> windows = WindowsOf(pieces, cycle);
   if (windows.size() < kEnough) return;
   std::array<bool, 2> has_torque{HasCommand(pieces, 0), HasCommand(pieces, 1)};
   for (const MachineLog& log : pieces) {
@@ -345,14 +369,24 @@ void CheckEquations(Pieces pieces, Findings& findings) {
   }
   const bool in_proportion = InProportion(windows);
   if (in_proportion && !has_torque[0] && !has_torque[1]) return;
+  const double noise = NoiseOf(pieces, windows, cycle);
   std::vector<Explanation> all;
   for (const Reading& reading : Readings(range)) {
     const Equations equations{{GramOf(windows, reading, 0), GramOf(windows, reading, 1)}};
-    for (const Explanation& e : equations.Explain({reading}, has_torque)) all.push_back(e);
+    for (const Explanation& e : equations.Explain({reading, noise}, has_torque)) all.push_back(e);
   }
   const Explanation best = *std::ranges::min_element(all, {}, &Explanation::cost);
-  if (best.changes() > kMostChanges) return;
-  if (std::max(best.unexplained[0], best.unexplained[1]) > kGood) return;
+  const double unexplained = std::max(best.unexplained[0], best.unexplained[1]);
+  const bool torques = std::ranges::any_of(pieces, [](const MachineLog& log) {
+    return !log.commanded.empty() || !log.measured.empty() || !log.push.empty();
+  });
+  if (!torques && unexplained > std::max(kDriven, kNoisy * noise)) {
+    return Reporter{findings, Aspect::kTorque}(
+        Severity::kFault,
+        "the log has no torque, but no free pendulum moves like this: suspect missing columns "
+        "(keys commanded1, commanded2)");
+  }
+  if (best.changes() > kMostChanges || unexplained > kGood) return;
   // Torques that have nothing to do with the motion are no evidence.
   if (best.torque_misfit > -1.0 * (has_torque[0] + has_torque[1])) return;
   Report(best, in_proportion, findings);

@@ -349,10 +349,10 @@ TEST(MachineCheck, PiecesAreNotJoined) {
   EXPECT_EQ((*fault)["aspect"], "clock");
 }
 
-/// A log of the equations of motion from a start, with torques at joint 1.
+/// A log of a pendulum's equations of motion from a start, with torques at joint 1.
 MachineLog Simulated(const PendulumState& start, const std::function<double(double)>& torque,
-                     double seconds) {
-  const Manipulator plant = ManipulatorOf(Plant());
+                     double seconds, const Plant& of = {}) {
+  const Manipulator plant = ManipulatorOf(of);
   MachineLog log;
   PendulumState x = start;
   for (int k = 0; k < seconds * 500; ++k) {
@@ -432,6 +432,38 @@ TEST(MachineCheck, TheEquationsOfMotionNameEachChangeOfTheColumns) {
       },
       {"swapped columns of both joints"});
   expect([](Joints& q, Joints&) { std::swap(q[0], q[1]); }, {"swapped angles"});
+}
+
+TEST(MachineCheck, AFreeSwingMayHaveACoarseEncoderAndNoTorques) {
+  Plant plant;
+  plant.mass1 = plant.mass2 = 1.2;
+  plant.damping1 = plant.damping2 = 0.03;
+  for (const PendulumState& start : {PendulumState{-0.1, 1.4, 0, 0},
+                                     {0.1, -2.3, 0, 0},
+                                     {0.6, -1.9, 0, 0},
+                                     {-0.7, -0.4, 0, 0},
+                                     {2.8, -1, 0, 0}}) {
+    plant.length1 = plant.length2 = start.q1 > 0 ? 0.2 : 0.4;
+    const MachineLog exact = Simulated(
+        start, [](double) { return 0; }, 10, plant);
+    for (const double counts : {16384, 2048, 1024}) {
+      MachineLog log = exact;
+      log.commanded.clear();
+      const double step = 2 * std::numbers::pi / counts;
+      for (Joints& q : log.angle) {
+        q = {step * std::round(q[0] / step), step * std::round(q[1] / step)};
+      }
+      EXPECT_EQ(FaultsOf(log), "") << start.q1 << " rad, " << counts << " counts";
+    }
+  }
+}
+
+TEST(MachineCheck, AMotorWithoutTorquesInTheLogIsAFault) {
+  MachineLog log = Simulated(
+      {1, -0.5, 0, 0}, [](double t) { return 3 * std::sin(3 * t) + 2 * std::sin(7 * t); }, 10);
+  EXPECT_EQ(FaultsOf(log), "");
+  log.commanded.clear();
+  EXPECT_NE(FaultsOf(log).find("the log has no torque"), std::string::npos);
 }
 
 TEST(MachineCheck, WrappedAnglesWrongSamplesAndSlips) {
