@@ -15,12 +15,13 @@ constexpr size_t kMostColumns = 4096;
 /// A line of a table. The error begins with the line's place.
 struct Line {
   std::string_view text;
-  const std::string& where;
-  int number = 0;
-  char separator = ',';  // of the cells
+  const std::string* where;
+  int number;
+  char separator;            // of the cells; ' ': any number of blanks
+  std::string_view comment;  // the last one before the line
 
   Error Bad(std::string_view what) const {
-    return BadInput(Concat(where, ":", number, ": ", what));
+    return BadInput(Concat(*where, ":", number, ": ", what));
   }
 };
 
@@ -45,6 +46,7 @@ void FindCells(const Line& line, std::vector<std::string_view>& cells) {
     const size_t end = EndOfCell(line, begin);
     cells.push_back(Trim(line.text.substr(begin, end - begin)));
     begin = end + 1;
+    while (line.separator == ' ' && begin < line.text.size() && line.text[begin] == ' ') ++begin;
   }
 }
 
@@ -72,8 +74,36 @@ bool FindLine(std::string_view& rest, Line& line) {
                             line.text.starts_with("//") ||
                             (line.text.starts_with(';') && line.separator != ';');
     if (!line.text.empty() && !is_comment) return true;
+    if (is_comment) line.comment = line.text;
   }
   return false;
+}
+
+/// Sets the separator of a line of names.
+void FindSeparator(Line& line) {
+  for (const char separator : {',', ';', '\t', ' '}) {
+    line.separator = separator;
+    if (EndOfCell(line, 0) < line.text.size()) return;
+  }
+  line.separator = ',';
+}
+
+/// Moves from the first row of a table without names back to the comment before it, if that has a
+/// name for each cell: NumPy's savetxt writes names so.
+void TakeNamesOfComment(std::string_view& rest, Line& line) {
+  std::vector<std::string_view> cells;
+  FindCells(line, cells);
+  const size_t width = cells.size();
+  const auto is_number = [](std::string_view cell) { return ParseNumber(cell).has_value(); };
+  if (line.comment.empty() || !std::ranges::all_of(cells, is_number)) return;
+  Line names = line;
+  names.text = Trim(line.comment.substr(line.comment.find_first_not_of("#%/;")));
+  FindSeparator(names);
+  FindCells(names, cells);
+  if (cells.size() != width || std::ranges::any_of(cells, is_number)) return;
+  rest = {line.text.data(), rest.data() + rest.size()};
+  line = names;
+  --line.number;
 }
 
 /// Moves to the line of names and sets the separator; false if there is none. Skips a byte-order
@@ -81,10 +111,10 @@ bool FindLine(std::string_view& rest, Line& line) {
 bool FindNames(std::string_view& rest, Line& line) {
   constexpr std::string_view kMark = "\xef\xbb\xbf";
   if (rest.starts_with("\xff\xfe") || rest.starts_with("\xfe\xff")) {
-    throw BadInput(Concat(line.where, ": expected text in UTF-8, got UTF-16: save it as UTF-8"));
+    throw BadInput(Concat(*line.where, ": expected text in UTF-8, got UTF-16: save it as UTF-8"));
   }
   if (rest.starts_with("PK") || rest.substr(0, 4096).find('\0') != rest.npos) {
-    throw BadInput(Concat(line.where, ": expected a CSV text, got ",
+    throw BadInput(Concat(*line.where, ": expected a CSV text, got ",
                           rest.starts_with("PK") ? "a zip archive or spreadsheet" : "binary data",
                           ": export it as CSV"));
   }
@@ -94,11 +124,8 @@ bool FindNames(std::string_view& rest, Line& line) {
     line.separator = line.text.size() == 5 ? line.text.back() : '\t';  // TakeLine trims a tab
     return FindLine(rest, line);
   }
-  for (const char separator : {',', ';', '\t'}) {
-    line.separator = separator;
-    if (EndOfCell(line, 0) < line.text.size()) return true;
-  }
-  line.separator = ',';
+  FindSeparator(line);
+  TakeNamesOfComment(rest, line);
   return true;
 }
 
@@ -128,7 +155,7 @@ std::string NamesHint(const std::vector<std::string_view>& cells, std::string_vi
   if (std::ranges::any_of(cells, [](auto cell) { return ParseNumber(cell).has_value(); })) {
     return ": the first line needs the names";
   }
-  const bool other = cells.size() == 1 && line.find_first_of(" |") != line.npos;
+  const bool other = cells.size() == 1 && line.find('|') != line.npos;
   return other ? ": separate cells by commas, semicolons or tabs" : "";
 }
 
@@ -142,7 +169,7 @@ std::string CellOf(std::string_view given) {
 }  // namespace
 
 std::vector<std::string> CsvNames(std::string_view text, const std::string& where) {
-  Line line{{}, where};
+  Line line{{}, &where, 0, ',', {}};
   std::vector<std::string_view> cells;
   if (FindNames(text, line)) FindCells(line, cells);
   std::vector<std::string> names;
@@ -154,7 +181,7 @@ std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::str
                                const std::string& where) {
   std::vector<CsvColumn> columns;
   for (const std::string& name : names) columns.push_back({name, {}});
-  Line line{{}, where};
+  Line line{{}, &where, 0, ',', {}};
   std::vector<std::string_view> cells;
   if (!FindNames(text, line)) return columns;
   FindCells(line, cells);
@@ -163,8 +190,10 @@ std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::str
   for (const std::string& name : names) {
     const auto found = std::ranges::find(cells, name, TextOf);
     if (found == cells.end()) {
+      const std::string hint = NamesHint(cells, line.text);
+      const std::vector<std::string> known(cells.begin(), cells.end());
       throw line.Bad(Concat("expected a column \"", name, "\", got \"", line.text.substr(0, 200),
-                            "\"", NamesHint(cells, line.text)));
+                            "\"", hint.empty() ? DidYouMean(name, known) : hint));
     }
     const auto times = std::ranges::count(cells, name, TextOf);
     if (times > 1) {
@@ -172,19 +201,21 @@ std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::str
     }
     places.push_back(static_cast<size_t>(found - cells.begin()));
   }
-  const bool ends = text.ends_with('\n');
+  const bool torn = !text.ends_with('\n');
+  const auto cut_off = [&] { return text.empty() && torn; };
+  constexpr const char* kCutOff = ": the last line is cut off; remove it";
   while (FindLine(text, line)) {
     FindCells(line, cells);
     if (cells.size() != width) {
-      throw line.Bad(Concat("expected ", width, " columns, got ", cells.size(),
-                            text.empty() && !ends ? ": the last line is cut off; remove it" : ""));
+      throw line.Bad(
+          Concat("expected ", width, " columns, got ", cells.size(), cut_off() ? kCutOff : ""));
     }
     for (size_t i = 0; i < places.size(); ++i) {
       const std::string_view cell = WithoutQuotes(cells[places[i]]);
       const auto number = NumberIn(cell, line);
       if (!number) {
         throw line.Bad(Concat(names[i], ": expected a finite number, got \"", Printable(cell), "\"",
-                              HintFor(cell, names[i])));
+                              cut_off() ? kCutOff : HintFor(cell, names[i])));
       }
       columns[i].values.push_back(*number);
     }

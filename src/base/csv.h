@@ -17,11 +17,12 @@ struct CsvColumn {
 
 /// Reads the columns called `names` from a CSV text: a line of names, then rows of cells.
 ///
-/// Commas separate the cells; if the line of names has none, semicolons or tabs do, and a number
-/// may have a decimal comma. A cell may be in double quotes. Within the quotes, a separator is part
-/// of the text and two quotes stand for one. The reader ignores a byte-order mark, empty lines,
-/// comments (lines that begin with #, %, // or ;), and the cells of other columns. A first line
-/// such as `sep=;`, which spreadsheets write, names the separator.
+/// Commas separate the cells; if the line of names has none, semicolons, tabs or blanks do, and a
+/// number may have a decimal comma. A cell may be in double quotes. Within the quotes, a separator
+/// is part of the text and two quotes stand for one. The reader ignores a byte-order mark, empty
+/// lines, comments (lines that begin with #, %, // or ;), and the cells of other columns. A first
+/// line such as `sep=;`, which spreadsheets write, names the separator. If the first row has
+/// numbers only, the comment before it has the names, as NumPy's savetxt writes them.
 ///
 /// Throws BadInput if a column is missing or named twice, a quote is not closed in its line, or a
 /// cell is not a finite number. Also throws it if a row and the line of names differ in their

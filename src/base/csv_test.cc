@@ -42,6 +42,9 @@ TEST(Csv, SeparatorsDecimalCommasAndComments) {
   EXPECT_EQ(CsvNames("sep=\t\na\tb,c\n", "t.csv"), (std::vector<std::string>{"a", "b,c"}));
   EXPECT_EQ(values("sep=|\na|b\n0|1,5\n0|-2e-3\n"), expected);
   EXPECT_EQ(values("sep=;\n;b;a\n0;1,5;0\n1;-2e-3;0\n"), expected);  // the index has no name
+  EXPECT_EQ(values("a  b\n 0   1.5\n 0  -2e-3\n"), expected);
+  EXPECT_EQ(values("# by numpy\n# a b\n0 1.5\n# half\n0 -2e-3\n"), expected);
+  EXPECT_EQ(values("% a,b\n0,1.5\n0,-2e-3\n"), expected);
 }
 
 TEST(Csv, NamesOfTheColumns) {
@@ -65,7 +68,8 @@ std::string Complaint(std::string_view text) {
 }
 
 TEST(Csv, MessagesNameLineAndColumn) {
-  EXPECT_EQ(Complaint("a,c\n1,2\n"), "t.csv:1: expected a column \"b\", got \"a,c\"");
+  EXPECT_EQ(Complaint("a,c\n1,2\n"),
+            "t.csv:1: expected a column \"b\", got \"a,c\" (did you mean a?)");
   EXPECT_EQ(Complaint("a,b\n1,2\n3\n"), "t.csv:3: expected 2 columns, got 1");
   EXPECT_EQ(Complaint("a,b\n1,2\n3"),
             "t.csv:3: expected 2 columns, got 1: the last line is cut off; remove it");
