@@ -72,11 +72,12 @@ std::vector<Window> WindowsOf(Pieces pieces, double cycle) {
 /// A way to read the columns of the angles.
 struct Reading {
   Joints sign{1, 1}, unit{1, 1};  // rad
-  bool absolute = false, swapped = false;
+  double link1 = 0;  // angles of joint 1 that are in those of joint 2; 1: against the vertical
+  bool swapped = false;
 
   Joints Of(const Joints& x) const {
     Joints y{sign[0] * unit[0] * x[swapped ? 1 : 0], sign[1] * unit[1] * x[swapped ? 0 : 1]};
-    if (absolute) y[1] -= y[0];
+    y[1] -= link1 * y[0];
     return y;
   }
 };
@@ -100,43 +101,47 @@ enum Term {
 using Terms = Eigen::Matrix<double, kTerms, 1>;
 using Gram = Eigen::Matrix<double, kTerms, kTerms>;
 
-/// The terms of the equation of joint `row` over a window.
-///   Row 1: d/dt [(J1 + J2) w1 + J2 w2 + b cos q2 (2 w1 + w2)] + G1 sin q1 + G2 sin(q1 + q2) + … =
-///   τ Row 2: d/dt [J2 (w1 + w2) + a w2 + b cos q2 w1] + b sin q2 w1 (w1 + w2) + G2 sin(q1 + q2) +
-///   … = τ
+/// The terms of the equations of both joints over a window.
+///   Joint 1: d/dt [(J1 + J2) w1 + J2 w2 + b cos q2 (2 w1 + w2)] + G1 sin q1 + G2 sin(q1 + q2) + …
+///   = τ1 Joint 2: d/dt [J2 (w1 + w2) + a w2 + b cos q2 w1] + b sin q2 w1 (w1 + w2) + G2 sin(q1 +
+///   q2) + … = τ2
 /// The turned terms are those with the angles a quarter turn ahead.
-Terms TermsOf(const Window& window, const Reading& reading, int row) {
-  Terms terms = Terms::Zero();
+std::array<Terms, 2> TermsOf(const Window& window, const Reading& reading) {
+  std::array<Terms, 2> both{Terms::Zero(), Terms::Zero()};
   for (const Sample& sample : window) {
     const Joints q = reading.Of(sample.q), w = reading.Of(sample.w);
-    const double s2 = std::sin(q[1]), c2 = std::cos(q[1]), dt = sample.seconds;
+    const double dt = sample.seconds;
     const double end = &sample == &window.back() ? 1 : &sample == &window.front() ? -1 : 0;
-    const double coupled = row == 0 ? 2 * w[0] + w[1] : w[0];
-    const double force = row == 0 ? 0 : w[0] * (w[0] + w[1]) * dt;
-    terms[kInertia] += end * (row == 0 ? w[0] : w[0] + w[1]);
-    terms[kOther] += end * w[1];
-    terms[kCoupling] += end * c2 * coupled + s2 * force;
-    terms[kTurnedCoupling] += -end * s2 * coupled + c2 * force;
-    terms[kLink2] += std::sin(q[0] + q[1]) * dt;
-    terms[kTurnedLink2] += std::cos(q[0] + q[1]) * dt;
-    terms[kLink1] += row == 0 ? std::sin(q[0]) * dt : 0;
-    terms[kTurnedLink1] += row == 0 ? std::cos(q[0]) * dt : 0;
-    terms[kDamping] += w[row] * dt;
-    terms[kFriction] += std::tanh(10 * w[row]) * dt;
-    terms[kTorque1] += sample.tau[0] * dt;
-    terms[kTorque2] += sample.tau[1] * dt;
+    const double s1 = std::sin(q[0]), c1 = std::cos(q[0]), s2 = std::sin(q[1]), c2 = std::cos(q[1]);
+    for (const int row : {0, 1}) {
+      Terms& terms = both[row];
+      const double coupled = row == 0 ? 2 * w[0] + w[1] : w[0];
+      const double force = row == 0 ? 0 : w[0] * (w[0] + w[1]) * dt;
+      terms[kInertia] += end * (row == 0 ? w[0] : w[0] + w[1]);
+      terms[kOther] += end * w[1];
+      terms[kCoupling] += end * c2 * coupled + s2 * force;
+      terms[kTurnedCoupling] += -end * s2 * coupled + c2 * force;
+      terms[kLink2] += (s1 * c2 + c1 * s2) * dt;
+      terms[kTurnedLink2] += (c1 * c2 - s1 * s2) * dt;
+      terms[kLink1] += row == 0 ? s1 * dt : 0;
+      terms[kTurnedLink1] += row == 0 ? c1 * dt : 0;
+      terms[kDamping] += w[row] * dt;
+      terms[kFriction] += std::tanh(10 * w[row]) * dt;
+      terms[kTorque1] += sample.tau[0] * dt;
+      terms[kTorque2] += sample.tau[1] * dt;
+    }
   }
-  return terms;
+  return both;
 }
 
-/// Products of all terms of the equation of joint `row`, summed over the windows.
-Gram GramOf(const std::vector<Window>& windows, const Reading& reading, int row) {
-  Gram gram = Gram::Zero();
+/// Products of all terms of the equation of each joint, summed over the windows.
+std::array<Gram, 2> GramsOf(const std::vector<Window>& windows, const Reading& reading) {
+  std::array<Gram, 2> grams{Gram::Zero(), Gram::Zero()};
   for (const Window& window : windows) {
-    const Terms terms = TermsOf(window, reading, row);
-    gram += terms * terms.transpose();
+    const auto terms = TermsOf(window, reading);
+    for (const int row : {0, 1}) grams[row] += terms[row] * terms[row].transpose();
   }
-  return gram;
+  return grams;
 }
 
 /// The share of `target`, a term with a sign, that the other terms leave unexplained when `zero` is
@@ -166,13 +171,17 @@ double Unexplained(const Gram& gram, int row, const Joints& zero, Term target, d
   x.setZero();
   x[kCoefficients] = target == kInertia ? 1 : -1;
   for (int sweep = 0; sweep < 100; ++sweep) {  // coordinate descent
+    double moved = 0;
     for (int i = 0; i < kCoefficients; ++i) {
       if (!(A(i, i) > 0)) continue;
+      const double before = x[i];
       x[i] -= A.row(i).dot(x) / A(i, i);
       if (i < kSigned || target != kInertia) x[i] = std::max(0.0, x[i]);
       // The mass matrix is positive: 2 b < J1 + J2.
       if (i == 1 && row == 0 && target == kInertia) x[i] = std::min(0.5, x[i]);
+      moved = std::max(moved, A(i, i) * (x[i] - before) * (x[i] - before));
     }
+    if (moved < 1e-8 * all) break;
   }
   return x.dot(A * x) / all;
 }
@@ -197,7 +206,7 @@ struct Explanation {
   /// Number of changes to the columns.
   int changes() const {
     const Reading& r = reading;
-    return (r.sign[0] < 0) + (r.sign[1] < 0) + r.absolute + (r.swapped || torques_swapped) +
+    return (r.sign[0] < 0) + (r.sign[1] < 0) + (r.link1 != 0) + r.swapped +
            (r.swapped != torques_swapped) + (r.unit != Joints{1, 1}) + (torque_sign[0] < 0) +
            (torque_sign[1] < 0) + (std::abs(zero[0]) > kZero) + (std::abs(zero[1]) > kZero);
   }
@@ -280,9 +289,9 @@ std::vector<Reading> Readings(const Joints& range) {
       continue;
     }
     for (const Joints& sign : {Joints{1, 1}, {1, -1}, {-1, 1}, {-1, -1}}) {
-      for (const bool absolute : {false, true}) {
+      for (const double link1 : {0, 1, -1}) {
         for (const bool swapped : {false, true}) {
-          readings.push_back({sign, unit, absolute, swapped});
+          readings.push_back({sign, unit, link1, swapped});
         }
       }
     }
@@ -300,11 +309,30 @@ bool InProportion(const std::vector<Window>& windows) {
   return std::abs(pairs.correlation()) > kProportion;
 }
 
+/// The joints with commands or pushes. Without either, those with measured torques: an idle motor
+/// may report some, too, but less than the other.
+std::array<bool, 2> DrivenJoints(Pieces pieces, const std::vector<Window>& windows) {
+  std::array<bool, 2> driven{HasCommand(pieces, 0), HasCommand(pieces, 1)};
+  for (const MachineLog& log : pieces) {
+    for (const int j : {0, 1}) driven[j] = driven[j] || HasTorque(log.push, j);
+  }
+  if (driven[0] || driven[1]) return driven;
+  Joints squares{};
+  for (const Window& window : windows) {
+    for (const Sample& sample : window) {
+      for (const int j : {0, 1}) squares[j] += sample.tau[j] * sample.tau[j];
+    }
+  }
+  constexpr double kShare = 0.25;  // of the larger square
+  const double least = kShare * std::max(squares[0], squares[1]);
+  return {squares[0] > least, squares[1] > least};
+}
+
 /// The share of the changes of velocity that the steps of the encoders make, of the joint with
 /// more.
 double NoiseOf(Pieces pieces, const std::vector<Window>& windows, double cycle) {
   const double apart = 2 * SpanOf(cycle) * cycle;
-  double most = 5e-4;
+  double most = 2e-3;
   for (const int j : {0, 1}) {
     double changes = 0;
     for (const Window& window : windows) {
@@ -330,7 +358,11 @@ void Report(const Explanation& e, bool in_proportion, Findings& findings) {
   if (r.swapped && e.torques_swapped) add(Aspect::kMotion, 0, "swapped columns of both joints");
   if (r.swapped && !e.torques_swapped) add(Aspect::kAngle, 0, "swapped angles");
   if (!r.swapped && e.torques_swapped) add(Aspect::kTorque, 0, "swapped torques");
-  if (r.absolute) add(Aspect::kAngle, 2, "an angle against the vertical (key absolute)");
+  if (r.link1 != 0) {
+    add(Aspect::kAngle, 2,
+        r.link1 > 0 ? "an angle against the vertical (key absolute)"
+                    : "an angle against link 1 (without key absolute)");
+  }
   for (const int j : {0, 1}) {
     if (r.unit[j] != 1) {
       add(Aspect::kAngle, j + 1, r.unit[j] > 1 ? "turns (key unit)" : "degrees (key unit)");
@@ -338,14 +370,14 @@ void Report(const Explanation& e, bool in_proportion, Findings& findings) {
     if (r.sign[j] < 0) add(Aspect::kAngle, j + 1, "the opposite sign (factor = -1)");
     if (e.torque_sign[j] < 0) add(Aspect::kTorque, j + 1, "the opposite sign (factor = -1)");
     // The reading of a link that hangs, by the column's own sign.
-    const double hangs = -r.sign[j] * (j == 1 && r.absolute ? e.zero[0] + e.zero[1] : e.zero[j]);
+    const double hangs = -r.sign[j] * (j == 1 ? e.zero[1] + r.link1 * e.zero[0] : e.zero[j]);
     if (std::abs(e.zero[j]) <= kZero) continue;
     const double zero = std::remainder(hangs, 2 * std::numbers::pi);
     add(Aspect::kAngle, j + 1,
         fmt::format("another zero, {:.2f} rad ({:.0f} deg) when its link {} (add it to the key "
                     "hanging, in the column's unit)",
                     zero, zero * 180 / std::numbers::pi,
-                    j == 0 || r.absolute ? "hangs" : "is in line with link 1"));
+                    j == 0 || r.link1 > 0 ? "hangs" : "is in line with link 1"));
   }
 }
 
@@ -363,16 +395,13 @@ void CheckEquations(Pieces pieces, Findings& findings) {
   if (!(cycle > 0)) return;
   const std::vector<Window> windows = WindowsOf(pieces, cycle);
   if (windows.size() < kEnough) return;
-  std::array<bool, 2> has_torque{HasCommand(pieces, 0), HasCommand(pieces, 1)};
-  for (const MachineLog& log : pieces) {
-    for (const int j : {0, 1}) has_torque[j] = has_torque[j] || HasTorque(log.push, j);
-  }
+  const std::array<bool, 2> has_torque = DrivenJoints(pieces, windows);
   const bool in_proportion = InProportion(windows);
   if (in_proportion && !has_torque[0] && !has_torque[1]) return;
   const double noise = NoiseOf(pieces, windows, cycle);
   std::vector<Explanation> all;
   for (const Reading& reading : Readings(range)) {
-    const Equations equations{{GramOf(windows, reading, 0), GramOf(windows, reading, 1)}};
+    const Equations equations{GramsOf(windows, reading)};
     for (const Explanation& e : equations.Explain({reading, noise}, has_torque)) all.push_back(e);
   }
   const Explanation best = *std::ranges::min_element(all, {}, &Explanation::cost);

@@ -405,15 +405,19 @@ TEST(MachineCheck, TheEquationsOfMotionNameEachChangeOfTheColumns) {
                           const std::vector<std::string>& texts) {
     MachineLog log = good;
     for (int k = 0; k < log.rows(); ++k) change(log.angle[k], log.commanded[k]);
-    const std::string faults = FaultsOf(log);
-    for (const std::string& text : texts) EXPECT_NE(faults.find(text), std::string::npos) << faults;
-    EXPECT_EQ(std::ranges::count(faults, '\n'), std::ssize(texts)) << faults;
+    for (const bool measured : {false, true}) {
+      if (measured) std::swap(log.measured, log.commanded);  // which is empty from then on
+      const std::string faults = FaultsOf(log);
+      for (const auto& text : texts) EXPECT_NE(faults.find(text), std::string::npos) << faults;
+      EXPECT_EQ(std::ranges::count(faults, '\n'), std::ssize(texts)) << faults;
+    }
   };
   expect([](Joints& q, Joints&) { q[0] += kPi; }, {"angle 1: suspect another zero"});
   expect([](Joints& q, Joints&) { q[0] += 0.8; }, {"angle 1: suspect another zero, 0.7"});
   expect([](Joints& q, Joints&) { q[1] -= 1; }, {"angle 2: suspect another zero, -0.9"});
   expect([](Joints& q, Joints&) { q[1] += q[0]; },
          {"angle 2: suspect an angle against the vertical"});
+  expect([](Joints& q, Joints&) { q[1] -= q[0]; }, {"angle 2: suspect an angle against link 1"});
   expect(
       [](Joints& q, Joints&) {
         q[1] += q[0] + kPi;
@@ -432,6 +436,8 @@ TEST(MachineCheck, TheEquationsOfMotionNameEachChangeOfTheColumns) {
       },
       {"swapped columns of both joints"});
   expect([](Joints& q, Joints&) { std::swap(q[0], q[1]); }, {"swapped angles"});
+  expect([](Joints&, Joints& u) { std::swap(u[0], u[1]); }, {"swapped torques"});
+  expect([](Joints&, Joints& u) { u[0] = -u[0]; }, {"torque 1: suspect the opposite sign"});
 }
 
 TEST(MachineCheck, AFreeSwingMayHaveACoarseEncoderAndNoTorques) {
