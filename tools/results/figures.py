@@ -3,7 +3,7 @@
 
     python3 tools/results/figures.py                  draw all figures
     python3 tools/results/figures.py pareto maps      draw these
-    python3 tools/results/figures.py --measure        run the program for the data of episode, maps and lqr-catch
+    python3 tools/results/figures.py --measure        run the program for the data of episode, maps, lqr-catch and machine-learn
 
 Each figure is a function with @figure. It reads docs/results/data/*.json or docs/figures/**/*.csv. Drawing
 needs matplotlib (tools/docs-requirements.txt) and no built program. Draw again when a data file changes:
@@ -307,6 +307,37 @@ def machine_motion():
     return fig
 
 
+@figure("machine-learn")
+def machine_learn():
+    """Tip and torque of a machine without a model, from the first twitch to balance."""
+    rows = data_of(CSV / "machine-learn.csv")
+    runs = {}
+    for row in rows:
+        runs.setdefault(row["phase"], []).append({name: float(value) for name, value in row.items()})
+    fig = canvas(800, 400)
+    height, torque = panel(fig, 95, 40, 685, 190), panel(fig, 95, 250, 685, 90)
+    titles = ("torques grow", "larger torques", "TVLQR, designed on the twin", "brakes")
+    for title, run in zip(titles, runs.values()):
+        time = [row["time"] for row in run]
+        height.plot(time, [row["height"] for row in run], color=LINK2)
+        torque.plot(time, [row["torque"] for row in run], color=TORQUE, linewidth=1.2)
+        for axes in (height, torque):
+            axes.axvline(time[0], color=MUTED, linewidth=1.3, linestyle=(0, (4, 3)))
+        height.text(time[0] + 0.2, 1.08, title, transform=height.get_xaxis_transform(), va="center", color=MUTED)
+    for axes in (height, torque):
+        axes.set_xlim(0, float(rows[-1]["time"]))
+    height.tick_params(labelbottom=False)
+    height.set_ylim(-1.08, 1.08)
+    height.set_yticks([-1, 0, 1], ["hanging", "0", "upright"])
+    height.set_ylabel("height of the tip")
+    torque.set_ylim(-5.8, 5.8)
+    torque.set_yticks([-5, 0, 5])
+    torque.set_ylabel("torque [N·m]")
+    torque.set_xlabel("time of motion [s]")
+    fig.align_ylabels([height, torque])
+    return fig
+
+
 def success_map(axes, grid, extent):
     """Success from 0 to 1, with the same colours in every map."""
     return axes.imshow(grid, origin="lower", extent=extent, cmap="viridis", vmin=0, vmax=1, interpolation="nearest",
@@ -566,6 +597,21 @@ def measure(program):
         run("map", "lqr", "--x", "q1=150:210:121", "--y", "q2=-30:30:121", "--out", out / "lqr")
         keep_maps(out / "maps", write)
         keep_lqr(out / "lqr", write)
+        run("machine", "learn", "--link", "realaigym-twin", "--encoder-counts", 16384, "--out", out / "learn")
+        keep_learning(out / "learn", write)
+
+
+def keep_learning(folder, write):
+    """The runs of `machine learn`, 25 rows per second: height of the tip (-1 to 1) and torque."""
+    lengths = 0.2, 0.3  # m, of the benchmark's robot
+    lines = []
+    for phase, log in enumerate(sorted(folder.glob("log-*.csv")), 1):
+        for row in rows_of(log)[::20]:
+            phase += phase == 3 and row["state"] == "3"  # brakes after the balance
+            q1, q2 = float(row["pos_meas1"]), float(row["pos_meas2"])
+            height = -(lengths[0] * math.cos(q1) + lengths[1] * math.cos(q1 + q2)) / sum(lengths)
+            lines.append([phase, f"{float(row['time']):.3f}", f"{height:.4f}", f"{float(row['tau_con1']):.3f}"])
+    write("machine-learn.csv", ["phase", "time", "height", "torque"], lines)
 
 
 def keep_maps(folder, write):
@@ -596,7 +642,7 @@ def draw(name):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("figures", nargs="*", metavar="FIGURE", help=f"figures to draw [all]: {', '.join(DRAWN)}")
-    parser.add_argument("--measure", action="store_true", help="run the program for episode, maps and lqr-catch first")
+    parser.add_argument("--measure", action="store_true", help="run the program for episode, maps, lqr-catch and machine-learn first")
     parser.add_argument("--program", default=str(ROOT / "upswing"), help="program that --measure runs")
     a = parser.parse_args()
     for name in a.figures:
