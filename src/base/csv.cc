@@ -191,9 +191,12 @@ std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::str
     const auto found = std::ranges::find(cells, name, TextOf);
     if (found == cells.end()) {
       const std::string hint = NamesHint(cells, line.text);
-      const std::vector<std::string> known(cells.begin(), cells.end());
+      std::vector<std::string> others;  // besides the wanted ones
+      for (const std::string_view cell : cells) {
+        if (std::ranges::count(names, TextOf(cell)) == 0) others.push_back(TextOf(cell));
+      }
       throw line.Bad(Concat("expected a column \"", name, "\", got \"", line.text.substr(0, 200),
-                            "\"", hint.empty() ? DidYouMean(name, known) : hint));
+                            "\"", hint.empty() ? DidYouMean(name, others) : hint));
     }
     const auto times = std::ranges::count(cells, name, TextOf);
     if (times > 1) {
