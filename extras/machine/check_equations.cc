@@ -413,7 +413,7 @@ void CheckEquations(Pieces pieces, Findings& findings) {
     return Reporter{findings, Aspect::kTorque}(
         Severity::kFault,
         "the log has no torque, but no free pendulum moves like this: suspect missing columns "
-        "(keys commanded1, commanded2)");
+        "(keys commanded1, commanded2) or a hand");
   }
   if (best.changes() > kMostChanges || unexplained > kGood) return;
   // Torques that have nothing to do with the motion are no evidence.
