@@ -60,4 +60,16 @@ test('a page that hangs still or is paused asks for no frame until something cha
   }
   await page.locator('#pause').click();
   await expect.poll(frames).toBeGreaterThan(asked + 20); // it moves
+
+  // The first hold of a key or pointer moves a page at rest.
+  const torque = () => page.evaluate(() => upswing.world.torque);
+  for (const arrow of ['ArrowRight', '#motor-right']) {
+    await open(page, '#tour=2');
+    await settle(frames);
+    if (arrow.startsWith('#')) await page.locator(arrow).hover();
+    await settle(frames);
+    await (arrow.startsWith('#') ? page.mouse.down() : page.keyboard.down(arrow));
+    await expect.poll(torque, { message: arrow, timeout: 10_000 }).toBe(-5);
+    await (arrow.startsWith('#') ? page.mouse.up() : page.keyboard.up(arrow));
+  }
 });

@@ -29,19 +29,12 @@ export class MotorKeys {
       const isHeld = ({ key: pressed, target }: KeyboardEvent) =>
         (pressed === key && element<HTMLInputElement>('keys').checked) ||
         (target === held && (pressed === ' ' || pressed === 'Enter'));
-      // In the capture phase, before the page's own keys, which would shove.
       const listen = (type: 'keydown' | 'keyup', turn: number) =>
-        addEventListener(
-          type,
-          (event) => {
-            if (!this.on || !isHeld(event) || event.ctrlKey || event.altKey || event.metaKey)
-              return;
-            event.preventDefault();
-            event.stopImmediatePropagation();
-            this.turn(turn);
-          },
-          { capture: true },
-        );
+        addEventListener(type, (event) => {
+          if (!this.on || !isHeld(event) || event.ctrlKey || event.altKey || event.metaKey) return;
+          event.preventDefault();
+          this.turn(turn);
+        });
       listen('keydown', sign);
       listen('keyup', 0);
     }

@@ -310,7 +310,8 @@ export class Page {
     listenToExamples(() => void this.open());
     onThemeChange(() => this.repaint());
     const wake = () => this.frames.wake();
-    for (const event of ['input', 'change', 'click', 'keydown']) addEventListener(event, wake);
+    for (const event of ['input', 'change', 'click', 'pointerdown', 'keydown'])
+      addEventListener(event, wake);
     this.frames.watch(this.canvases.map((canvas) => canvas.element));
     lightNouns(this.scene, wake);
   }
