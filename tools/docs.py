@@ -366,7 +366,6 @@ PAGE = "http://localhost:4173/"  # of ./upswing demo, where the documentation li
 def join(site):
     page = site / "index.html"
     text = page.read_text(encoding="utf-8")
-    text = text.replace('class="no-site"', 'class="no-site" hidden')
     page.write_text(re.sub(r'(class="site"[^>]*?) hidden(?:="")?', r"\1", text), encoding="utf-8")
     for path in (site / "docs").rglob("*.html"):
         text = path.read_text(encoding="utf-8")

@@ -90,6 +90,8 @@ test('a result is a link with a ghost that others try to beat', async ({ stage: 
   await expect
     .poll(() => page.evaluate(() => Array.from(upswing.scene.ghosts)))
     .toEqual([expect.any(Number), expect.any(Number)]);
+  const labels = await page.evaluate(() => upswing.scene.labels.map(({ text }) => text));
+  expect(labels).toContain('the sent try');
   await page.getByRole('button', { name: 'Start over' }).click();
   await page.evaluate(() => (upswing.world.byHand = 0));
   expect(await play(page, 0.1)).not.toBe(time);

@@ -143,6 +143,7 @@ export function decisionText(decision: Decision, rewardScale: number): string {
   }
 }
 
+const SPIN = 3; // rad/s
 const BALANCED = 1; // s upright, after which it is more than a swing through the top
 
 /// The pendulum's state in words.
@@ -150,7 +151,7 @@ export function situation(world: World): { state: string; text: string } {
   const upright = world.uprightFor;
   if (upright !== null && upright >= BALANCED)
     return { state: 'balanced', text: `balanced for ${upright.toFixed(1)} s` };
-  if (upright !== null) return { state: 'upright', text: 'upright' };
+  if (upright !== null && isSlow(world.state)) return { state: 'upright', text: 'upright' };
   if (world.agentOn)
     return {
       state: 'swinging',
@@ -159,6 +160,11 @@ export function situation(world: World): { state: string; text: string } {
   return isAtRest(world.state)
     ? { state: 'hanging', text: 'hanging' }
     : { state: 'free', text: 'swinging freely' };
+}
+
+/// Whether no link is spinning.
+function isSlow({ w1, w2 }: State): boolean {
+  return Math.max(Math.abs(w1), Math.abs(w1 + w2)) < SPIN;
 }
 
 function isAtRest({ q1, q2, w1, w2 }: State): boolean {

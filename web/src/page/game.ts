@@ -74,6 +74,11 @@ export class Game {
     return states[Math.min(this.keys.length, states.length - 1)]!;
   }
 
+  /// Whose try the ghost repeats.
+  get ghostName(): string {
+    return this.rival ? 'the sent try' : 'your best try';
+  }
+
   /// A hint or result for the visitor.
   get answer(): string {
     if (this.held > BALANCED) return 'You balanced it by hand! Few do.';

@@ -26,6 +26,14 @@ export function placeCharts(): void {
 }
 wide.addEventListener('change', placeCharts);
 
+/// Opens the explanation of reward and DQN, and scrolls to it.
+export function explain(): void {
+  const about = element<HTMLDetailsElement>('q-about');
+  const [reward, dqn] = about.querySelectorAll('details');
+  for (const details of [about, reward!, dqn!]) details.open = true;
+  about.scrollIntoView({ block: 'start' });
+}
+
 /// Lets the keyboard focus and scroll a formula that is wider than its place.
 export function focusWideFormulas(): void {
   const observer = new ResizeObserver((entries) => {

@@ -18,7 +18,7 @@ import { button, element } from './dom';
 import { Frames } from './frames';
 import { Hand } from './hand';
 import { listenToKeys } from './keys';
-import { listenToExamples, placeCharts } from './layout';
+import { explain, listenToExamples, placeCharts } from './layout';
 import { MapPanel } from './map';
 import { note, warn } from './message';
 import { prefersStill } from './motion';
@@ -121,6 +121,11 @@ export class Page {
 
   /// Shows the view of an address, with its settings.
   async open(hash = location.hash): Promise<void> {
+    if (hash === '#how') {
+      if (this.view !== 'everything' || !this.agent) await this.open('#everything');
+      this.address.changed();
+      return explain();
+    }
     const view = viewOf(hash);
     const isOther = this.view !== view.name;
     if (isOther && this.view === 'everything' && this.agent) this.laboratory = this.hash();

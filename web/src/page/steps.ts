@@ -39,6 +39,7 @@ export interface Stage {
     readonly paused: boolean;
     readonly story: { readonly count: string; readonly milestone: string };
     readonly keeps: boolean;
+    readonly begun: boolean;
   };
 }
 
@@ -113,7 +114,11 @@ function motor(stage: Stage): Step {
   return {
     id: 'motor',
     agents: [],
-    labels: ({ torque }) => (torque === 0 ? [GOAL] : [GOAL, { at: 'motor', text: 'your torque' }]),
+    labels: ({ torque }) => [
+      GOAL,
+      ...(torque === 0 ? [] : [{ at: 'motor', text: 'your torque' } as const]),
+      ...(game.ghost ? [{ at: 'ghost', text: game.ghostName } as const] : []),
+    ],
     async begin(ghost) {
       keys.enabled = true;
       if (await stage.begin({ agent: NOMINAL_AGENT, on: false })) game.open(ghost);
@@ -140,6 +145,7 @@ function learn(stage: Stage): Step {
   return {
     id: 'learn',
     agents: [NOMINAL_AGENT],
+    labels: () => (stage.learn.begun ? [{ at: 'goal', text: 'ring: its guesses' }] : []),
     async begin() {
       const learned = stage.learn.keeps;
       const on = learned && !prefersStill();
@@ -239,7 +245,8 @@ function verdictOf(onMany: boolean, one: number, many: number, raced: number): s
 
 const RIGHT = 'You were right';
 export const LOST = 'You lost';
-const MANY_HOLDS = 'only the agent that learned on many balances it.';
+const MANY_HOLDS =
+  'only the agent that learned on many balances it: it estimates the mass from the motion.';
 const ONE_HOLDS = 'only the agent that learned on one balances it.';
 const BOTH_HOLD = 'A draw: both balance it.';
 const NONE_HOLDS = `A draw: neither balances it within ${LONGEST} s.`;

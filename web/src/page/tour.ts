@@ -109,9 +109,10 @@ export class Tour {
 
   /// Call at each frame.
   follow(world: World, scene: Scene): void {
-    scene.labels = this.twin.labels = this.now?.labels?.(world) ?? [];
     const ghost = prefersStill() ? null : this.now?.ghost?.();
     scene.ghosts = ghost ? [ghost.q1, ghost.q2] : [];
+    const labels = this.now?.labels?.(world) ?? [];
+    scene.labels = this.twin.labels = labels.filter(({ at }) => at !== 'ghost' || ghost);
     if (this.now && this.frame++ % FRAMES === 0) this.say(this.now.answer?.(world) ?? '');
   }
 

@@ -15,14 +15,14 @@ const ROOMY = 90; // pixels of height that leave room for that name
 const TOP = 4;
 const SCALE = 38; // pixels, for the costs next to Q-values
 const CUT_OFF = 0.005; // smallest share that gets a number
-const EASE = 0.2; // share of the way to a bar's new height and colour, at each drawing
+const EASE = 0.2; // share of the way to a bar's new height, at each drawing
 
 /// Chart of a decision: Q-values, or the torque's distribution.
 export class DecisionChart {
   readonly canvas = new Canvas('q');
   private below = 0; // pixels for the name of the axis
   private room = 1; // points of reward, from the best Q-value to the bottom of the chart
-  private bars: { value: number; chosen: number }[] = []; // as drawn
+  private bars: number[] = []; // heights as drawn, in units of their values
 
   /// A Q-value is `rewardScale` times a reward.
   draw(decision: Decision | null, rewardScale: number): void {
@@ -69,43 +69,47 @@ export class DecisionChart {
     }
     canvas.text('best', SCALE - 4, y(0) + 3, 'right');
     canvas.text(signed(-round), SCALE - 4, y(round), 'right');
-    this.drawBars(torques, action, SCALE, cost, (cost) => [y(cost), bottom - y(cost)]);
+    this.drawBars(
+      torques,
+      SCALE,
+      (i) => -cost(i),
+      (value, most) => {
+        const top = y(most - value);
+        return [top, bottom - top];
+      },
+    );
   }
 
   /// Bars from 0 to 1.
-  private drawProbabilities({ probabilities, action, torques }: CategoricalDecision): void {
+  private drawProbabilities({ probabilities, torques }: CategoricalDecision): void {
     const { bottom } = this;
     const height = (share: number) => (bottom - TOP) * share;
     const box = (share: number) => [bottom - height(share), height(share)] as const;
-    this.drawBars(torques, action, 0, (i) => probabilities[i]!, box);
+    this.drawBars(torques, 0, (i) => probabilities[i]!, box);
   }
 
-  /// Bars from `left` on, each with its torque. `box`: top and height (pixels) of a value.
+  /// Bars from `left` on, each with its torque, the tallest in colour: the agent takes it. `box`: top
+  /// and height (pixels) of a value, given the largest one.
   private drawBars(
     torques: Float64Array,
-    action: number,
     left: number,
     value: (i: number) => number,
-    box: (value: number) => readonly [number, number],
+    box: (value: number, most: number) => readonly [number, number],
   ): void {
     const { canvas, bottom } = this;
     const width = (canvas.width - left) / torques.length;
     const labelled = Math.ceil(LABEL_WIDTH / width); // labels every N-th bar
     if (this.bars.length !== torques.length) {
-      this.bars = Array.from(torques, (_, i) => ({ value: value(i), chosen: 0 }));
+      this.bars = Array.from(torques, (_, i) => value(i));
     }
+    // Eased, because the agent chooses 50 times a second.
+    this.bars = this.bars.map((bar, i) => bar + EASE * (value(i) - bar));
+    const most = Math.max(...this.bars);
     torques.forEach((torque, i) => {
-      // Eased, because the agent chooses 50 times a second. The colour shows how often it chose
-      // this torque lately.
       const bar = this.bars[i]!;
-      bar.value += EASE * (value(i) - bar.value);
-      bar.chosen += EASE * (Number(i === action) - bar.chosen);
-      const [top, height] = box(bar.value);
+      const [top, height] = box(bar, most);
       const place = [left + i * width + 2.5, top, width - 5, height] as const;
-      canvas.rectangle(...place, 'bar');
-      canvas.context.globalAlpha = bar.chosen;
-      canvas.rectangle(...place, 'torque');
-      canvas.context.globalAlpha = 1;
+      canvas.rectangle(...place, bar === most ? 'torque' : 'bar');
       canvas.context.strokeStyle = canvas.color('grid');
       canvas.context.lineWidth = 1;
       canvas.context.strokeRect(...place);

@@ -2,9 +2,13 @@ import type { Neurons } from '../neurons';
 import { Canvas } from './canvas';
 
 const LEFT = 84; // px, for the names of the rows
-const INPUTS = ['cos θ₁', 'sin θ₁', 'ω₁', 'cos θ₂', 'sin θ₂', 'ω₂', 'energy', 'height'];
-const SHORT = ['cos₁', 'sin₁', 'ω₁', 'cos₂', 'sin₂', 'ω₂', 'E', 'h'];
-const ROOM = 46; // px, for a whole name
+/// Names of the inputs, each over a number of them.
+const INPUTS = [
+  ['upper', 3],
+  ['lower', 3],
+  ['energy, height', 2],
+] as const;
+const NAMED = 8; // inputs with these names
 const NAMES = 16; // px, above the inputs
 const GAP = 4; // px, between rows
 const LINE = 11; // px, lowest row with its own name
@@ -33,7 +37,7 @@ export class NeuronChart {
       this.rows = layers.map(({ length }) => ({ shown: new Float32Array(length), most: 0 }));
     }
     this.neurons = neurons;
-    const named = observation.length === INPUTS.length ? NAMES : 0;
+    const named = observation.length === NAMED ? NAMES : 0;
     if (named > 0) this.nameInputs();
     const height = (canvas.height - named - GAP * (layers.length - 1)) / layers.length;
     layers.forEach((layer, i) => {
@@ -47,12 +51,17 @@ export class NeuronChart {
     canvas.text('neurons', LEFT - 8, middle, 'right');
   }
 
-  /// Each name above its input.
+  /// Each name above its inputs.
   private nameInputs(): void {
     const { canvas } = this;
-    const width = (canvas.width - LEFT) / INPUTS.length;
-    const names = width < ROOM ? SHORT : INPUTS;
-    names.forEach((name, k) => canvas.text(name, LEFT + (k + 0.5) * width, NAMES / 2, 'center'));
+    const width = (canvas.width - LEFT) / NAMED;
+    let k = 0;
+    for (const [name, count] of INPUTS) {
+      const middle = LEFT + (k + count / 2) * width;
+      const last = k + count === NAMED;
+      canvas.text(name, last ? canvas.width : middle, NAMES / 2, last ? 'right' : 'center');
+      k += count;
+    }
   }
 
   private drawRow(layer: Float32Array, row: Row, y: number, height: number): void {

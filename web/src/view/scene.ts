@@ -110,7 +110,7 @@ export class Scene {
     this.sparks.draw(canvas, ...this.at(elbow), 0.75 * this.scale);
     const letters = Math.max(canvas.letters, 0.036 * this.scale);
     for (const { at, text } of this.labels) {
-      drawLabel(canvas, text, letters, this.place(at, elbow, tip), this.box);
+      drawLabel(canvas, text, letters, this.place(at, elbow, tip, plant), this.box);
     }
   }
 
@@ -146,7 +146,7 @@ export class Scene {
   }
 
   /// The place of a label.
-  private place(what: Label['at'], elbow: Vec, tip: Vec): Anchor {
+  private place(what: Label['at'], elbow: Vec, tip: Vec, plant: Plant): Anchor {
     if (what === 'motor') {
       const [x, y] = this.at(PIVOT);
       return { x, y, nx: 1, ny: 0, gap: Math.max(0.2 * this.scale, 30) };
@@ -154,6 +154,12 @@ export class Scene {
     if (what === 'goal') {
       const [x, y] = this.at({ x: 0.6, z: 1 });
       return { x, y, nx: 0, ny: -1, gap: 2 };
+    }
+    if (what === 'ghost') {
+      const [q1, q2] = [this.ghosts[0]!, this.ghosts[1]!];
+      const { position } = pointOn(plant, { q1, q2, w1: 0, w2: 0 }, 2, plant.length2);
+      const [x, y] = this.at(position);
+      return { x, y, nx: Math.sign(position.x) || 1, ny: 0, gap: 6 };
     }
     // At a side of the link, turning with it.
     const [x, y] = this.at({ x: (elbow.x + tip.x) / 2, z: (elbow.z + tip.z) / 2 });
