@@ -53,6 +53,7 @@ test('axe finds no problem in any step of the tour or in everything, in any them
   });
   await expectNone(page, 'the tour');
   await open(page, '#learn');
+  await page.locator('#learn-options > summary').click();
   await page.getByLabel('four seeds at once').check();
   await page.getByRole('button', { name: 'Learn', exact: true }).click();
   await expect(page.locator('#learn-updates')).not.toHaveText('0');

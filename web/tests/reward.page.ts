@@ -9,6 +9,7 @@ const terms = (page: Page) => page.locator('#reward-terms');
 
 async function openReward(page: Page): Promise<void> {
   await open(page, '#learn');
+  await page.locator('#learn-options > summary').click();
   const details = page.locator('#reward-details');
   const missing = await details.evaluate((found) => (found as HTMLElement).hidden);
   test.skip(Boolean(missing), 'the core has no setting reward');

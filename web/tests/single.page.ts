@@ -39,6 +39,7 @@ test('one file holds the page: without a server or a network it balances, and it
   await page.evaluate(() => (location.hash = '#learn=fast&seed=1'));
   await expect(page.locator('#learn-updates')).not.toHaveText('0');
   await page.evaluate(() => upswing.learn.stop());
+  await page.locator('#learn-options > summary').click();
   await page.getByRole('button', { name: 'How the default agent learned' }).click();
   await page.locator('#learn-scrub').fill('0');
   await expect(page.locator('#learn-where')).toHaveText('on the stage: after 0 steps');

@@ -1,81 +1,113 @@
 import { button, element, write } from '../page/dom';
+import { withMinus } from '../text';
 import { signed } from '../view/charts';
-import type { UpdateExample } from './learner';
-import type { Session } from './session';
+import type { Example, Session } from './session';
 
 /// How a DQN agent learns, with the numbers of the training that is shown: its random torques, its
-/// memory, one update, and what it expected against what it got.
+/// memory, updates of its network, and what it expected against what it got.
 export class Lesson {
   private readonly guesses = element('lesson-guesses');
-  private shown: UpdateExample | null = null; // waits for the visitor's guess, or has its answer
-  private answered = false;
+  private session: Session | null = null;
+  private rewardScale = 1;
+  private asked: Question | null = null; // waits for the visitor's guess, or has its answer
 
   constructor() {
     button('lesson-up', () => this.answer(true));
     button('lesson-down', () => this.answer(false));
-    button('lesson-next', () => (this.shown = null));
+    button('lesson-next', () => this.next());
   }
 
   /// Call after each change. `rewardScale`: factor of the rewards in the agent's values.
   show(session: Session | null, rewardScale: number): void {
-    const example = session?.example ?? null;
-    element('lesson').hidden = example === null;
-    if (!example) return;
+    if (session !== this.session) this.asked = null;
+    [this.session, this.rewardScale] = [session, rewardScale];
+    const example = session?.examples.at(-1);
+    element('lesson').hidden = !example;
+    if (!session || !example) return;
     const meter = (id: string, value: number, text: string) => {
       element<HTMLMeterElement>(id).value = value;
       write(element(`${id}-text`), text);
     };
     meter('lesson-random', example.epsilon, percent(example.epsilon));
     const [filled, all] = [example.remembered, example.capacity];
-    meter('lesson-memory', filled / all, `${whole(filled)} of ${whole(all)} steps`);
-    const test = session!.evaluations.at(-1);
-    const expected = test ? `${whole(test.expected)}, and got ${whole(test.attained)}` : '–';
-    write(element('lesson-test'), expected);
-    if (!this.shown) this.ask(example, rewardScale);
+    meter('lesson-memory', filled / all, `${whole(filled)} steps`);
+    const test = session.evaluations.at(-1);
+    element('lesson-tested').hidden = !test;
+    if (test) {
+      const [expected, attained] = [whole(test.expected), whole(test.attained)];
+      write(element('lesson-test'), `${expected} points, and got ${attained}`);
+    }
+    if (!this.asked) this.next();
   }
 
-  /// Asks whether a guess will go up or down.
-  private ask(example: UpdateExample, rewardScale: number): void {
-    const scaled = (value: number) => value / rewardScale;
-    this.shown = {
-      ...example,
-      guess: scaled(example.guess),
-      corrected: scaled(example.corrected),
-      reward: scaled(example.reward),
-      target: scaled(example.target),
-    };
-    this.answered = false;
-    const { torque, guess } = this.shown;
+  /// Asks about the newest update; about recorded ones in turn if that is shown already or the
+  /// training has ended.
+  private next(): void {
+    const { session, rewardScale, asked } = this;
+    const all = session!.examples.flatMap((example) => questionOf(example, rewardScale) ?? []);
+    const newest = all.at(-1);
+    const at = all.findIndex(({ update }) => update === asked?.update);
+    this.asked = session!.running && newest?.update !== asked?.update ? newest! : all[at + 1]!;
+    this.asked ??= all[0] ?? null;
+    element('lesson-question').hidden = !this.asked;
+    if (!this.asked) return;
+    const { update, torque, guess, reward, next } = this.asked;
     write(
       element('lesson-guess'),
-      `In a step that it remembers, it turned with ${signed(torque)} N·m and guessed that all ` +
-        `rewards from there on are worth ${points(guess)}. Will it correct this guess up or down?`,
+      `Update ${whole(update)} looks at a step that the agent remembers. It turned with ` +
+        `${signed(torque)}\u00a0N·m and guessed that ${points(guess)} points follow. Then it got ` +
+        `${points(reward)}, and from there it expects ${points(next)} more. Will its guess go up ` +
+        `or down?`,
     );
-    this.arrange();
+    this.arrange(false);
   }
 
   private answer(up: boolean): void {
-    if (!this.shown) return;
-    const { guess, reward, target, corrected } = this.shown;
-    const right = up === target > guess;
+    if (!this.asked) return;
+    const { guess, reward, next, target, corrected } = this.asked;
+    const rises = target > guess;
+    const sum = `${points(reward)} ${next < 0 ? '−' : '+'} ${points(Math.abs(next))}`;
     write(
       element('lesson-answer'),
-      `${right ? 'Right' : 'No'}: the step and those after it brought ${points(reward)}, and ` +
-        `from there it expects ${points(target - reward)} more. The target is ` +
-        `${points(target)}, so the guess ${points(guess)} became ${points(corrected)}` +
-        `${target > guess === corrected > guess ? '.' : ': other steps pulled it away.'}`,
+      `${up === rises ? 'Right' : 'No'}: ${sum} = ${points(target)} is ` +
+        `${rises ? 'more' : 'less'} than ${points(guess)}. The guess went ` +
+        `${rises ? 'up' : 'down'}, to ${points(corrected)}.`,
     );
-    this.answered = true;
-    this.arrange();
+    this.arrange(true);
   }
 
-  private arrange(): void {
-    this.guesses.hidden = this.answered;
-    element('lesson-answer').hidden = !this.answered;
-    element('lesson-next').hidden = !this.answered;
+  private arrange(answered: boolean): void {
+    this.guesses.hidden = answered;
+    element('lesson-answer').hidden = !answered;
+    element('lesson-next').hidden = !answered;
   }
 }
 
+/// An update, in tenths of a point: the numbers add up as they are shown.
+interface Question {
+  readonly update: number; // its number
+  readonly torque: number; // N·m
+  readonly guess: number;
+  readonly reward: number;
+  readonly next: number; // expected after the reward
+  readonly target: number; // reward + next
+  readonly corrected: number;
+}
+
+/// Null for an update that does not move clearly towards its target: other remembered steps pull,
+/// too.
+export function questionOf(example: Example, rewardScale: number): Question | null {
+  const tenths = (value: number) => Math.round((10 * value) / rewardScale);
+  const { update, torque } = example;
+  const [guess, corrected] = [tenths(example.guess), tenths(example.corrected)];
+  const [reward, target] = [tenths(example.reward), tenths(example.target)];
+  const share = (corrected - guess) / (target - guess);
+  if (!(share >= CLEAR && share <= 1)) return null;
+  return { update, torque, guess, reward, next: target - reward, target, corrected };
+}
+
+const CLEAR = 0.1; // share of the way to the target
+
 const percent = (share: number) => `${Math.round(100 * share)}%`;
 const whole = (count: number) => Math.round(count).toLocaleString('en');
-const points = (reward: number) => signed(Number(reward.toFixed(1)));
+const points = (tenths: number) => withMinus((tenths / 10).toFixed(1));

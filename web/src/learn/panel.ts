@@ -15,6 +15,7 @@ import './learn.css';
 import type { LearnSettings } from './learner';
 import { Lesson } from './lesson';
 import { nameOf as contenderOf, RACE_SEEDS } from './race';
+import type { Rival } from './race';
 import { RacePanel } from './race_panel';
 import { RewardPanel } from './reward';
 import { decodeRecipe, encodeRecipe, LARGEST_SEED } from './recipe';
@@ -85,7 +86,7 @@ export class LearnPanel {
     this.page = page;
     this.strip = new Filmstrip(page.world);
     this.race = new RacePanel(
-      () => this.start(),
+      () => this.start(this.race.rival),
       () => this.offerRace(),
     );
     this.scrubber = new Scrubber(page, () => this.draw());
@@ -130,12 +131,11 @@ export class LearnPanel {
     new ResizeObserver(() => this.draw()).observe(this.chart.canvas.element);
   }
 
-  /// Starts a training with the chosen seed and settings. If a value is invalid, shows the reason
-  /// and lets the current training go on.
-  start(): void {
+  /// Starts a training with the chosen seed and settings, or a race against a rival. If a value is
+  /// invalid, shows the reason and lets the current training go on.
+  start(rival: Rival | null = null): void {
     if (!this.knobs.check()) return;
     for (const session of this.sessions) session.stop();
-    const { rival } = this.race;
     const count = rival ? RACE_SEEDS : this.four.checked ? SEEDS_AT_ONCE : 1;
     const largest = LARGEST_SEED - (count - 1);
     const first = Math.min(Math.max(Math.round(Number(this.seed.value)) || 0, 0), largest);
@@ -163,6 +163,7 @@ export class LearnPanel {
   private offerRace(): void {
     this.race.offer(this.agent.value, this.settings);
     this.four.disabled = this.race.rival !== null;
+    this.draw();
   }
 
   /// Both sides of the race that is shown; null without a race.
@@ -219,8 +220,13 @@ export class LearnPanel {
     if (session.state === 'failed' || !session.last) {
       return { count: '', milestone: sentence(session) };
     }
+    if (!this.isAtNewest) {
+      const { step } = this.scrubber;
+      return { count: `After ${swinging(step)}`, milestone: earlier(session, step) };
+    }
     const { episodeCount } = session.last;
-    const { example, slow } = session;
+    const { slow } = session;
+    const example = session.examples.at(-1);
     const random = example && slow ? `${Math.round(100 * example.epsilon)}% random torques` : '';
     const trial = `Trial ${(episodeCount + (slow ? 1 : 0)).toLocaleString('en')}`;
     const count = `${trial}, ${random || swinging(session.steps)}`;
@@ -257,9 +263,9 @@ export class LearnPanel {
     this.draw();
   }
 
-  /// Whether there is a training or a recording.
+  /// Whether a policy of the shown training has been on the stage.
   get begun(): boolean {
-    return this.scrubber.course !== null;
+    return this.scrubber.checkpoint !== null;
   }
 
   /// Leaves the stage to another view or step.
@@ -282,7 +288,7 @@ export class LearnPanel {
   /// before its first test; null otherwise.
   get lastTest(): object | null {
     const { session, scrubber } = this;
-    if (!session?.running || !scrubber.follows || !scrubber.onStage) return null;
+    if (!session?.running || !scrubber.follows || !scrubber.onStage || !this.begun) return null;
     return session.evaluations.at(-1) ?? session;
   }
 
@@ -433,13 +439,16 @@ export class LearnPanel {
       );
     this.race.show(sides);
     this.reward.show(session);
-    this.lesson.show(session, page.world.policy?.rewardScale ?? 1);
+    this.lesson.show(sides ? null : session, page.world.policy?.rewardScale ?? 1);
     element('learn-figure').toggleAttribute('data-race', sides !== null);
     this.strip.show(session?.state === 'finished' ? session : null);
     const running = this.active.length > 0;
     const label = this.paused ? 'Resume training' : running ? 'Pause training' : 'Learn';
     element('learn-start').textContent = label;
-    element<HTMLButtonElement>('learn-again').disabled = this.sessions.length === 0;
+    // A race begins with a bet.
+    const races = this.race.rival !== null;
+    element('learn-start').hidden = races && !running;
+    element('learn-again').hidden = races || this.sessions.length === 0;
     const has = session !== null && session.policy !== null;
     element<HTMLButtonElement>('learn-save').disabled = !has;
     element<HTMLButtonElement>('learn-keep').disabled = !has || this.isKept;
@@ -464,7 +473,8 @@ export class LearnPanel {
     }
     this.scrub.ariaValueText = `after ${scrubber.step.toLocaleString('en')} steps`;
     this.drawNumbers(course);
-    this.say(session ? sentence(session) : OF_RECORDING);
+    const said = this.isAtNewest || !session ? sentence : earlier;
+    this.say(session ? said(session, scrubber.step) : OF_RECORDING);
   }
 
   /// The numbers of a training: the latest ones, or at the step of the policy on the stage.
@@ -544,6 +554,12 @@ function milestone(session: Session): string {
     if (trial >= 0) return `Upright ${long}: trial ${trial + 1}.`;
   }
   return 'Learning …';
+}
+
+/// The policy on the stage, which is not the newest one.
+function earlier(session: Session, step: number): string {
+  const success = Math.round(100 * (successAt(session, step) ?? 0));
+  return `An earlier version: it passes ${success > 0 ? `${success} of 100 tests` : 'no test'}.`;
 }
 
 function sentence(session: Session): string {

@@ -1,3 +1,4 @@
+import { readFileSync } from 'node:fs';
 import { expect, test } from 'vitest';
 import { nameOf, resultOf, winnerOf } from './race';
 
@@ -37,4 +38,18 @@ test('the result in words', () => {
       ],
     ),
   ).toMatch(/^B wins in the median, but not/);
+});
+
+test('the claim about our study holds in its table', () => {
+  const read = (path: string) => readFileSync(new URL(path, import.meta.url), 'utf8');
+  expect(read('../../index.html').replace(/\s+/g, ' ')).toContain(
+    'In our study with 1,000 seeds each, dueling halved the steps and Double made no clear difference.',
+  );
+  const table = read('../../../docs/results/seeds.md');
+  const steps = (variant: string) => {
+    const cells = table.split(`\n| ${variant} | `)[1]!.split(' | ');
+    return { iqm: Number(cells[1]!.replace(',', '')), interval: cells[2]! };
+  };
+  expect(steps('no dueling').iqm / steps('`fast`').iqm).toBeCloseTo(2, 1);
+  expect(steps('no Double DQN').interval).toMatch(/^-.* to \+/); // it contains 0
 });

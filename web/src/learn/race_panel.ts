@@ -40,6 +40,7 @@ export class RacePanel {
     if (!rival) return;
     this.bets[0]!.textContent = nameOf(agent, settings);
     this.bets[1]!.textContent = rival.name;
+    element('race-how').hidden = !isFamily([agent, rival.agent]);
   }
 
   /// Call when other trainings have begun.
@@ -51,6 +52,12 @@ export class RacePanel {
   /// Shows how far a race is, or its result.
   show(sides: readonly [readonly Session[], readonly Session[]] | null): void {
     write(element('race-result'), sides ? this.textOf(sides) : '');
+    const runs = sides?.flat() ?? [];
+    const ended = runs.length > 0 && runs.every(({ state }) => state === 'finished');
+    element('race-why').hidden = !ended || !isFamily(runs.map(({ agent }) => agent));
+    sides?.forEach(([first], side) => {
+      write(element(`race-name-${side}`), nameOf(first!.agent, first!.settings));
+    });
   }
 
   private textOf(sides: readonly [readonly Session[], readonly Session[]]): string {
@@ -68,3 +75,6 @@ export class RacePanel {
     return `${this.bet === winner.side ? 'You were right' : 'You lost'}. ${result}`;
   }
 }
+
+/// Whether all are of the DQN family, which the page explains.
+const isFamily = (agents: readonly string[]) => agents.every((agent) => agent === 'fast');

@@ -23,7 +23,7 @@ export class Scrubber {
   course: Course | null = null;
   follows = true; // shows the newest policy, now and later
   step = 0; // of the policy on the stage
-  checkpoint: Checkpoint | null = null; // the policy on the stage
+  checkpoint: Checkpoint | null = null; // the course's policy on the stage
   private readonly stage: LearnStage;
   private readonly onShown: () => void;
   private shown: Policy | null = null;
@@ -49,7 +49,7 @@ export class Scrubber {
   /// Shows another training and follows it. `moves`: its policy acts at once.
   take(course: Course, moves = true): void {
     this.course = course;
-    this.given = null;
+    this.given = this.checkpoint = null;
     this.replaceable = this.stage.world.policy;
     this.follow(moves);
     void this.showUntrained(this.withUntrained);

@@ -7,6 +7,10 @@ import type { News, Order } from './worker';
 
 const MOST = 64; // checkpoints; when reached, every other one is removed
 
+export interface Example extends UpdateExample {
+  update: number; // its number in the training
+}
+
 /// A training in its own worker, with its results.
 export class Session implements Course {
   readonly name: string;
@@ -21,7 +25,7 @@ export class Session implements Course {
   readonly evaluations: Test[] = [];
   /// The reward's terms: each one's mean per step, for each report with trials.
   terms: { name: string; means: number[] }[] = [];
-  example: UpdateExample | null = null; // of the last update
+  readonly examples: Example[] = []; // one for each report with updates
   slow: boolean; // whether its start is still slow
   checkpoints: Checkpoint[] = [];
   policy: ArrayBuffer | null = null; // latest one
@@ -118,14 +122,15 @@ export class Session implements Course {
   private hear(news: News): void {
     if (news.kind === 'failed') return this.fail(news.reason);
     if (news.kind === 'poses') return void (this.poses = news.poses);
-    const { report, policy, best, seconds, isMark } = news;
-    this.example = news.example;
+    const { report, policy, best, seconds, example, isMark } = news;
     this.slow &&= news.slow;
     if (this.last && seconds > this.seconds) {
       const rate = (report.updates - this.last.updates) / (seconds - this.seconds);
       this.updatesPerSecond += 0.3 * (rate - this.updatesPerSecond);
     }
     this.seconds = seconds;
+    const isNew = report.updates !== this.last?.updates;
+    if (example && isNew) this.examples.push({ ...example, update: report.updates });
     this.last = report;
     this.policy = policy;
     for (const { step, return: sum } of report.episodes)

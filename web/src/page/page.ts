@@ -257,7 +257,6 @@ export class Page {
     const { step } = document.documentElement.dataset;
     this.learning = this.view === 'learn' || step === 'learn';
     this.map.atRest = this.view !== 'everything';
-    this.ring.shown = (this.learning && this.learn.begun) || step === 'map';
     if (!this.learning) this.learn.leave();
   }
 
@@ -441,6 +440,8 @@ export class Page {
 
   private draw(): void {
     const { world } = this;
+    const { step } = document.documentElement.dataset;
+    this.ring.shown = (this.learning && this.learn.begun) || step === 'map';
     this.ring.follow(world, this.map.valueRange, this.learn.lastTest ?? world.policy);
     this.scene.ring = this.ring.colors;
     const trail = prefersStill() ? [] : this.history.from(world.time - TRAIL_SECONDS);
