@@ -1,32 +1,17 @@
-// Doubles as text, and back, by printf and strtod. libc++ has tables for both: 12 kB for reading,
-// and 104 kB for a given number of digits and for doubles from 2^53 on (ryu/d2fixed.cpp). With
-// these definitions the linker leaves the tables out. Both round correctly and give the same bits.
+// Doubles as text, and back, by printf and strtod, because charconv.cpp of libc++ has tables of 130
+// kB. Both round correctly and give the same bits. 46 of the 2,098 powers of two, 2^-24 for one,
+// get a digit more here.
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
 
-namespace {
-
-std::to_chars_result Print(char* first, char* last, const char* format, double value,
-                           uint32_t precision) {
-  std::array<char, 2048> text;  // 309 digits before the point, 1074 behind it
-  const int size =
-      std::snprintf(text.data(), text.size(), format, static_cast<int>(precision), value);
-  if (last - first < size) return {last, std::errc::value_too_large};
-  return {std::copy_n(text.data(), size, first), std::errc()};
-}
-
-}  // namespace
-
 using Read = std::__from_chars_result<double>;
 
-/// The definition of __from_chars_floating_point<double> in charconv.cpp is weak. This one has the
-/// same name and is not.
+/// The function that the headers of libc++ declare under this name.
 Read ReadDouble(const char* first, const char* last, std::chars_format) __asm__(
     "_ZNSt3__127__from_chars_floating_pointIdEENS_19__from_chars_resultIT_EEPKcS5_NS_12chars_"
     "formatE");
@@ -46,12 +31,36 @@ Read ReadDouble(const char* first, const char* last, std::chars_format) {
 
 _LIBCPP_BEGIN_NAMESPACE_STD
 
-to_chars_result __d2fixed_buffered_n(char* first, char* last, double value, uint32_t precision) {
-  return Print(first, last, "%.*f", value, precision);
+to_chars_result to_chars(char* first, char* last, double value, chars_format format,
+                         int precision) {
+  array<char, 2048> text;  // 309 digits before the point, 1074 behind it
+  const int size =
+      format == chars_format::general
+          ? snprintf(text.data(), text.size(), "%.*g", precision, value)
+          : snprintf(text.data(), text.size(), format == chars_format::fixed ? "%.*f" : "%.*e",
+                     precision, value);
+  if (last - first < size) return {last, errc::value_too_large};
+  return {copy_n(text.data(), size, first), errc()};
 }
 
-to_chars_result __d2exp_buffered_n(char* first, char* last, double value, uint32_t precision) {
-  return Print(first, last, "%.*e", value, precision);
+/// Writes the fewest decimals that are read as the same value.
+to_chars_result to_chars(char* first, char* last, double value, chars_format format) {
+  for (int decimals = 0;; ++decimals) {
+    const auto result = to_chars(first, last, value, format, decimals);
+    if (result.ec != errc() || isnan(value)) return result;
+    if (ReadDouble(first, result.ptr, format).__value == value) return result;
+  }
+}
+
+/// Writes the shorter notation.
+to_chars_result to_chars(char* first, char* last, double value) {
+  array<char, 32> text;
+  const auto scientific = to_chars(text.begin(), text.end(), value, chars_format::scientific);
+  const auto fixed = to_chars(first, last, value, chars_format::fixed);
+  const ptrdiff_t size = scientific.ptr - text.begin();
+  if (fixed.ec == errc() && fixed.ptr - first <= size) return fixed;
+  if (last - first < size) return fixed;
+  return {copy_n(text.begin(), size, first), errc()};
 }
 
 _LIBCPP_END_NAMESPACE_STD
