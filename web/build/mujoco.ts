@@ -36,6 +36,12 @@ const METHOD_CALLER = `(obj, func, destructorsRef, args) => {
 const REPLACEMENTS: [string, string][] = [
   ['new Function(...args, invokerFnBody)(...closureArgs)', INVOKER],
   ['new Function(...params, functionBody)(...args)', METHOD_CALLER],
+  // Code for Node, and checks of the calling code.
+  [
+    "var ENVIRONMENT_IS_NODE = typeof process == 'object' && process.versions?.node && process.type != 'renderer'",
+    'const ENVIRONMENT_IS_NODE = false',
+  ],
+  ['function assert(', '/* @__NO_SIDE_EFFECTS__ */ function assert('],
   // Messages for those who use what the build leaves out.
   ['missingLibrarySymbols.forEach(missingLibrarySymbol)', ''],
   ['unexportedSymbols.forEach(unexportedRuntimeSymbol);', ''],
