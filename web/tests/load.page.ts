@@ -3,7 +3,7 @@ import type { Page, Response } from '@playwright/test';
 import { gzipSync } from 'node:zlib';
 import { open, test } from './page';
 
-test('the page loads at most 2.33 MB compressed, and asks no other host', async ({ page }) => {
+test('the page loads at most 2.3 MB compressed, and asks no other host', async ({ page }) => {
   const responses: Response[] = [];
   page.on('response', (response) => responses.push(response));
   const hosts = new Set<string>();
@@ -17,7 +17,7 @@ test('the page loads at most 2.33 MB compressed, and asks no other host', async 
   const bodies = await Promise.all(responses.map((response) => response.body()));
   const sizes = bodies.map((body) => gzipSync(body).length);
   expect(sizes.length).toBeGreaterThan(4);
-  expect(sizes.reduce((sum, size) => sum + size, 0)).toBeLessThan(2.33e6);
+  expect(sizes.reduce((sum, size) => sum + size, 0)).toBeLessThan(2.3e6);
 });
 
 test('the pendulum swings before the default agent and MuJoCo have loaded, then continues with them', async ({
