@@ -19,19 +19,54 @@ const CHARTS = [
   /^likeliest \d+%, V −?\d+\.\d$/,
 ];
 
-test('an actor has its own chart, and Q-values return with a Q-network', async ({
+const SIZES = [
+  [320, 568],
+  [390, 844],
+  [844, 390],
+  [768, 1024],
+  [1024, 768],
+  [1440, 900],
+] as const;
+
+/// At any size the chart with its numbers and the pendulum are visible together.
+async function expectFits(page: Page): Promise<void> {
+  for (const [width, height] of SIZES) {
+    await page.setViewportSize({ width, height });
+    const seen = await page.evaluate(async () => {
+      await globalThis.drawn(); // drawings adapt to the size a frame later
+      document.getElementById('stage')!.scrollIntoView({ behavior: 'instant' });
+      const caption = document.querySelector('#q-figure figcaption')!;
+      const figure = document.getElementById('q-figure')!.getBoundingClientRect();
+      return {
+        scrolls: document.documentElement.scrollWidth > innerWidth,
+        cut: caption.scrollWidth > caption.clientWidth,
+        inside: figure.left >= 0 && figure.right <= innerWidth,
+        lines: Math.round(caption.clientHeight / parseFloat(getComputedStyle(caption).lineHeight)),
+      };
+    });
+    expect(seen, `${width} × ${height}`).toEqual({
+      scrolls: false,
+      cut: false,
+      inside: true,
+      lines: 1,
+    });
+  }
+}
+
+test('an actor has its own chart at any size, and Q-values return with a Q-network', async ({
   stage: page,
 }) => {
   await open(page);
   await expect(page.locator('#q-name')).toHaveText('Q-values');
   for (const [i, file] of actorFiles().entries()) {
     await bring(page, file);
-    await expect(page.locator('#message')).toBeHidden();
+    await expect(page.locator('#message-text')).toContainText('is the agent now');
     await expect(page.locator('#q-value')).toHaveText(CHARTS[i]!);
     await expect(page.locator('#q-name')).toHaveText('Policy');
     await expect(page.locator('#q')).toHaveAccessibleName(/^Policy: /);
     await expect(page.locator('#agent-text')).toContainText(' policy 8-');
     await expect(page.locator('label[for=torque_limit]')).toContainText('agent: ±5');
+    if (i === 0 || i === 3) await expectFits(page); // the others' numbers are as long or shorter
     await page.locator('#agent').selectOption('d3qn');
     await expect(page.locator('#q-name')).toHaveText('Q-values');
     await expect(page.locator('#q-value')).toHaveText(/^the worst torque costs /);
@@ -46,7 +81,7 @@ test('the curve is centred on its mean, and moves with the observation', async (
   /// Place of the mean's line (0 left, 1 right), and the painted share of the chart.
   const chart = () =>
     page.evaluate(async () => {
-      for (let k = 0; k < 4; ++k) await new Promise(requestAnimationFrame);
+      await globalThis.drawn();
       const canvas = document.getElementById('q') as HTMLCanvasElement;
       const { width, height } = canvas;
       const { data } = canvas.getContext('2d')!.getImageData(0, 0, width, height);
@@ -101,51 +136,6 @@ test('its torque equals that of `upswing simulate`', async ({ stage: page }, inf
     // So that the arrival of the next one is visible.
     await page.locator('#agent').selectOption('d3qn');
     await expect(page.locator('#agent')).toHaveValue('d3qn');
-  }
-});
-
-const SIZES = [
-  [320, 568],
-  [390, 844],
-  [844, 390],
-  [768, 1024],
-  [1024, 768],
-  [1440, 900],
-] as const;
-
-test('at any size the chart with its numbers and the pendulum are visible together', async ({
-  stage: page,
-}) => {
-  await open(page);
-  for (const file of actorFiles()) {
-    await bring(page, file);
-    await expect(page.locator('#q-name')).toHaveText('Policy');
-    for (const [width, height] of SIZES) {
-      await page.setViewportSize({ width, height });
-      const seen = await page.evaluate(async () => {
-        await document.fonts.ready;
-        // Drawings adapt to the size a frame later.
-        for (let k = 0; k < 3; ++k) await new Promise(requestAnimationFrame);
-        document.getElementById('stage')!.scrollIntoView({ behavior: 'instant' });
-        const caption = document.querySelector('#q-figure figcaption')!;
-        const figure = document.getElementById('q-figure')!.getBoundingClientRect();
-        return {
-          scrolls: document.documentElement.scrollWidth > innerWidth,
-          cut: caption.scrollWidth > caption.clientWidth,
-          inside: figure.left >= 0 && figure.right <= innerWidth,
-          lines: Math.round(
-            caption.clientHeight / parseFloat(getComputedStyle(caption).lineHeight),
-          ),
-        };
-      });
-      expect(seen, `${width} × ${height}`).toEqual({
-        scrolls: false,
-        cut: false,
-        inside: true,
-        lines: 1,
-      });
-    }
-    await page.locator('#agent').selectOption('d3qn');
   }
 });
 

@@ -1,6 +1,6 @@
 import { expect } from '@playwright/test';
 import type { QDecision } from '../src/decision';
-import { advance, balanced, largestDifference, open, run, startFrom, test } from './page';
+import { advance, balanced, largestDifference, open, run, shift, startFrom, test } from './page';
 import { policyPath, simulate } from './program';
 
 test('the agent swings up and balances when it is switched on', async ({ stage: page }) => {
@@ -72,19 +72,42 @@ test('a link brings controllers that were not learned', async ({ stage: page }) 
   await expect(page).toHaveURL(/agent=mpc&twin=mpc/);
 });
 
-test('the last of two requested agents counts', async ({ page }) => {
+test('agents that come late or never disturb nothing', async ({ page }) => {
+  await page.setViewportSize({ width: 844, height: 390 });
   await open(page);
-  await page.route(/dueling-dqn\.safetensors$/, async (route) => {
-    await new Promise((resolve) => setTimeout(resolve, 500));
+  await page.waitForLoadState('networkidle');
+  expect(await shift(page)).toBeLessThan(0.05);
+  // A link with a slow agent does not disturb the link opened after it.
+  let arrive = () => {};
+  const late = new Promise<void>((resolve) => (arrive = resolve));
+  await page.route(/(sac|dueling-dqn)\.safetensors$/, async (route) => {
+    await late;
     await route.continue();
   });
-  const slow = page.waitForResponse(/dueling-dqn\.safetensors$/);
+  await page.evaluate(() => void upswing.open('#agent=sac'));
+  await page.evaluate(() => upswing.open('#agent=d3qn'));
+  await startFrom(page, 1.5);
+  // The last of two requested agents counts.
   await page.locator('#agent').selectOption('dueling-dqn');
   await page.locator('#agent').selectOption('fast');
-  await (await slow).finished();
-  await page.waitForTimeout(200);
+  const answers = ['sac', 'dueling-dqn'].map((id) => page.waitForResponse(`**/${id}.safetensors`));
+  arrive();
+  for (const answer of answers) await (await answer).finished();
+  await page.evaluate(() =>
+    Promise.all(['sac', 'dueling-dqn'].map((id) => upswing.agents.get(id))),
+  );
   await expect(page.locator('#agent')).toHaveValue('fast');
   expect(await page.evaluate(() => upswing.world.policy!.controller.text)).toContain('8-48-32');
+  expect(await page.evaluate(() => upswing.world.state.q1)).toBe(1.5);
+
+  // A missing second agent is reported.
+  await open(page, '#agent=fast&twin=none');
+  await expect(page.locator('#message')).toContainText('unknown agent "none"');
+  await page.route(/ppo\.safetensors$/, (route) => route.fulfill({ status: 200, body: 'broken' }));
+  await page.getByLabel('Second agent').selectOption('ppo');
+  await expect(page.locator('#message')).toContainText('Agent "ppo" cannot be used');
+  await expect(page.locator('#twin-scene')).toBeHidden();
+  await expect(page.getByLabel('Second agent')).toHaveValue('');
 });
 
 test('a posed pendulum is judged at once', async ({ stage: page }) => {

@@ -20,24 +20,6 @@ test('pause stands still, step goes on by 0.02 s, reset hangs', async ({ stage: 
   await expect.poll(() => page.evaluate(time)).toBeGreaterThan(stopped + 0.1);
 });
 
-test('a link with a slow agent does not disturb the link opened after it', async ({ page }) => {
-  await open(page);
-  let arrive = () => {};
-  const late = new Promise<void>((resolve) => (arrive = resolve));
-  await page.route(/sac\.safetensors$/, async (route) => {
-    await late;
-    await route.continue();
-  });
-  await page.evaluate(() => void upswing.open('#agent=sac'));
-  await page.evaluate(() => upswing.open('#agent=d3qn'));
-  await startFrom(page, 1.5);
-  const answer = page.waitForResponse(/sac\.safetensors$/);
-  arrive();
-  await (await answer).finished();
-  await page.evaluate(() => upswing.choose('sac')); // it has loaded by now
-  expect(await page.evaluate(() => upswing.world.state.q1)).toBe(1.5);
-});
-
 test('speed', async ({ stage: page }) => {
   await open(page);
   const rate = async () => {
@@ -156,14 +138,6 @@ test('the trail shows the last 20 s, at any frame rate and speed', async ({ stag
   expect(Math.max(...long)).toBeCloseTo(20, 9);
 });
 
-test("a visitor's own policy", async ({ stage: page }) => {
-  await open(page);
-  await page.locator('#file').setInputFiles(policyPath('fast'));
-  await expect(page.locator('#agent')).toHaveValue('own');
-  await expect(page.locator('#agent-text')).toContainText('8-48-32');
-  await expect(page.locator('#message')).toBeHidden();
-});
-
 test('a policy dropped on the page', async ({ stage: page }) => {
   await open(page);
   const bytes = [...readFileSync(policyPath('fast'))];
@@ -230,21 +204,4 @@ test('dark where the system is dark, on canvases too', async ({ stage: page }) =
   await page.emulateMedia({ colorScheme: 'dark' });
   await expect.poll(colors).not.toContain(light[0]);
   await expect.poll(colors).not.toContain(light[1]);
-});
-
-test('on a phone everything fits its width, and the agent can be switched on', async ({
-  browser,
-}) => {
-  const context = await browser.newContext({
-    viewport: { width: 360, height: 740 },
-    hasTouch: true,
-    isMobile: true,
-  });
-  const page = await context.newPage();
-  await open(page);
-  const widths = await page.evaluate(() => [document.body.scrollWidth, innerWidth]);
-  expect(widths[0]).toBeLessThanOrEqual(widths[1]!);
-  await page.locator('#agent-on').tap();
-  await expect(page.locator('#badge')).toHaveText(/swinging up|balanced/);
-  await context.close();
 });

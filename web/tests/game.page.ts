@@ -146,8 +146,12 @@ test('every step and view offers a film, MP4 first, with title and address', asy
     document.querySelector<HTMLElement>('#tour-buttons .film')!.click();
     await new Promise((resolve) => setTimeout(resolve, 500));
     CanvasRenderingContext2D.prototype.fillText = fillText;
+    const now = performance.now.bind(performance);
+    performance.now = () => now() + 5000; // the film ends
     return [...drawn];
   });
   expect(await texts).toEqual(['Shove it', new URL(page.url()).host]);
   expect((await download).suggestedFilename()).toBe(`upswing.${type}`);
+  await expect(page.locator('#tour-buttons .film')).toHaveText('Film 5 s');
+  await page.evaluate(() => delete (performance as Partial<Performance>).now);
 });

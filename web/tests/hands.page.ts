@@ -138,30 +138,3 @@ test('while paused, dragging sets the start', async ({ stage: page }) => {
   expect(posed.q1 + posed.q2).toBeCloseTo(-Math.PI, 1);
   expect([posed.w1, posed.w2]).toEqual([0, 0]);
 });
-
-test('a finger on the pendulum does not scroll', async ({ browser }) => {
-  const context = await browser.newContext({
-    hasTouch: true,
-    viewport: { width: 390, height: 700 },
-  });
-  const page = await context.newPage();
-  await open(page);
-  const prevented = () =>
-    page.evaluate(() => {
-      const canvas = document.getElementById('scene')!;
-      const { left, top, width, height } = canvas.getBoundingClientRect();
-      return [0, 0.45 * width].map((aside) => {
-        const touch = new Touch({
-          identifier: 1,
-          target: canvas,
-          clientX: left + width / 2 + aside,
-          clientY: top + height / 2 + 60,
-        });
-        const event = new TouchEvent('touchstart', { changedTouches: [touch], cancelable: true });
-        return !canvas.dispatchEvent(event);
-      });
-    });
-  // On a slow machine the canvas changes its size even after the page is ready.
-  await expect.poll(prevented).toEqual([true, false]);
-  await context.close();
-});

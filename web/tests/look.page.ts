@@ -1,37 +1,11 @@
 import { expect } from '@playwright/test';
-import type { Page } from '@playwright/test';
 import { onScreen, open, startFrom, test } from './page';
 
 /// Typefaces, numbers, nouns, and the page's card on other sites.
 
-/// Layout shift since the page was opened.
-async function shift(page: Page): Promise<number> {
-  return page.evaluate(
-    () =>
-      new Promise<number>((resolve) => {
-        let sum = 0;
-        new PerformanceObserver((list) => {
-          for (const entry of list.getEntries()) sum += (entry as never as { value: number }).value;
-        }).observe({ type: 'layout-shift', buffered: true });
-        setTimeout(() => resolve(sum), 1000);
-      }),
-  );
-}
-
-for (const [width, height] of [
-  [1440, 900],
-  [844, 390],
-  [390, 844],
-] as const) {
-  test(`nothing moves while everything loads, at ${width} × ${height}`, async ({ page }) => {
-    await page.setViewportSize({ width, height });
-    await open(page);
-    await page.waitForLoadState('networkidle');
-    expect(await shift(page)).toBeLessThan(0.05);
-  });
-}
-
-test('the page uses its own two typefaces, with their licence next to them', async ({ page }) => {
+test('the page uses its own two typefaces, with their licence next to them', async ({
+  stage: page,
+}) => {
   await open(page);
   const loaded = await page.evaluate(async () => {
     await document.fonts.ready;
@@ -75,7 +49,7 @@ test('a noun lights its thing, under a mouse and from a tap to the next', async 
   expect(new Set(colors).size).toBe(4);
 });
 
-test("the page's card is 1200 × 630, at most 150 kB", async ({ page }) => {
+test("the page's card is 1200 × 630, at most 150 kB", async ({ stage: page }) => {
   await open(page);
   const card = page.locator('meta[property="og:image"]');
   const response = await page.request.get((await card.getAttribute('content'))!);

@@ -23,21 +23,26 @@ const ofPlant = (plant: Record<string, number>) =>
 const bring = (page: Page, buffer: Buffer, name = 'mine.safetensors') =>
   page.locator('#file').setInputFiles({ name, mimeType: '', buffer });
 
-test('a reload keeps it, until it is removed', async ({ stage: page }) => {
+test('a reload keeps it, until it is removed; other kept data is ignored', async ({
+  stage: page,
+}) => {
   await open(page);
   await expect(page.locator('#own')).toBeHidden();
-  await page.locator('#file').setInputFiles(policyPath('fast'));
+  const name = 'learned here, mine';
+  await bring(page, Buffer.from(readPolicy('fast')), name);
   await expect(page.locator('#agent')).toHaveValue('own');
-  await expect(page.locator('#own')).toContainText('fast.safetensors stays in this browser');
+  await expect(page.locator('#message-text')).toContainText('is the agent now');
+  await expect(page.locator('#own')).toContainText(`${name} stays in this browser`);
+  // The page's policies never replace a visitor's file, whatever its name.
+  expect(await page.evaluate(() => upswing.agents.ownIsLearned)).toBe(false);
   await expect(page).toHaveURL(/agent=own/);
   await page.reload();
   await expect(page.locator('#agent-on')).toBeEnabled();
   await expect(page.locator('#agent')).toHaveValue('own');
-  await expect(page.locator('#agent option:checked')).toHaveText('fast.safetensors (yours)');
+  await expect(page.locator('#agent option:checked')).toHaveText(`${name} (yours)`);
   await expect(page.locator('#agent-text')).toContainText('8-48-32');
   await expect(page.locator('#message')).toBeHidden();
   // Without settings the page begins with the default agent, and still offers the visitor's own.
-  await page.goto('about:blank');
   await open(page);
   await expect(page.locator('#agent')).toHaveValue('d3qn');
   await page.locator('#agent').selectOption('own');
@@ -46,10 +51,30 @@ test('a reload keeps it, until it is removed', async ({ stage: page }) => {
   await page.getByRole('button', { name: 'Remove it' }).click();
   await expect(page.locator('#agent')).toHaveValue('d3qn');
   await expect(page.locator('#own')).toBeHidden();
+  /// The number of kept files, before a file that is too large for a policy is kept.
+  const before = await page.evaluate(
+    () =>
+      new Promise<number>((resolve, reject) => {
+        const request = indexedDB.open('upswing');
+        request.onsuccess = () => {
+          const transaction = request.result.transaction('files', 'readwrite');
+          const files = transaction.objectStore('files');
+          const count = files.count();
+          files.put({ name: 'large', bytes: new ArrayBuffer((16 << 20) + 1) }, 'own');
+          transaction.oncomplete = () => {
+            request.result.close();
+            resolve(count.result);
+          };
+          transaction.onerror = () => reject(transaction.error!);
+        };
+      }),
+  );
+  expect(before).toBe(0);
   await page.goto('about:blank');
   await open(page, '#agent=own');
   await expect(page.locator('#message')).toContainText('sender’s own policy');
   await expect(page.locator('#agent option[value=own]')).toHaveCount(0);
+  expect(await page.evaluate(() => upswing.agents.ownName)).toBeNull();
 });
 
 test('a link for others has no agent of your own', async ({ stage: page }) => {
@@ -69,55 +94,24 @@ test('a link for others has no agent of your own', async ({ stage: page }) => {
     .toMatch(/#everything$/);
 });
 
-test('kept data that cannot be a policy is ignored', async ({ page }) => {
-  await open(page);
-  await page.locator('#file').setInputFiles({
-    ...{ name: 'learned here, mine', mimeType: '' },
-    buffer: Buffer.from(readPolicy('fast')),
-  });
-  await expect(page.locator('#own')).toContainText('learned here, mine');
-  // The page's policies never replace a visitor's file, whatever its name.
-  expect(await page.evaluate(() => upswing.agents.ownIsLearned)).toBe(false);
-  await page.evaluate(
-    () =>
-      new Promise<void>((resolve, reject) => {
-        const request = indexedDB.open('upswing');
-        request.onsuccess = () => {
-          const transaction = request.result.transaction('files', 'readwrite');
-          const bytes = new ArrayBuffer((16 << 20) + 1);
-          transaction.objectStore('files').put({ name: 'large', bytes }, 'own');
-          transaction.oncomplete = () => resolve();
-          transaction.onerror = () => reject(transaction.error!);
-        };
-      }),
-  );
-  await page.goto('about:blank');
-  await open(page);
-  expect(await page.evaluate(() => upswing.agents.ownName)).toBeNull();
-});
-
-test('a browser that keeps nothing still runs the policy', async ({ page }) => {
-  await page.addInitScript(() => {
-    const refuse = () => {
-      throw new DOMException('private', 'SecurityError');
-    };
-    IDBFactory.prototype.open = refuse;
-    Storage.prototype.getItem = Storage.prototype.setItem = refuse;
-  });
+test('without storage, and with a database that never answers, the page runs the policy', async ({
+  page,
+}) => {
+  const refuse = () => {
+    throw new DOMException('private', 'SecurityError');
+  };
+  await page.addInitScript(`{
+    Storage.prototype.getItem = Storage.prototype.setItem = ${refuse};
+    IDBFactory.prototype.open = () => ({}); // never answers
+    const later = setTimeout;
+    setTimeout = (call, ms) => later(call, ms / 20); // the page waits 3 s
+  }`);
   await open(page);
   await page.locator('#file').setInputFiles(policyPath('fast'));
   await expect(page.locator('#agent')).toHaveValue('own');
+  await page.evaluate(`IDBFactory.prototype.open = ${refuse}`);
   await page.getByRole('button', { name: 'Remove it' }).click();
   await expect(page.locator('#agent')).toHaveValue('d3qn');
-});
-
-test('a database that never answers does not stop the page', async ({ page }) => {
-  await page.addInitScript(() => {
-    IDBFactory.prototype.open = () => ({}) as IDBOpenDBRequest;
-  });
-  await open(page);
-  await page.locator('#file').setInputFiles(policyPath('fast'));
-  await expect(page.locator('#agent')).toHaveValue('own');
 });
 
 test('a plant with a parameter of 0 is refused, and the charts go on', async ({ stage: page }) => {
@@ -137,7 +131,7 @@ test('Q-values that are not finite do not spoil the chart for later ones', async
   await page.locator('#pause').click();
   const painted = () =>
     page.evaluate(async () => {
-      for (let k = 0; k < 4; ++k) await new Promise(requestAnimationFrame);
+      await globalThis.drawn();
       const canvas = document.getElementById('q') as HTMLCanvasElement;
       const { data } = canvas
         .getContext('2d')!
@@ -161,7 +155,7 @@ test('sliders extend to a plant or link beyond their range', async ({ stage: pag
   const plant = { mass1: 5, length2: 2, gravity: 60, mass2: 0.01, torque_limit: 400 };
   await bring(page, ofPlant(plant));
   await expect(page.locator('#agent')).toHaveValue('own');
-  await expect(page.locator('#message')).toBeHidden();
+  await expect(page.locator('#message-text')).toContainText('is the agent now');
   const shown = async () => {
     for (const [name, value] of Object.entries(plant)) {
       const slider = page.locator(`#${name}`);

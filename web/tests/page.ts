@@ -8,11 +8,38 @@ function drawSeldom(): void {
   const { requestAnimationFrame: soon } = globalThis;
   const waiting: FrameRequestCallback[] = [];
   globalThis.requestAnimationFrame = (draw) => waiting.push(draw);
+  const drawAll = () => {
+    for (const draw of waiting.splice(0)) soon(draw);
+  };
   setInterval(() => {
     // Draws nothing while the stage waits for its next test.
-    if (document.body?.inert) return;
-    for (const draw of waiting.splice(0)) soon(draw);
+    if (!document.body?.inert) drawAll();
   }, 100);
+  globalThis.drawn = async () => {
+    for (let k = 0; k < 4; ++k) {
+      drawAll();
+      await new Promise(soon);
+    }
+  };
+}
+
+declare global {
+  var drawn: () => Promise<void>;
+  var keepTime: (() => void) | undefined; // undoes hurryTimers()
+}
+
+/// Waits until earlier changes are laid out and drawn.
+export const drawn = (page: Page) => page.evaluate(() => globalThis.drawn());
+
+/// Timers that the page starts from now on run this many times as fast.
+export function hurryTimers(page: Page, times: number): Promise<void> {
+  return page.evaluate((times) => {
+    const { setTimeout: later, setInterval: often } = globalThis;
+    globalThis.setTimeout = ((call: TimerHandler, ms = 0) => later(call, ms / times)) as never;
+    globalThis.setInterval = ((call: TimerHandler, ms = 0) => often(call, ms / times)) as never;
+    globalThis.keepTime = () =>
+      void Object.assign(globalThis, { setTimeout: later, setInterval: often });
+  }, times);
 }
 
 /// Collects errors and warnings that a context's pages write to the console.
@@ -37,16 +64,14 @@ interface Kept {
 ///
 /// `page` has its own browser context, and open() loads it. Tests that are not about loading take
 /// `stage`: one page for all tests of a Playwright worker, which open() only resets. Loading takes
-/// twenty times as long. With `smooth`, `page` draws at each frame of the screen.
+/// twenty times as long.
 interface Options {
   complains: boolean;
-  smooth: boolean;
 }
 export const test = base.extend<Options & { stage: Page }, { kept: Kept }>({
   complains: [false, { option: true }],
-  smooth: [false, { option: true }],
-  context: async ({ context, complains, smooth }, use) => {
-    if (!smooth) await context.addInitScript(drawSeldom);
+  context: async ({ context, complains }, use) => {
+    await context.addInitScript(drawSeldom);
     const complaints = complaintsOf(context);
     await use(context);
     if (!complains) expect(complaints).toEqual([]);
@@ -82,6 +107,7 @@ async function setBack(page: Page): Promise<void> {
   await page.emulateMedia({ colorScheme: null, forcedColors: null, reducedMotion: null });
   await page.evaluate(async () => {
     document.body.inert = false;
+    globalThis.keepTime?.();
     localStorage.clear();
     delete document.documentElement.dataset.theme;
     for (const details of document.querySelectorAll('details')) {
@@ -147,6 +173,20 @@ export async function startFrom(page: Page, q1: number, q2 = 0, w1 = 0, w2 = 0):
   await page.evaluate((s) => upswing.world.reset(s), { q1, q2, w1, w2 });
 }
 
+/// Layout shift since the page was opened.
+export async function shift(page: Page): Promise<number> {
+  return page.evaluate(
+    () =>
+      new Promise<number>((resolve) => {
+        let sum = 0;
+        new PerformanceObserver((list) => {
+          for (const entry of list.getEntries()) sum += (entry as never as { value: number }).value;
+        }).observe({ type: 'layout-shift', buffered: true });
+        setTimeout(() => resolve(sum), 1000);
+      }),
+  );
+}
+
 /// How long (s) both links have been upright; 0 if they are not.
 export function balanced(page: Page): Promise<number> {
   return page.evaluate(() => upswing.world.uprightFor ?? 0);
@@ -168,11 +208,14 @@ export async function slide(page: Page, id: string, value: number): Promise<void
 }
 
 /// Place of a point of the pendulum's plane (m) on the screen.
-export function onScreen(page: Page, x: number, z: number): Promise<{ x: number; y: number }> {
+export async function onScreen(
+  page: Page,
+  x: number,
+  z: number,
+): Promise<{ x: number; y: number }> {
+  await drawn(page);
   return page.evaluate(
-    async (point) => {
-      // Waits until earlier changes are laid out and drawn.
-      for (let k = 0; k < 3; ++k) await new Promise(requestAnimationFrame);
+    (point) => {
       const { left, top } = document.getElementById('scene')!.getBoundingClientRect();
       const [px, py] = upswing.scene.at(point);
       return { x: left + px, y: top + py };

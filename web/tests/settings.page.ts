@@ -121,30 +121,6 @@ test('settings are restored after a look at the tour', async ({ stage: page }) =
   await expect(page.locator('#gravity')).toHaveValue('14');
 });
 
-test('a swipe over a slider scrolls and changes nothing', async ({ browser }) => {
-  const context = await browser.newContext({
-    ...{ hasTouch: true, isMobile: true, viewport: { width: 390, height: 700 } },
-  });
-  const page = await context.newPage();
-  await open(page);
-  const slider = page.locator('#gravity');
-  await slider.scrollIntoViewIfNeeded();
-  const { x, y, width } = (await slider.boundingBox())!;
-  const session = await context.newCDPSession(page);
-  const before = await page.evaluate(() => scrollY);
-  const touch = (type: 'touchStart' | 'touchMove', moved: number) =>
-    session.send('Input.dispatchTouchEvent', {
-      type,
-      touchPoints: [{ x: x + 0.9 * width, y: y + 5 - moved }],
-    });
-  await touch('touchStart', 0);
-  for (let moved = 12; moved < 150; moved += 12) await touch('touchMove', moved);
-  await session.send('Input.dispatchTouchEvent', { type: 'touchEnd', touchPoints: [] });
-  await expect.poll(() => page.evaluate(() => scrollY)).toBeGreaterThan(before + 50);
-  await expect(slider).toHaveValue('9.81');
-  await context.close();
-});
-
 test('invalid parts of an address are reported, and the rest is used', async ({ stage: page }) => {
   await open(page, '#agent=none&mass1=-3&mass2=1.5&colour=red');
   const message = page.locator('#message');

@@ -63,16 +63,6 @@ test('a link sets both agents, and only the adaptive one balances', async ({ sta
   await expect(page.locator('#twin-badge')).toHaveText(/balanced for/);
 });
 
-test('a missing second agent is reported', async ({ page }) => {
-  await open(page, '#agent=fast&twin=none');
-  await expect(page.locator('#message')).toContainText('unknown agent "none"');
-  await page.route(/ppo\.safetensors$/, (route) => route.fulfill({ status: 200, body: 'broken' }));
-  await page.getByLabel('Second agent').selectOption('ppo');
-  await expect(page.locator('#message')).toContainText('Agent "ppo" cannot be used');
-  await expect(page.locator('#twin-scene')).toBeHidden();
-  await expect(page.getByLabel('Second agent')).toHaveValue('');
-});
-
 test('at any size both are fully visible', async ({ stage: page }) => {
   await open(page, '#agent=fast&twin=sac');
   for (const [width, height] of [
