@@ -2,6 +2,8 @@ import type { Neurons } from '../neurons';
 import { Canvas } from './canvas';
 
 const LEFT = 84; // px, for the names of the rows
+const NARROW = 360; // px, width below which counts have two lines
+const NARROW_LEFT = 58; // px, for those
 /// Names of the inputs, each over a number of them.
 const INPUTS = [
   ['upper', 3],
@@ -11,7 +13,7 @@ const INPUTS = [
 const NAMED = 8; // inputs with these names
 const NAMES = 16; // px, above the inputs
 const GAP = 4; // px, between rows
-const LINE = 11; // px, lowest row with its own name
+const LINE = 11; // px, lowest row with its own name, and a line of it
 const EASE = 0.3; // share of the way to a new brightness, at each drawing
 const FADE = 0.98; // factor of a row's reference brightness per drawing
 
@@ -42,22 +44,36 @@ export class NeuronChart {
     const height = (canvas.height - named - GAP * (layers.length - 1)) / layers.length;
     layers.forEach((layer, i) => {
       const y = named + i * (height + GAP);
-      const name = i === 0 ? `${layer.length} inputs` : `${layer.length} neurons`;
-      if (height >= LINE || i === 0) canvas.text(name, LEFT - 8, y + height / 2, 'right');
+      const name = [`${layer.length}`, i === 0 ? 'inputs' : 'neurons'];
+      if (height >= LINE || i === 0) this.nameRow(name, y, height);
       this.drawRow(layer, this.rows[i]!, y, height);
     });
     if (height >= LINE) return;
     const middle = (named + height + canvas.height) / 2;
-    canvas.text('neurons', LEFT - 8, middle, 'right');
+    canvas.text('neurons', this.left - 8, middle, 'right');
+  }
+
+  private get left(): number {
+    return this.canvas.width < NARROW ? NARROW_LEFT : LEFT;
+  }
+
+  /// A count and a noun next to a row: on one line, or on two lines, or the count.
+  private nameRow([count, noun]: string[], y: number, height: number): void {
+    const isNarrow = this.left < LEFT && noun === 'neurons';
+    const lines = !isNarrow ? [`${count} ${noun}`] : height < 3 * LINE ? [count!] : [count!, noun!];
+    const first = y + height / 2 - ((lines.length - 1) * (LINE + 3)) / 2;
+    lines.forEach((line, k) =>
+      this.canvas.text(line, this.left - 8, first + k * (LINE + 3), 'right'),
+    );
   }
 
   /// Each name above its inputs.
   private nameInputs(): void {
-    const { canvas } = this;
-    const width = (canvas.width - LEFT) / NAMED;
+    const { canvas, left } = this;
+    const width = (canvas.width - left) / NAMED;
     let k = 0;
     for (const [name, count] of INPUTS) {
-      const middle = LEFT + (k + count / 2) * width;
+      const middle = left + (k + count / 2) * width;
       const last = k + count === NAMED;
       canvas.text(name, last ? canvas.width : middle, NAMES / 2, last ? 'right' : 'center');
       k += count;
@@ -65,11 +81,11 @@ export class NeuronChart {
   }
 
   private drawRow(layer: Float32Array, row: Row, y: number, height: number): void {
-    const { canvas } = this;
+    const { canvas, left } = this;
     const { context } = canvas;
-    const width = (canvas.width - LEFT) / layer.length;
+    const width = (canvas.width - left) / layer.length;
     const space = width > 8 ? 2 : width > 3 ? 1 : 0;
-    canvas.rectangle(LEFT, y, canvas.width - LEFT, height, 'bar');
+    canvas.rectangle(left, y, canvas.width - left, height, 'bar');
     row.most = Math.max(FADE * row.most, 1e-6, ...layer.map(Math.abs));
     layer.forEach((value, k) => {
       row.shown[k]! += EASE * (value / row.most - row.shown[k]!);
@@ -77,7 +93,7 @@ export class NeuronChart {
       if (share < 0.02) return;
       context.globalAlpha = Math.min(1, share);
       const color = row.shown[k]! > 0 ? 'torque' : 'below';
-      canvas.rectangle(LEFT + k * width + space / 2, y, width - space, height, color);
+      canvas.rectangle(left + k * width + space / 2, y, width - space, height, color);
     });
     context.globalAlpha = 1;
   }
