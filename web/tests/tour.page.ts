@@ -247,15 +247,18 @@ test('the bars show the expected reward, and the highest is taken', async ({ sta
   // Its neurons are above the bars and change with the observation.
   const neurons = page.locator('#neurons');
   await expect(neurons).toBeVisible();
-  const picture = () => neurons.evaluate((canvas: HTMLCanvasElement) => canvas.toDataURL());
   await page.evaluate(() => upswing.reset());
   await advance(page, 0.1);
-  const settled = async () => {
-    let last = '';
-    const rests = async () => last === (last = await picture());
-    await expect.poll(rests, { intervals: [250] }).toBe(true);
-    return last;
-  };
+  /// The picture, once brightnesses rest.
+  const settled = () =>
+    neurons.evaluate(async (canvas: HTMLCanvasElement) => {
+      for (let last = ''; ;) {
+        await globalThis.drawn();
+        const picture = canvas.toDataURL();
+        if (picture === last) return picture;
+        last = picture;
+      }
+    });
   const before = await settled();
   await advance(page, 1);
   expect(await settled()).not.toBe(before);
