@@ -58,9 +58,15 @@ function filmTitle(page: Page): Promise<string[]> {
       if (!this.canvas.isConnected) drawn.add(given[0]); // the film's canvas is outside of the page
       fillText.apply(this, given);
     };
-    document.getElementById('learn-film')!.click();
-    await new Promise((resolve) => setTimeout(resolve, 500));
+    const film = document.getElementById('learn-film')!;
+    const label = film.textContent;
+    film.click();
+    await globalThis.drawn();
     CanvasRenderingContext2D.prototype.fillText = fillText;
+    const now = performance.now.bind(performance);
+    performance.now = () => now() + 5000; // the film ends
+    while (film.textContent !== label) await globalThis.drawn();
+    delete (performance as Partial<Performance>).now;
     return [...drawn];
   });
 }

@@ -88,21 +88,27 @@ test.describe('missing or broken parts are reported', () => {
   }
 
   test('without a policy the page runs, and offers the others', async ({ page }) => {
+    const message = page.locator('#message');
+    await page.route(/d3qn\.safetensors$/, (route) =>
+      route.fulfill({ status: 200, body: 'broken' }),
+    );
+    await page.goto('./#everything');
+    await expect(message).toContainText('Agent "d3qn" cannot be used');
+    await expect(message).toContainText('not a valid safetensors file');
+    await expect(page.locator('#agent-what')).toContainText('could not be loaded');
+    await expect(page.locator('#badge')).toHaveText('hanging');
+    await expect(page.locator('#agent-on')).toBeDisabled();
     for (const [answer, words] of [
-      [{ status: 200, body: 'broken' }, 'not a valid safetensors file'],
-      [{ status: 404 }, 'agents/d3qn.safetensors is missing'],
+      [{ status: 404 }, 'agents/dqn.safetensors is missing'],
       [null, 'cannot be fetched'],
     ] as const) {
       await page.unrouteAll();
-      await page.route(/d3qn\.safetensors$/, (route) =>
+      await page.route(/\bdqn\.safetensors$/, (route) =>
         answer ? route.fulfill(answer) : route.abort(),
       );
-      await page.goto('about:blank');
-      await page.goto('./#everything');
-      await expect(page.locator('#message')).toContainText('Agent "d3qn" cannot be used');
-      await expect(page.locator('#message')).toContainText(words);
-      await expect(page.locator('#agent-what')).toContainText('could not be loaded');
-      await expect(page.locator('#badge')).toHaveText('hanging');
+      await page.locator('#agent').selectOption('dqn');
+      await expect(message).toContainText('Agent "dqn" cannot be used');
+      await expect(message).toContainText(words);
       await expect(page.locator('#agent-on')).toBeDisabled();
     }
     await page.locator('#agent').selectOption('fast');

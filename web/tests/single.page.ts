@@ -47,8 +47,6 @@ test('one file holds the page: without a server or a network it balances, and it
   await page.evaluate(() => (location.hash = '#write'));
   await page.locator('#write-run').click();
   await expect.poll(() => page.evaluate(() => Math.abs(upswing.world.byHand))).toBe(5);
-  await page.locator('#write-score').click();
-  await expect(page.locator('#write-own')).toContainText('Yours');
   expect(asked.filter((one) => !['file:', 'blob:', 'data:'].includes(one))).toEqual([]);
 });
 
@@ -59,7 +57,7 @@ async function learned(): Promise<string> {
   const { learn } = upswing as never as { learn: { session: Session | null; stop(): void } };
   for (;;) {
     learn.session?.hurry();
-    const found = learn.session?.checkpoints.find(({ step }) => step === 15_360);
+    const found = learn.session?.checkpoints.find(({ step }) => step === 6144);
     if (found) {
       learn.stop();
       return Array.from(new Uint8Array(found.file as ArrayBuffer)).join();
@@ -71,8 +69,8 @@ async function learned(): Promise<string> {
 test('in Firefox it learns the same bits as in Node', async () => {
   test.skip(!firefox, 'no Firefox (UPSWING_FIREFOX, or one on the PATH)');
   const learner = new Learner(await Core.start(await coreModule()), 'fast', 1);
-  learner.run(480);
-  expect(learner.report().steps).toBe(15_360);
+  learner.run(192);
+  expect(learner.report()).toMatchObject({ steps: 6144, updates: 227 });
   const there = await inFirefox(`${address}#learn=fast&seed=1`, learned);
   expect(there).toBe(Array.from(new Uint8Array(learner.policy())).join());
 });
