@@ -14,7 +14,7 @@ test('on a phone nothing moves while the page loads, and fingers drag, scroll an
   const widths = await page.evaluate(() => [document.body.scrollWidth, innerWidth]);
   expect(widths[0]).toBeLessThanOrEqual(widths[1]!);
 
-  // A finger on the pendulum does not scroll, one beside it does.
+  // A finger on the pendulum does not scroll, one next to it does.
   const prevented = () =>
     page.evaluate(() => {
       const canvas = document.getElementById('scene')!;
