@@ -485,7 +485,7 @@ test("a finger holds the slider under the chart, and the numbers match the worke
 
   // Hidden in the tour, it waits.
   await page.getByRole('link', { name: 'Tour' }).click();
-  await expect(page.locator('#step-watch h2')).toBeVisible();
+  await expect(page.locator('html')).toHaveAttribute('data-view', 'tour');
   await page.getByRole('link', { name: 'Learn', exact: true }).click();
   await expect(status(page)).toHaveText(/^(Learning …|Solved after)/); // it went on
   await page.evaluate(() => upswing.learn.stop());
@@ -551,6 +551,7 @@ test('a race waits for a bet, trains both sides and can be shared', async ({ sta
   await expect(two).toHaveAttribute('aria-pressed', 'true');
   await expect(page.locator('#race-result')).toHaveText('0 of 6 trainings have ended.');
   await expect.poll(() => page.workers().length).toBe(6);
+  await expect(one).toBeDisabled(); // a second bet would start again
   await expect(page.getByRole('radio', { name: 'DQN, seed 9' })).toBeVisible();
   await expect(page).toHaveURL(/#learn=fast&seed=7&balance_weight=4&rival=dqn$/);
   await expect(page.locator('#race-name-0')).toHaveText('Dueling Double DQN (balance weight 4)');
@@ -559,6 +560,7 @@ test('a race waits for a bet, trains both sides and can be shared', async ({ sta
   await page.evaluate(() => upswing.learn.stop());
   await expect(page.locator('#race-result')).toHaveText('The race was ended.');
   await expect(page.locator('#learn-start')).toBeHidden();
+  await expect(one).toBeEnabled();
   await page.locator('#learn-rival').selectOption('');
   await expect(page.locator('#race')).toBeHidden();
   await expect(page.locator('#learn-start')).toBeVisible();

@@ -10,6 +10,7 @@ export class Lesson {
   private session: Session | null = null;
   private rewardScale = 1;
   private asked: Question | null = null; // waits for the visitor's guess, or has its answer
+  private readonly done = new Set<number>(); // updates that were asked about
 
   constructor() {
     button('lesson-up', () => this.answer(true));
@@ -19,7 +20,10 @@ export class Lesson {
 
   /// Call after each change. `rewardScale`: factor of the rewards in the agent's values.
   show(session: Session | null, rewardScale: number): void {
-    if (session !== this.session) this.asked = null;
+    if (session !== this.session) {
+      this.asked = null;
+      this.done.clear();
+    }
     [this.session, this.rewardScale] = [session, rewardScale];
     const example = session?.examples.at(-1);
     element('lesson').hidden = !example;
@@ -40,24 +44,25 @@ export class Lesson {
     if (!this.asked) this.next();
   }
 
-  /// Asks about the newest update; about recorded ones in turn if that is shown already or the
-  /// training has ended.
+  /// Asks about the newest update that was not asked about yet, if there is one with another answer
+  /// than the last.
   private next(): void {
-    const { session, rewardScale, asked } = this;
+    const { session, rewardScale, asked, done } = this;
     const all = session!.examples.flatMap((example) => questionOf(example, rewardScale) ?? []);
-    const newest = all.at(-1);
-    const at = all.findIndex(({ update }) => update === asked?.update);
-    this.asked = session!.running && newest?.update !== asked?.update ? newest! : all[at + 1]!;
-    this.asked ??= all[0] ?? null;
+    if (all.every(({ update }) => done.has(update))) done.clear();
+    const open = all.filter(({ update }) => !done.has(update)).reverse();
+    const other = open.find((question) => !asked || rises(question) !== rises(asked));
+    this.asked = other ?? open[0] ?? null;
+    if (this.asked) done.add(this.asked.update);
     element('lesson-question').hidden = !this.asked;
     if (!this.asked) return;
     const { update, torque, guess, reward, next } = this.asked;
     write(
       element('lesson-guess'),
       `Update ${whole(update)} looks at a step that the agent remembers. It turned with ` +
-        `${signed(torque)}\u00a0N·m and guessed that ${points(guess)} points follow. Then it got ` +
-        `${points(reward)}, and from there it expects ${points(next)} more. Will its guess go up ` +
-        `or down?`,
+        `${signed(torque)}\u00a0N·m and guessed that ${points(guess)} points follow. Its next few ` +
+        `steps brought ${points(reward)}, and from there it expects ${points(next)} more. Will its ` +
+        `guess go up or down?`,
     );
     this.arrange(false);
   }
@@ -65,13 +70,13 @@ export class Lesson {
   private answer(up: boolean): void {
     if (!this.asked) return;
     const { guess, reward, next, target, corrected } = this.asked;
-    const rises = target > guess;
+    const goesUp = rises(this.asked);
     const sum = `${points(reward)} ${next < 0 ? '−' : '+'} ${points(Math.abs(next))}`;
     write(
       element('lesson-answer'),
-      `${up === rises ? 'Right' : 'No'}: ${sum} = ${points(target)} is ` +
-        `${rises ? 'more' : 'less'} than ${points(guess)}. The guess went ` +
-        `${rises ? 'up' : 'down'}, to ${points(corrected)}.`,
+      `${up === goesUp ? 'Right' : 'No'}: ${sum} = ${points(target)} is ` +
+        `${goesUp ? 'more' : 'less'} than ${points(guess)}. The guess went ` +
+        `${goesUp ? 'up' : 'down'}, to ${points(corrected)}.`,
     );
     this.arrange(true);
   }
@@ -93,6 +98,9 @@ interface Question {
   readonly target: number; // reward + next
   readonly corrected: number;
 }
+
+/// Whether the guess goes up.
+const rises = ({ guess, target }: Question) => target > guess;
 
 /// Null for an update that does not move clearly towards its target: other remembered steps pull,
 /// too.

@@ -538,15 +538,16 @@ function swinging(steps: number): string {
   return minutes < 1 ? 'less than a minute of swinging' : `${minutes.toFixed(0)} min of swinging`;
 }
 
-/// The most recent first success.
+/// How the newest test went; before a success, how long both links were up.
 function milestone(session: Session): string {
   const { state, episodes, evaluations, settings } = session;
   if (state !== 'starting' && state !== 'learning') return sentence(session);
-  if (evaluations.some(({ success }) => success === 1)) return 'It passes all of its tests.';
-  const most = evaluations.find(({ success }) => success > 0.5);
-  if (most) return `It passes most of its tests: ${Math.round(100 * most.success)} of 100.`;
-  const first = evaluations.find(({ success }) => success > 0);
-  if (first) return `It passes its first tests: ${Math.round(100 * first.success)} of 100.`;
+  const best = Math.max(...evaluations.map(({ success }) => success));
+  if (best > 0) {
+    const { success } = evaluations.at(-1)!;
+    const steady = success < best ? ': learning is not steady.' : '.';
+    return `It passes ${Math.round(100 * success)} of 100 tests${steady}`;
+  }
   // With another reward, returns prove nothing.
   if (Object.keys(settings).some((name) => /reward|_weight$/.test(name))) return 'Learning …';
   for (const [proof, long] of PROOFS) {

@@ -35,10 +35,13 @@ export class RacePanel {
 
   /// Shows the bet for the agent that would start against the rival.
   offer(agent: string, settings: LearnSettings): void {
+    const own = nameOf(agent, settings);
+    if (this.rival?.name === own) this.select.value = '';
+    for (const option of this.select.options) option.hidden = option.text === own;
     const { rival } = this;
     element('race').hidden = rival === null;
     if (!rival) return;
-    this.bets[0]!.textContent = nameOf(agent, settings);
+    this.bets[0]!.textContent = own;
     this.bets[1]!.textContent = rival.name;
     element('race-how').hidden = !isFamily([agent, rival.agent]);
   }
@@ -53,6 +56,8 @@ export class RacePanel {
   show(sides: readonly [readonly Session[], readonly Session[]] | null): void {
     write(element('race-result'), sides ? this.textOf(sides) : '');
     const runs = sides?.flat() ?? [];
+    const goesOn = runs.some(({ active }) => active);
+    for (const bet of this.bets) bet.disabled = goesOn;
     const ended = runs.length > 0 && runs.every(({ state }) => state === 'finished');
     element('race-why').hidden = !ended || !isFamily(runs.map(({ agent }) => agent));
     sides?.forEach(([first], side) => {

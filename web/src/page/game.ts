@@ -41,7 +41,10 @@ export class Game {
     this.world = world;
     this.setSpeed = setSpeed;
     this.hang = hang;
-    button('motor-again', () => this.again());
+    button('motor-again', () => {
+      this.said = '';
+      this.again();
+    });
     this.half.addEventListener('change', () => this.changeSpeed());
   }
 
@@ -156,7 +159,6 @@ export class Game {
     this.helped = this.fallen = false;
     this.up = null;
     this.held = 0;
-    if (this.best === null) this.said = '';
   }
 
   /// The record's key in the storage. Half speed has its own record.

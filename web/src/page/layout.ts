@@ -26,11 +26,11 @@ export function placeCharts(): void {
 }
 wide.addEventListener('change', placeCharts);
 
-/// Opens the explanation of reward and DQN, and scrolls to it.
+/// Opens the explanations of DQN, Double and Dueling, and scrolls to them.
 export function explain(): void {
   const about = element<HTMLDetailsElement>('q-about');
-  const [reward, dqn] = about.querySelectorAll('details');
-  for (const details of [about, reward!, dqn!]) details.open = true;
+  const parts = [...about.querySelectorAll('details')].slice(1, 4); // after the reward
+  for (const details of [about, ...parts]) details.open = true;
   about.scrollIntoView({ block: 'start' });
 }
 

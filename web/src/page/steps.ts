@@ -145,7 +145,8 @@ function learn(stage: Stage): Step {
   return {
     id: 'learn',
     agents: [NOMINAL_AGENT],
-    labels: () => (stage.learn.begun ? [{ at: 'goal', text: 'ring: its guesses' }] : []),
+    labels: () =>
+      stage.learn.begun ? [{ at: 'goal', text: 'ring: points it expects there' }] : [],
     async begin() {
       const learned = stage.learn.keeps;
       const on = learned && !prefersStill();

@@ -16,6 +16,7 @@ export class Tour {
   private readonly twin: Scene;
   private now: Step | null = null;
   private frame = 0;
+  private last = 1; // number of the step shown last
 
   /// `has`: whether an agent exists. `onStep`: called when another step is shown.
   constructor(
@@ -65,13 +66,14 @@ export class Tour {
     return this.now && (this.now.keys ?? []);
   }
 
-  /// Shows the nearest existing step, with a try of the game in the address. When the visitor goes
+  /// Shows the nearest existing step, or for 0 the one shown last, with a try of the game in the address. When the visitor goes
   /// there, moves the focus to it and adds it to the browser's history.
   async go(number: number, focus = false, ghost = ''): Promise<void> {
     this.leave();
-    const i = Math.min(Math.max(Math.round(number) || 1, 1), this.steps.length) - 1;
+    const i = Math.min(Math.max(Math.round(number) || this.last, 1), this.steps.length) - 1;
     const now = this.steps[i]!;
     this.now = now;
+    this.last = i + 1;
     for (const step of this.steps) section(step).inert = step !== now;
     this.dots.forEach((dot, k) => (dot.ariaCurrent = k === i ? 'step' : null));
     element<HTMLButtonElement>('tour-back').disabled = i === 0;
