@@ -40,6 +40,7 @@ LearnConfig ConfigFor(double hold) {
   LearnConfig config;
   config.encoder_counts = 2000;
   config.hold = hold;
+  config.computing = 1e6;  // sanitizers take longer
   return config;
 }
 
