@@ -146,7 +146,7 @@ function learn(stage: Stage): Step {
     id: 'learn',
     agents: [NOMINAL_AGENT],
     labels: () =>
-      stage.learn.begun ? [{ at: 'goal', text: 'ring: points it expects there' }] : [],
+      stage.learn.begun ? [{ at: 'goal', text: 'expected points' }] : [],
     async begin() {
       const learned = stage.learn.keeps;
       const on = learned && !prefersStill();
