@@ -402,7 +402,7 @@ test('the end has three doors, and an invitation', async ({ stage: page }) => {
     /^A double pendulum learns.* http.*\/#tour$/,
   );
   await page.getByRole('link', { name: 'Read how it works' }).click();
-  await expect(page.getByText('is the reward that the agent expects')).toBeInViewport();
+  await expect(page.getByText('At each step the agent is rewarded for')).toBeInViewport();
   await expect(page.getByText('A dueling network learns the two separately')).toBeVisible();
   await visit(page, '#tour=99');
   await page.getByRole('link', { name: 'Everything at once' }).click();

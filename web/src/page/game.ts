@@ -132,7 +132,7 @@ export class Game {
     if (rival && time < rival.time)
       return `You won: ${seconds(time)} against ${seconds(rival.time)}.`;
     if (rival) return `${so}. The other try took ${seconds(rival.time)}.`;
-    if (time < AGENT) return `${so}, faster than the agent!`;
+    if (time < AGENT - 0.05) return `${so}, faster than the agent, which then stays up!`;
     return isRecord ? `You did it! ${so}; the agent needs ${seconds(AGENT)}.` : `${so}.`;
   }
 

@@ -26,10 +26,10 @@ export function placeCharts(): void {
 }
 wide.addEventListener('change', placeCharts);
 
-/// Opens the explanations of DQN, Double and Dueling, and scrolls to them.
+/// Opens the explanations of reward, DQN, Double and Dueling, and scrolls to them.
 export function explain(): void {
   const about = element<HTMLDetailsElement>('q-about');
-  const parts = [...about.querySelectorAll('details')].slice(1, 4); // after the reward
+  const parts = [...about.querySelectorAll('details')].slice(0, 4); // before the actors
   for (const details of [about, ...parts]) details.open = true;
   about.scrollIntoView({ block: 'start' });
 }

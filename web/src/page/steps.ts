@@ -145,8 +145,7 @@ function learn(stage: Stage): Step {
   return {
     id: 'learn',
     agents: [NOMINAL_AGENT],
-    labels: () =>
-      stage.learn.begun ? [{ at: 'goal', text: 'expected points' }] : [],
+    labels: () => (stage.learn.begun ? [{ at: 'goal', text: 'expected points' }] : []),
     async begin() {
       const learned = stage.learn.keeps;
       const on = learned && !prefersStill();
