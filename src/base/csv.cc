@@ -91,13 +91,15 @@ void FindSeparator(Line& line) {
 /// Moves from the first row of a table without names back to the comment before it, if that has a
 /// name for each cell: NumPy's savetxt writes names so.
 void TakeNamesOfComment(std::string_view& rest, Line& line) {
+  const size_t begin = line.comment.find_first_not_of("#%/;");
+  if (begin == line.comment.npos) return;
   std::vector<std::string_view> cells;
   FindCells(line, cells);
   const size_t width = cells.size();
   const auto is_number = [](std::string_view cell) { return ParseNumber(cell).has_value(); };
-  if (line.comment.empty() || !std::ranges::all_of(cells, is_number)) return;
+  if (!std::ranges::all_of(cells, is_number)) return;
   Line names = line;
-  names.text = Trim(line.comment.substr(line.comment.find_first_not_of("#%/;")));
+  names.text = Trim(line.comment.substr(begin));
   FindSeparator(names);
   FindCells(names, cells);
   if (cells.size() != width || std::ranges::any_of(cells, is_number)) return;

@@ -88,6 +88,8 @@ TEST(Csv, MessagesNameLineAndColumn) {
       Complaint("a,b\n1,inf\n"),
       "t.csv:2: b: expected a finite number, got \"inf\": a missing value; remove or fill its row");
   EXPECT_EQ(Complaint("a,b\nx,1\n"), "none");
+  EXPECT_EQ(Complaint("##\n1,2\n"),
+            "t.csv:2: expected a column \"b\", got \"1,2\": the first line needs the names");
   EXPECT_EQ(Complaint("a,b\n\"x,1\n"), "t.csv:2: expected a closing quote, got \"\"x,1\"");
   EXPECT_EQ(
       Complaint("a,b\n1,\"\"\n"),
