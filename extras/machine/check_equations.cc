@@ -101,10 +101,12 @@ enum Term {
 using Terms = Eigen::Matrix<double, kTerms, 1>;
 using Gram = Eigen::Matrix<double, kTerms, kTerms>;
 
-/// The terms of the equations of both joints over a window.
-///   Joint 1: d/dt [(J1 + J2) w1 + J2 w2 + b cos q2 (2 w1 + w2)] + G1 sin q1 + G2 sin(q1 + q2) + …
-///   = τ1 Joint 2: d/dt [J2 (w1 + w2) + a w2 + b cos q2 w1] + b sin q2 w1 (w1 + w2) + G2 sin(q1 +
-///   q2) + … = τ2
+/// The terms of the equations of both joints over a window. Each sum equals the joint's torque.
+///
+/// Joint 1: d/dt [(J1 + J2) w1 + J2 w2 + b cos q2 (2 w1 + w2)] + G1 sin q1 + G2 sin(q1 + q2) + …
+///
+/// Joint 2: d/dt [J2 (w1 + w2) + a w2 + b cos q2 w1] + b sin q2 w1 (w1 + w2) + G2 sin(q1 + q2) + …
+///
 /// The turned terms are those with the angles a quarter turn ahead.
 std::array<Terms, 2> TermsOf(const Window& window, const Reading& reading) {
   std::array<Terms, 2> both{Terms::Zero(), Terms::Zero()};

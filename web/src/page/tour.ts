@@ -66,8 +66,9 @@ export class Tour {
     return this.now && (this.now.keys ?? []);
   }
 
-  /// Shows the nearest existing step, or for 0 the one shown last, with a try of the game in the address. When the visitor goes
-  /// there, moves the focus to it and adds it to the browser's history.
+  /// Shows the nearest existing step, or for 0 the one shown last, with a try of the game in the
+  /// address. When the visitor goes there, moves the focus to it and adds it to the browser's
+  /// history.
   async go(number: number, focus = false, ghost = ''): Promise<void> {
     this.leave();
     const i = Math.min(Math.max(Math.round(number) || this.last, 1), this.steps.length) - 1;
