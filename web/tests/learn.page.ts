@@ -529,10 +529,17 @@ test('a slow start shows one update after another: guess, target, correction', a
   expect(answer.startsWith('Right')).toBe(rises);
   const corrected = numbers(answer).at(-1)!;
   expect(Math.abs(target - corrected)).toBeLessThan(Math.abs(target - before));
-  // There is another question after the training has ended.
+  // There is another question once a later update has made one, and also after the training's end.
+  const another = page.getByRole('button', { name: 'Another update' });
+  await expect(async () => {
+    if (!(await another.isVisible())) await ask();
+    await another.click();
+    expect(await guess.textContent()).not.toBe(asked);
+  }).toPass();
+  const second = (await ask()).asked!;
   await page.evaluate(() => upswing.learn.stop());
-  await page.getByRole('button', { name: 'Another update' }).click();
-  await expect(guess).not.toHaveText(asked!);
+  await another.click();
+  await expect(guess).not.toHaveText(second);
   // A new training asks about its own updates, and its ring has its own values.
   await page.getByRole('button', { name: 'Start over' }).click();
   await expect(page.locator('#lesson')).toBeHidden();
