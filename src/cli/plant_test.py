@@ -111,11 +111,10 @@ class PlantTest(ProgramTest):
                                       "gravity", "torque_limit"})
 
     def test_a_controller_for_the_board(self):
-        score = ("realaigym", "score", "tvlqr", "--score-version", 2, "--made-for")
+        score = ("realaigym", "score", "tvlqr", "--runs", 1, "--made-for")
         board = json.loads(self.succeed(*score, "realaigym", "--json"))
         self.assertEqual(board["policy"], "tvlqr (for realaigym)")
-        self.assertTrue(board["performance"]["swung_up"])
-        self.assertGreater(board["performance"]["score"], 0.45)
+        self.assertGreater(board["runs"][0]["swing_ups"], 10)
         self.assertNotIn("designed for", self.succeed(*score, "realaigym"))
         changed = self.succeed(*score, "realaigym", "--made-for", "mass1=0.6")
         self.assertIn("tvlqr (for realaigym and mass1 0.6)", changed)
