@@ -20,8 +20,8 @@ import ours  # noqa: E402  pylint: disable=wrong-import-position
 # Settings whose defaults do not matter here: of features that are off, of schedules that are constant.
 NEUTRAL = {"dqn": {"head", "levels", "priority_exponent", "importance_exponent", "learning_rate_steps",
                    "target_period", "epsilon_decay"},
-           "sac": {"value_low", "value_high", "priority_exponent", "importance_exponent",
-                   "learning_rate_steps", "actor_rate", "tune_alpha"},
+           "sac": {"priority_exponent", "importance_exponent", "learning_rate_steps", "actor_rate",
+                   "tune_alpha"},
            "ppo": {"actions", "levels", "learning_rate_steps"}}
 TINY = {"width": 8, "batch": 8, "threads": 1}
 

@@ -13,9 +13,10 @@ namespace {
 struct RemovedSetting {
   std::string_view section, name, value;
 };
-constexpr RemovedSetting kRemoved[] = {{"network", "precision", "float32"},
-                                       {"task", "task", "double-pendulum"},
-                                       {"task", "task", "gymnasium"}};  // has an environment
+constexpr RemovedSetting kRemoved[] = {
+    {"network", "precision", "float32"}, {"network", "bins", "0"},
+    {"network", "value_low", "-10"},     {"network", "value_high", "60"},
+    {"task", "task", "double-pendulum"}, {"task", "task", "gymnasium"}};  // has an environment
 
 /// Whether this setting was removed. Throws BadInput if it has a value that is no longer possible.
 bool IsRemoved(std::string_view section, std::string_view name, const toml::node& node,

@@ -24,7 +24,7 @@ void OffPolicyConfig::Describe(Options& o) {
         "mirror a random half of each minibatch; DQN also evaluates targets at mirrored states");
   o.Add(&reward_centering, "reward_centering", kUnit, "",
         "share of the mean TD error that each update removes by shifting all values, for gamma "
-        "near 0.99; 0 or a categorical critic: off");
+        "near 0.99; 0: off");
   o.Add(&learning_starts, "learning_starts", kNotNegative, "steps",
         "warm-up before the first update");
   o.Add(&updates_per_step, "updates_per_step", {0, 100}, "", "updates per control step");

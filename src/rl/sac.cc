@@ -18,7 +18,6 @@ Sac::Sac(const SacConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       A_(spec.action_size()),
       B_(static_cast<int>(config.batch)),
       action_limit_(spec.action_limit),
-      bins_(static_cast<int>(config.bins), config.value_low, config.value_high),
       noise_rng_(seed, "policy noise"),
       actor_(config.Shape(D_, 2 * A_), B_, Rng(seed, "initial actor")),
       theta_policy_(actor_.theta().begin(), actor_.theta().end()),
@@ -40,12 +39,9 @@ Sac::Sac(const SacConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       last_mean_(act_action_.size()),
       begins_(spec.num_envs, 1) {
   for (size_t i = 0; i < num_critics(); ++i) {
-    TrainedNetwork network(config.Shape(D_ + A_, bins_.outputs()), B_,
-                           Rng(seed, "initial critic", i));
+    TrainedNetwork network(config.Shape(D_ + A_, 1), B_, Rng(seed, "initial critic", i));
     AlignedVector<float> target(network.theta().begin(), network.theta().end());
-    const AlignedVector<float> outputs(Size(B_, bins_.outputs())), value(y_.size());
-    critics_.push_back(
-        {std::move(network), std::move(target), outputs, outputs, value, value, inputs_});
+    critics_.push_back({std::move(network), std::move(target), y_, y_, y_, inputs_});
   }
 }
 
@@ -121,11 +117,9 @@ std::unique_ptr<NetworkPolicy> Sac::ExportPolicy(PolicyInfo info) const {
   info.reward_scale = config_.reward_scale;
   NetworkPolicyParts parts{ActionRule::kSquashedGaussian, actor_.network().shape(), theta_policy_};
   parts.action_limit = action_limit_;
-  if (config_.bins == 0) {
-    parts.critic = config_.Shape(D_ + A_, 1);
-    const std::span<const float> theta = critics_.front().network.theta();
-    parts.critic_parameters.assign(theta.begin(), theta.end());
-  }
+  parts.critic = config_.Shape(D_ + A_, 1);
+  const std::span<const float> theta = critics_.front().network.theta();
+  parts.critic_parameters.assign(theta.begin(), theta.end());
   return std::make_unique<NetworkPolicy>(std::move(parts), std::move(info));
 }
 

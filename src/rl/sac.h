@@ -12,7 +12,6 @@
 #include "rl/off_policy.h"
 #include "rl/sac_config.h"
 #include "rl/trained_network.h"
-#include "rl/value_bins.h"
 
 /// Soft Actor-Critic (Haarnoja et al., 2018, "Algorithms and Applications") and its extensions,
 /// each a flag.
@@ -64,10 +63,10 @@ class Sac : public OffPolicyAgent {
  private:
   struct Critic {
     TrainedNetwork network;
-    AlignedVector<float> target;       // (num_parameters) Polyak average of the parameters
-    AlignedVector<float> outputs, dy;  // (B × outputs) outputs and the gradient of the loss
-    AlignedVector<float> value, loss;  // (B) value, and loss times the transition's weight
-    AlignedVector<float> dinputs;      // (B × (D + A)) dQ/d(s, a), for the actor
+    AlignedVector<float> target;     // (num_parameters) Polyak average of the parameters
+    AlignedVector<float> value, dy;  // (B) outputs and the gradient of the loss
+    AlignedVector<float> loss;       // (B) loss times the transition's weight
+    AlignedVector<float> dinputs;    // (B × (D + A)) dQ/d(s, a), for the actor
   };
 
   /// Action samples by component; see SquashSamples.
@@ -88,9 +87,6 @@ class Sac : public OffPolicyAgent {
   void CenterCritics(const Minibatch& batch);
   void UpdateActor(const Minibatch& batch);
   void UpdateTemperature();
-  /// Computes Q of some rows from the outputs: the output itself, or the mean of a categorical
-  /// output.
-  void ValueRows(Critic& critic, RowRange rows) const;
   /// Adds a minibatch to the metrics and sets td_error_.
   void CountMinibatch();
   /// Draws the noise of samples_.
@@ -101,7 +97,6 @@ class Sac : public OffPolicyAgent {
   SacConfig config_;
   int D_, A_, B_;
   std::vector<double> action_limit_;  // (A)
-  ValueBins bins_;
   Rng noise_rng_;
 
   TrainedNetwork actor_;

@@ -13,10 +13,6 @@ void SacConfig::Describe(Options& o) {
   o.Section("network");
   o.Add(&hidden, "hidden", {1, 4096}, "widths of the hidden layers of actor and critics");
   o.Add(&layer_norm, "layer_norm", "apply layer normalisation after each hidden layer");
-  o.Add(&bins, "bins", {0, 1001}, "",
-        "number of value bins of a categorical critic (HL-Gauss); 0: scalar critic");
-  o.Add(&value_low, "value_low", {-1e9, 1e9}, "", "lowest value of a categorical critic");
-  o.Add(&value_high, "value_high", {-1e9, 1e9}, "", "highest value of a categorical critic");
 
   o.Section("agent");
   o.Add(&twin, "twin", "train two critics and use the smaller value");
@@ -47,26 +43,19 @@ std::unique_ptr<Agent> SacConfig::Make(const EnvSpec& spec, uint64_t seed, Threa
   return std::make_unique<Sac>(*this, spec, seed, pool);
 }
 
-void SacConfig::Check(int64_t /*num_envs*/) const {
-  OffPolicyConfig::Check();
-  if (bins == 1) throw BadInput("bins: expected 0 or at least 2, got 1");
-  if (bins > 0 && value_low >= value_high) {
-    throw BadInput(
-        Concat("value_low: expected less than value_high (", value_high, "), got ", value_low));
-  }
-}
+void SacConfig::Check(int64_t /*num_envs*/) const { OffPolicyConfig::Check(); }
 
 AgentSize SacConfig::Size(const EnvSpec& spec) const {
   const int D = spec.obs_size, A = spec.action_size();
   const double critics = twin ? 2 : 1;
   const Network actor(Shape(D, 2 * A));
-  const Network critic(Shape(D + A, static_cast<int>(std::max<int64_t>(1, bins))));
+  const Network critic(Shape(D + A, 1));
   return {static_cast<double>(actor.num_parameters()) +
               critics * static_cast<double>(critic.num_parameters()),
           // Arrays: online, target or kept parameters, gradient, Adam's two moments, and transposed
           // weights.
           6, 4, 2.0 * D + A + 2, static_cast<double>(replay), static_cast<double>(batch),
-          std::max(static_cast<double>(std::ranges::max(hidden)), static_cast<double>(bins)),
+          static_cast<double>(std::ranges::max(hidden)),
           (1 + critics) * 3 * static_cast<double>(hidden.size())};
 }
 

@@ -14,8 +14,6 @@ struct SacConfig : AgentConfig, OffPolicyConfig {
   SacConfig() { reward_centering = 0; }
   std::vector<int64_t> hidden = {256, 256};
   bool layer_norm = true;
-  int64_t bins = 0;
-  double value_low = -10, value_high = 60;
   bool twin = true;
   double smoothness = 0;
   int64_t actor_period = 2;

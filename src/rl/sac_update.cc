@@ -70,21 +70,13 @@ void Sac::SampleRows(Matrix<const float> obs, RowRange rows, Matrix<float> input
   }
 }
 
-void Sac::ValueRows(Critic& critic, RowRange rows) const {
-  const Matrix<const float> outputs(critic.outputs.data(), B_, bins_.outputs());
-  for (int i = rows.first; i < rows.first + rows.count; ++i) {
-    critic.value[i] = bins_.Value(outputs.row(i));
-  }
-}
-
 void Sac::CriticRows(const Minibatch& batch, RowRange rows) {
   const Matrix<const float> s(batch.obs.data(), B_, D_), s_next(batch.next_obs.data(), B_, D_);
   const Matrix<float> sa(inputs_, B_, D_ + A_), next_sa(policy_inputs_, B_, D_ + A_);
   // y = r + γⁿ (min Q'(s', a') - α ln π(a'|s')), a' ~ π(s'); α = 0 without entropy_reward
   SampleRows(s_next, rows, next_sa);
   for (Critic& critic : critics_) {
-    critic.network.Forward(critic.target, next_sa, rows, {critic.outputs, B_, bins_.outputs()});
-    ValueRows(critic, rows);
+    critic.network.Forward(critic.target, next_sa, rows, {critic.value, B_, 1});
   }
   SoftTargets(Part(critics_.front().value, rows), Part(critics_.back().value, rows),
               Part(log_prob_, rows), config_.entropy_reward ? alpha() : 0.0,
@@ -94,16 +86,13 @@ void Sac::CriticRows(const Minibatch& batch, RowRange rows) {
   CopyRows(s, rows, 0, sa);
   CopyRows({batch.action.data(), B_, A_}, rows, D_, sa);
   for (Critic& critic : critics_) {
-    const Matrix<float> outputs(critic.outputs, B_, bins_.outputs());
-    const Matrix<float> dy(critic.dy, B_, bins_.outputs());
-    critic.network.Forward(sa, rows, outputs);
-    ValueRows(critic, rows);
+    critic.network.Forward(sa, rows, {critic.value, B_, 1});
     for (int i = rows.first; i < rows.first + rows.count; ++i) {
-      const float weight = batch.weight[i] / static_cast<float>(B_);
-      critic.loss[i] = batch.weight[i] * bins_.Loss(outputs.row(i), y_[i], dy.row(i));
-      for (float& gradient : dy.row(i)) gradient *= weight;
+      const float error = critic.value[i] - y_[i];
+      critic.loss[i] = batch.weight[i] * (error * error / 2);
+      critic.dy[i] = error * (batch.weight[i] / static_cast<float>(B_));
     }
-    critic.network.Backward(dy, rows);
+    critic.network.Backward({critic.dy, B_, 1}, rows);
   }
 }
 
@@ -112,7 +101,7 @@ void Sac::UpdateCritics(const Minibatch& batch) {
   for (Critic& critic : critics_) critic.network.Prepare(pool_);
   ForSlices(pool_, B_, [&](RowRange rows) { CriticRows(batch, rows); });
   CountMinibatch();
-  if (config_.reward_centering > 0 && config_.bins == 0) CenterCritics(batch);
+  if (config_.reward_centering > 0) CenterCritics(batch);
   for (Critic& critic : critics_) {
     norm_sum_ += critic.network.Step({inputs_.data(), B_, D_ + A_}, learning_rate(),
                                      config_.max_gradient_norm, critic.target, config_.tau, pool_) /
@@ -136,21 +125,16 @@ void Sac::ActorRows(const Minibatch& batch, RowRange rows) {
   const Matrix<const float> s(batch.obs.data(), B_, D_);
   const Matrix<float> sa(policy_inputs_, B_, D_ + A_);
   SampleRows(s, rows, sa);
-  for (Critic& critic : critics_) {
-    critic.network.Forward(sa, rows, {critic.outputs, B_, bins_.outputs()});
-    ValueRows(critic, rows);
-  }
+  for (Critic& critic : critics_) critic.network.Forward(sa, rows, {critic.value, B_, 1});
   // Compute dQ/da of the critic with the smaller value. The other critic contributes nothing.
   for (Critic& critic : critics_) {
     const Critic& other = &critic == &critics_.front() ? critics_.back() : critics_.front();
-    const Matrix<float> outputs(critic.outputs, B_, bins_.outputs());
-    const Matrix<float> dy(critic.dy, B_, bins_.outputs());
     for (int i = rows.first; i < rows.first + rows.count; ++i) {
       const bool counts = critic.value[i] < other.value[i] ||
                           (critic.value[i] == other.value[i] && &critic == &critics_.front());
-      bins_.ValueGradient(outputs.row(i), counts ? 1.0F : 0.0F, dy.row(i));
+      critic.dy[i] = counts ? 1.0F : 0.0F;
     }
-    critic.network.Backward(dy, rows, {critic.dinputs, B_, D_ + A_});
+    critic.network.Backward({critic.dy, B_, 1}, rows, {critic.dinputs, B_, D_ + A_});
   }
   // Compute the gradient of the mean of α ln π(a|s) - min Q(s, a).
   const auto temperature = static_cast<float>(alpha());

@@ -26,7 +26,7 @@ inline Config TinyConfig(const std::string& physics, const std::string& algorith
     SetFlags(OptionsOf(config), {{"horizon", "4"}, {"epochs", "2"}, {"value_clip", "0.2"}});
   } else if (algorithm == "sac") {
     SetFlags(OptionsOf(config), off_policy);
-    SetFlags(OptionsOf(config), {{"smoothness", "0.1"}, {"bins", "3"}});
+    SetFlags(OptionsOf(config), {{"smoothness", "0.1"}});
   } else {
     SetFlags(OptionsOf(config), off_policy);
     SetFlags(OptionsOf(config), {{"head", "2"}});

@@ -64,7 +64,7 @@ def settings(what, task, width, batch, threads, seed):
         return common | {
             "envs": 1, "updates_per_step": 1, "actor_period": 1, "n_step": 1, "gamma": SAC_GAMMA,
             "tau": TAU, "alpha": ALPHA, "alpha_rate": LEARNING_RATE, "target_entropy": -1,
-            "bins": 0, "smoothness": 0, "replay": REPLAY, "learning_starts": LEARNING_STARTS,
+            "smoothness": 0, "replay": REPLAY, "learning_starts": LEARNING_STARTS,
             "policy_tau": 1, "max_gradient_norm": 1e9, "twin": True, "prioritized": False,
             "entropy_reward": True, "reward_centering": 0}
     return common | {
