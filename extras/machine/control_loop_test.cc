@@ -289,12 +289,21 @@ TEST(LogRing, KeepsTheOrderAcrossThreads) {
   std::thread reader([&] {
     LoopRow row;
     for (int next = 0; next < kRows;) {
-      if (!ring.Pop(row)) continue;
+      if (!ring.Pop(row)) {
+        std::this_thread::yield();
+        continue;
+      }
       ASSERT_EQ(row.time, next);
       ++next;
     }
   });
-  for (int i = 0; i < kRows;) i += ring.Push({.time = static_cast<double>(i)}) ? 1 : 0;
+  for (int i = 0; i < kRows;) {
+    if (ring.Push({.time = static_cast<double>(i)})) {
+      ++i;
+    } else {
+      std::this_thread::yield();
+    }
+  }
   reader.join();
   LogRing full(2);
   EXPECT_TRUE(full.Push({}) && full.Push({}));
