@@ -57,7 +57,7 @@ class DemoTest(ProgramTest):
                                   stderr=subprocess.DEVNULL, encoding="utf-8")
         self.addCleanup(self.end, server)
         line = server.stdout.readline()
-        self.assertRegex(line, r"http://localhost:\d+/ ")
+        self.assertRegex(line, r"http://localhost:\d+/\S* ")
         return server, line.split()[4]
 
     def open(self, address, **fields):
@@ -139,7 +139,9 @@ class DemoTest(ProgramTest):
         self.succeed(*small(out="work/My Run"))
         self.assertEqual(self.demo("My Run", "--dist", "site").returncode, 0)
         self.read_only(self.page)
-        server, address = self.serve("My Run")
+        server, shown = self.serve("My Run", PAGE / "agents/sac.safetensors")
+        address, _, playing = shown.partition("#")
+        self.assertEqual(playing, "agent=my-run&on=1")
         for agents in (json.loads(self.fetch(address + "agents/agents.json")),
                        json.loads((self.work / "site/agents/agents.json").read_text())):
             (mine,) = [each for each in agents["agents"] if each["id"] == "my-run"]

@@ -66,11 +66,13 @@ void CopyContent(const fs::path& from, const fs::path& to) {
   }
 }
 
-/// Adds policies to a folder of agents.
-void AddAgents(const DemoArguments& a, const fs::path& folder) {
-  if (a.policies.empty()) return;
+/// Adds policies to a folder of agents. Returns the end of the address at which the first one
+/// plays; empty without policies.
+std::string AddAgents(const DemoArguments& a, const fs::path& folder) {
+  if (a.policies.empty()) return "";
   const std::vector<fs::path> paths(a.policies.begin(), a.policies.end());
-  (void)ExportToPage(paths, "", 0, folder);
+  const fs::path first = ExportToPage(paths, "", 0, folder).front();
+  return Concat("#agent=", first.stem().string(), "&on=1");  // an ID has letters, digits and -
 }
 
 /// --dist without slashes at its end, which would hide its name.
@@ -100,7 +102,7 @@ int WriteDist(const DemoArguments& a, const fs::path& page) {
   const fs::path dist = DistFolder(a.dist);
   Making making(dist, Making::Kind::kFolder);
   CopyContent(page, making.path());
-  AddAgents(a, making.path() / kAgents);
+  (void)AddAgents(a, making.path() / kAgents);
   if (StopSignal() != 0) return 128 + StopSignal();
   making.Publish();
   const std::string name = dist.string();
@@ -114,15 +116,16 @@ int WriteDist(const DemoArguments& a, const fs::path& page) {
 }
 
 /// The page's folder of agents. With policies, their files and those of the page's own agents are
-/// in the new folder `temporary`, because the page may be read-only.
+/// in the new folder `temporary`, because the page may be read-only. `address`: as AddAgents
+/// returns.
 fs::path AgentsFolder(const DemoArguments& a, const fs::path& page,
-                      std::optional<Making>& temporary) {
+                      std::optional<Making>& temporary, std::string& address) {
   if (a.policies.empty()) return page / kAgents;
   temporary.emplace(fs::temp_directory_path() / "upswing-demo", Making::Kind::kFolder);
   fs::path agents = temporary->path() / kAgents;
   fs::create_directory(agents);
   if (fs::is_directory(page / kAgents)) CopyContent(page / kAgents, agents);
-  AddAgents(a, agents);
+  address = AddAgents(a, agents);
   return agents;
 }
 
@@ -150,8 +153,8 @@ int WriteSingle(const DemoArguments& a, const fs::path& page) {
     throw Failure(Concat(page.string(), ": expected \"", kPlace, "\" in single.html, found none"));
   }
   std::optional<Making> temporary;
-  std::string files;
-  for (const fs::path& folder : {page / "assets", AgentsFolder(a, page, temporary)}) {
+  std::string files, address;
+  for (const fs::path& folder : {page / "assets", AgentsFolder(a, page, temporary, address)}) {
     for (const auto& entry : fs::directory_iterator(folder)) {
       const fs::path& file = entry.path();
       const std::string type = file.extension().string();
@@ -172,11 +175,12 @@ int ServePage(const DemoArguments& a, const fs::path& page) {
   std::string job = Concat(kPatience, '\n', a.port == 0 ? kUsualPort : a.port, '\n',
                            a.port == 0 ? kLastPort : a.port, '\n', fs::absolute(page).string());
   std::optional<Making> temporary;
-  const fs::path agents = AgentsFolder(a, page, temporary);
+  std::string address;
+  const fs::path agents = AgentsFolder(a, page, temporary, address);
   if (temporary) job += '\n' + agents.string();
   PythonChild server("demo", DemoServer(), job);
   while (const auto port = server.Next()) {
-    fmt::print("The page is at http://localhost:{}/ (stop with Ctrl-C).\n", *port);
+    fmt::print("The page is at http://localhost:{}/{} (stop with Ctrl-C).\n", *port, address);
     std::fflush(stdout);
   }
   const int code = server.Finish();
@@ -208,8 +212,8 @@ void AddDemo(CommandLine& line) {
       "HTML file to write the page into, which a browser opens without a server or a network");
   line.Check([&a] { CheckPlace(a); });
   line.Footer(
-      "The server listens on this machine only. It runs in Python: `python3`, or the one that\n"
-      "UPSWING_PYTHON names.\n\n"
+      "At the printed address the first of the policies plays. The server listens on this machine\n"
+      "only. It runs in Python: `python3`, or the one that UPSWING_PYTHON names.\n\n"
       "Examples:\n"
       "  ./upswing demo\n"
       "  ./upswing demo runs/d3qn-seed1\n"

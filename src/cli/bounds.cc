@@ -236,7 +236,7 @@ void AddBounds(CommandLine& line) {
           "number of swing-ups from hanging that the search starts with");
   line.Arguments(own);
   AddPlant(line, a.plant);
-  AddSet(line, a.trial.set, "change of the plant, such as mass2=1.2");
+  AddSet(line, a.trial.set);
   AddSeed(line, a.trial.seed, "start states");
   AddPhysics(line, a.trial.physics);
   AddThreads(line, a.threads);

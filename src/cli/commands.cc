@@ -78,7 +78,7 @@ void AddUnknownPlant(CommandLine& line, bool& unknown_plant) {
 void AddTrialOptions(CommandLine& line, TrialArguments& a, const std::string& seed_of) {
   AddSeed(line, a.seed, seed_of);
   AddPlant(line, a.plant);
-  AddSet(line, a.set, "change of the plant, such as mass2=1.2");
+  AddSet(line, a.set);
   line.Text("--model", a.model, "FILE", "MJCF file that replaces the policy's model");
   AddPhysics(line, a.physics);
   AddUnknownPlant(line, a.unknown_plant);

@@ -47,7 +47,10 @@ void AddPhysics(CommandLine& line, std::string& physics);
 void AddManyOptions(CommandLine& line, std::string& seeds, int64_t& jobs);
 
 /// Adds --set, the argument of ApplyChanges.
-void AddSet(CommandLine& line, std::vector<std::string>& set, const std::string& help);
+void AddSet(CommandLine& line, std::vector<std::string>& set,
+            const std::string& help =
+                "change of the plant, such as mass2=1.2; mass, length and "
+                "damping change both links");
 
 /// Adds --plant, the argument of ReadPlantFile.
 void AddPlant(CommandLine& line, std::string& plant);
