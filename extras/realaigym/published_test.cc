@@ -191,6 +191,9 @@ TEST(RealAiGymPublished, TvlqrHasItsPublishedScores) {
     ends[k] = EndOf(Robot::kPendubot, cases[k].episode, PublishedTvlqr(plan));
   });
   const Robustness judged = JudgeRobustness(cases, ends);
+  // docs/results/realaigym.md has these scores.
+  RecordProperty("S", std::to_string(PerformanceScore(o)));
+  RecordProperty("R", std::to_string(judged.score()));
   const auto& [model, velocity, torque, response, delay, pushes] = judged.rows;
   // Rows without random draws. One cell of the model is at an edge that rounding can move.
   EXPECT_NEAR(model, 132.0 / 210, 1.1 / 210);

@@ -1,7 +1,7 @@
 """The double pendulum and its task over MuJoCo's Python package, as a Gymnasium environment.
 
-It has the model, observation, reward, torques and episodes of src/pendulum/task.cc and
-src/pendulum/pendulum_env.cc with the built-in plant; check_task.py compares it with the program.
+It has the model, observation, reward and episodes of src/pendulum/task.cc and src/pendulum/pendulum_env.cc
+with the built-in plant.
 
 Symbols: q1, q2 joint angles (rad; 0 hanging, q2 relative to link 1), w1, w2 their velocities
 (rad/s), tau torque at joint 1 (N·m).
@@ -34,7 +34,6 @@ MJCF = """<mujoco model="double_pendulum">
 """
 
 TORQUE_LIMIT = 5.0  # N·m
-TORQUES = [TORQUE_LIMIT * quarter / 4 for quarter in range(-4, 5)]  # N·m, one per action
 PHYSICS_STEPS = 4  # per control period of 0.02 s
 EPISODE_STEPS = 500  # control steps: 10 s
 START_NOISE = 0.1  # standard deviation of all four state variables, rad and rad/s
@@ -82,10 +81,10 @@ def reward(q1, q2, w1, w2, tau):
 
 
 class DoublePendulum(gymnasium.Env):
-    """Starts hanging with noise. Nine torques; an episode is truncated after 10 s."""
+    """Starts hanging with noise. The action is a torque (N·m); an episode is truncated after 10 s."""
 
     observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (8,), np.float32)
-    action_space = gymnasium.spaces.Discrete(len(TORQUES))
+    action_space = gymnasium.spaces.Box(-TORQUE_LIMIT, TORQUE_LIMIT, (1,), np.float32)
 
     def __init__(self):
         self.model = mujoco.MjModel.from_xml_string(MJCF)
@@ -96,38 +95,18 @@ class DoublePendulum(gymnasium.Env):
         """The state q1, q2, w1, w2."""
         return (*self.data.qpos.tolist(), *self.data.qvel.tolist())
 
-    def set_state(self, state):
-        """Begins an episode in a state (q1, q2, w1, w2)."""
-        mujoco.mj_resetData(self.model, self.data)
-        self.data.qpos[:], self.data.qvel[:] = state[:2], state[2:]
-        self.steps = 0
-
-    def apply(self, tau):
-        """Holds a torque for one control period."""
-        self.data.ctrl[0] = tau
-        mujoco.mj_step(self.model, self.data, PHYSICS_STEPS)
-
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
-        self.set_state(START_NOISE * self.np_random.standard_normal(4))
+        start = START_NOISE * self.np_random.standard_normal(4)
+        mujoco.mj_resetData(self.model, self.data)
+        self.data.qpos[:], self.data.qvel[:] = start[:2], start[2:]
+        self.steps = 0
         return observe(*self.state()), {}
 
-    def torque(self, action):
-        """The torque of an action (N·m)."""
-        return TORQUES[action]
-
     def step(self, action):
-        tau = self.torque(action)
-        self.apply(tau)
+        tau = min(max(float(action[0]), -TORQUE_LIMIT), TORQUE_LIMIT)
+        self.data.ctrl[0] = tau
+        mujoco.mj_step(self.model, self.data, PHYSICS_STEPS)
         self.steps += 1
         state = self.state()
         return observe(*state), reward(*state, tau), False, self.steps >= EPISODE_STEPS, {}
-
-
-class TorquePendulum(DoublePendulum):
-    """The same task with any torque up to the limit as action (N·m)."""
-
-    action_space = gymnasium.spaces.Box(-TORQUE_LIMIT, TORQUE_LIMIT, (1,), np.float32)
-
-    def torque(self, action):
-        return min(max(float(action[0]), -TORQUE_LIMIT), TORQUE_LIMIT)

@@ -35,8 +35,8 @@ def make(side, threads):
         # Imported only here. The package makes MuJoCo time each stage of a step, in all engines of
         # the process, which halves the speed of small models.
         sys.path.insert(0, str(Path(__file__).parent))
-        from pendulum import TorquePendulum  # pylint: disable=import-outside-toplevel
-        return gym.vector.SyncVectorEnv([TorquePendulum] * ENVS)
+        from pendulum import DoublePendulum  # pylint: disable=import-outside-toplevel
+        return gym.vector.SyncVectorEnv([DoublePendulum] * ENVS)
     physics, _, copies = side.split(", ")
     return gym.make_vec("upswing/DoublePendulum-v0", num_envs=ENVS, physics=physics,
                         threads=threads, episode_seconds=10, copy=copies == "copies")

@@ -140,12 +140,6 @@ def number(cell):
     return float(found[0].replace(",", "")) if found else None
 
 
-def interval(cell):
-    """Value, low and high of '2,667 (2,657 to 2,682)'."""
-    found = [float(text.replace(",", "")) for text in re.findall(r"-?[\d,]*\.?\d+", cell)]
-    return found if len(found) == 3 else None
-
-
 def rows_of(path):
     with open(path, newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
@@ -215,64 +209,6 @@ def episode():
     fig.align_ylabels([angles, torque, reward])
     return fig
 
-
-BREAK, LOW, HIGH = 2400, 950, 2720  # returns: the axis is compressed below BREAK or less
-CLEAR = 60                          # distance of every return from the break
-
-
-def ablation(name, agent, reference):
-    """A row for each variant: final return with its 95% interval, and the number of solved
-    seeds."""
-    columns, rows = table(name)
-    at = next(k for k, column in enumerate(columns) if column.startswith("return at the end"))
-    rows = [row for row in rows if interval(row[at])]
-    values = [interval(row[at]) for row in rows]
-    lowest, highest = min([LOW, *(low - 50 for _, low, _ in values)]), max([HIGH, *(high + 20 for _, _, high in values)])
-    reference = next(k for k, row in enumerate(rows) if row[0] == reference)
-    fig = canvas(800, 26 * len(rows) + 92)
-    height = 26 * len(rows)
-    narrow = min(low for _, low, _ in values) >= BREAK
-    cut = BREAK
-    while not narrow and any(abs(value - cut) < CLEAR for value, _, _ in values):
-        cut -= 50
-    panels = [(panel(fig, 210, 30, 410, height), (cut, highest))] if narrow else [
-        (panel(fig, 210, 30, 130, height), (lowest, cut)), (panel(fig, 346, 30, 274, height), (cut, highest))]
-    for k, (axes, limits) in enumerate(panels):
-        axes.set_xlim(*limits)
-        axes.set_ylim(len(rows) - 0.5, -0.5)
-        axes.grid(axis="y", visible=False)
-        axes.tick_params(axis="y", length=0)
-        axes.set_yticks(range(len(rows)), [row[0] for row in rows] if k == 0 else [])
-        axes.set_xticks([1000, 1500, 2000] if limits[1] == cut else
-                        [tick for tick in (2400, 2500, 2600, 2700) if narrow or tick > cut])
-        axes.xaxis.set_major_formatter("{x:,.0f}")
-        axes.spines["left"].set_visible(False)
-        if limits[0] < values[reference][0] < limits[1]:
-            axes.axvline(values[reference][0], color=MUTED, linewidth=1.3, linestyle=(0, (4, 3)))
-        for y, (row, (value, low, high)) in enumerate(zip(rows, values)):
-            color = AGENTS.get(row[0], AGENTS[agent])
-            axes.plot([low, high], [y, y], color=color, linewidth=2.5, solid_capstyle="butt")
-            if limits[0] < value < limits[1]:
-                axes.plot(value, y, "o", color=color, markersize=9, markeredgecolor=PAPER, markeredgewidth=1,
-                          clip_on=False)
-    if len(panels) == 2:
-        for axes, x in ((panels[0][0], 1), (panels[1][0], 0)):
-            axes.plot([x], [0], marker=[(-0.5, -1), (0.5, 1)], markersize=12, color=MUTED, transform=axes.transAxes,
-                      clip_on=False, linestyle="none", markeredgewidth=1.3)
-    note(fig, 415, height + 74, "return at the end: interquartile mean of the seeds, 95% interval "
-                                f"(dashed line: {rows[reference][0]})", ha="center")
-    note(fig, 690, 16, "return", ha="right", color=MUTED)
-    note(fig, 785, 16, "solved", ha="right", color=MUTED)
-    solved = columns.index("solved")
-    for y, (row, (value, _, _)) in enumerate(zip(rows, values)):
-        note(fig, 690, 30 + 26 * (y + 0.5), f"{value:,.0f}", ha="right")
-        note(fig, 785, 30 + 26 * (y + 0.5), row[solved], ha="right")
-    return fig
-
-
-for _name, _agent, _reference in (("reward", "fast", "all"), ("curriculum", "fast", "hanging"),
-                                  ("sac-extensions", "sac-fast", "all"), ("ppo-parts", "ppo", "all")):
-    DRAWN[f"study-{_name}"] = lambda name=_name, agent=_agent, reference=_reference: ablation(name, agent, reference)
 
 @figure("machine-motion")
 def machine_motion():

@@ -22,10 +22,12 @@ backticks; COLUMN is an index or a header. A page can also show the table of the
 
 import argparse
 import datetime
+import functools
 import json
 import os
 import platform
 import re
+import resource
 import statistics
 import subprocess
 import sys
@@ -266,6 +268,15 @@ class Lab:
         self.run(*arguments, **more)
         return time.monotonic() - begin
 
+    def cpu_seconds(self, *arguments, **more):
+        """Processor time of a command [s]."""
+        def used():
+            usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+            return usage.ru_utime + usage.ru_stime
+        begin = used()
+        self.run(*arguments, **more)
+        return used() - begin
+
 
 PAGE_AGENTS = Path("web/public/agents")
 OVERVIEW_AGENTS = ("d3qn", "dqn", "double-dqn", "dueling-dqn", "fast", "sac", "sac-fast", "ppo",
@@ -313,6 +324,81 @@ def overview(lab):
                      f"{nominal['torque_variation']['mean']:.1f}", seconds.get(name, NONE)])
     return ["agent", "success", "swing-up [s]", "return / bound", "±25% plants",
             "torque variation [N·m/s]", "time to train [s]"], rows
+
+
+STUDIES = ("curriculum", "extensions", "ppo-parts", "reward", "sac-extensions")
+
+
+def study(lab, name):
+    """A study's variants, in the order of its file."""
+    file = Path("configs/studies", f"{name}.toml")
+    out = lab.folder / name
+    lab.run("study", file, *(["--seeds", 2] if lab.few else []), "--jobs", 1, "--out", out)
+    groups = {group["group"]: group for group in lab.json("compare", out)["groups"]}
+    rows = []
+    for variant in tomllib.loads((ROOT / file).read_text(encoding="utf-8"))["variants"]:
+        group = groups[variant]
+        steps, value = group["solve_steps"]["median"], group["final_return"]["iqm"]
+        low, high = value["interval_95"]
+        once_solved = group["once_solved"]
+        rows.append([f"`{variant}`", f"{group['solved']} of {len(group['runs'])}",
+                     NONE if steps is None else f"{steps:,.0f}",
+                     f"{value['value']:,.0f} ({low:,.0f} to {high:,.0f})",
+                     f"{once_solved['steady_seeds']} of {once_solved['seeds']}" if once_solved["seeds"] else NONE])
+    return ["variant", "solved", "steps to solve: median", "return at the end: IQM (95% interval)",
+            "stayed solved"], rows
+
+
+for _name in STUDIES:
+    RECIPES[_name] = functools.partial(study, name=_name)
+
+
+@recipe("control-decision")
+def control_decision(lab):
+    """Processor time of a decision in many episodes at once, physics included."""
+    rows = []
+    for name in ("d3qn", "fast", "sac", "d3qn-adaptive", "lqr", "tvlqr", "mpc"):
+        episodes = 2 if lab.few else 20 if name in SLOW else 1000
+        policy = name if name in CONTROLLERS else PAGE_AGENTS / f"{name}.safetensors"
+        seconds = lab.cpu_seconds("eval", policy, "--threads", 1, "--physics", "closed-form",
+                                  "--episodes", episodes)
+        rows.append([f"`{name}`", format_number(1e6 * seconds / (1000 * episodes), 2)])
+    return ["controller", "a decision [µs]"], rows
+
+
+@recipe("lqr-catch")
+def lqr_catch(lab):
+    rows = []
+    for k, flags in enumerate(([], ["--made-for", "torque_limit=10"])):
+        chart = lab.json("map", "lqr", *flags, "--x", "q1=150:210:121", "--y", "q2=-30:30:121",
+                         "--out", lab.folder / f"lqr{k}")
+        rows.append([f"`{' '.join(flags)}`" if flags else "none", percent(chart["mean_success_rate"])])
+    return ["flags", "caught at once"], rows
+
+
+@recipe("perf-rates")
+def processor_rates(lab):
+    """Rates of one thread per second of processor time, which other load disturbs less."""
+    text = lab.run("bench", "gradient", "env", "--threads", 1, "--batch", 128, "--repetitions",
+                   2 if lab.few else 5, "--json", "-")
+    return ["case", "per second of processor time"], [
+        [f"`{entry['run_name'].split('/threads')[0]}`",
+         format_number(entry["items_per_second"] * entry["real_time"] / entry["cpu_time"], 3)]
+        for entry in json.loads(text)["benchmarks"] if entry.get("aggregate_name") == "median"]
+
+
+@recipe("robustness-randomized")
+def told_and_untold(lab):
+    rows = []
+    for box in (0, 0.1, 0.25):
+        row = ["nominal" if box == 0 else f"±{100 * box:g}%"]
+        for agent, flags in (("d3qn", []), ("d3qn-randomized", []), ("d3qn-randomized", ["--unknown-plant"])):
+            got = lab.json("eval", PAGE_AGENTS / f"{agent}.safetensors", "--randomize", box,
+                           "--episodes", 4 if lab.few else 1000, "--seed", 1, "--physics", "closed-form", *flags)
+            low, high = got["success_interval_95"]
+            row.append(f"{percent(got['success_rate'])} ({percent(low)} to {percent(high)})")
+        rows.append(row)
+    return ["box", "`d3qn`", "`d3qn-randomized`", "`d3qn-randomized`, `--unknown-plant`"], rows
 
 
 @recipe("first-training")

@@ -43,7 +43,7 @@ test('the result in words', () => {
 test('the claim about our study holds in its table', () => {
   const read = (path: string) => readFileSync(new URL(path, import.meta.url), 'utf8');
   expect(read('../../index.html').replace(/\s+/g, ' ')).toContain(
-    'In our study with 1,000 seeds each, dueling halved the steps and Double made no clear difference.',
+    'In our study with 20 seeds each, dueling halved the steps and Double made no clear difference.',
   );
   const table = read('../../../docs/results/seeds.md');
   const steps = (variant: string) => {
