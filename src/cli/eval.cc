@@ -93,14 +93,11 @@ void AddEval(CommandLine& line) {
       "  pfl     pumps energy by partial feedback linearisation until lqr catches\n"
       "  energy  pumps energy by energy shaping until lqr catches\n"
       "  hybrid  lets lqr catch what --swing-up POLICY swings up\n\n"
-      "--set takes mass1, mass2, length1, length2, damping1, damping2, gravity,\n"
-      "torque_limit, actuated_joint, rotor_inertia, gear_ratio, coulomb1 and coulomb2 (dry "
-      "friction),\n"
-      "center1, center2, inertia1, inertia2, armature, and mass, length and damping for both\n"
-      "links. A plant file of --plant has the same names. With --randomize each episode\n"
-      "draws its plant from a box around the nominal one. Observed energy and\n"
-      "height are scaled by the episode's plant, which reveals the plant to the policy.\n"
-      "With --unknown-plant they are scaled by the plant of the training.\n",
+      "--set takes mass1, mass2, length1, length2, damping1, damping2, gravity, torque_limit,\n"
+      "actuated_joint, rotor_inertia, gear_ratio, coulomb1, coulomb2, center1, center2, inertia1,\n"
+      "inertia2 and armature, the names in a plant file. With --randomize each episode draws its\n"
+      "plant from a box around the nominal one. Observed energy and height are scaled by the\n"
+      "episode's plant, which tells the policy of it; with --unknown-plant by the training's.\n",
       kEvaluationSeconds, kHoldSeconds, kReturnSeconds));
 }
 
