@@ -211,7 +211,7 @@ class StudyTest(ProgramTest):
         """Every study file can be planned, which parses the settings of all variants; no training
         runs."""
         studies = sorted((ROOT / "configs/studies").glob("*.toml"))
-        self.assertEqual(len(studies), 7)
+        self.assertEqual(len(studies), 8)
         for path in studies:
             with self.subTest(study=path.stem):
                 self.succeed("study", path, "--prepare")
