@@ -134,7 +134,7 @@ bool FindNames(std::string_view& rest, Line& line) {
 /// The number in a cell. Where commas do not separate cells, one may stand before the decimals.
 std::optional<double> NumberIn(std::string_view cell, const Line& line) {
   const bool has_comma = line.separator != ',' && cell.find(',') != cell.npos;
-  const auto number = ParseNumber(has_comma ? Replaced(std::string(cell), ",", ".") : cell);
+  const auto number = ParseNumber(has_comma ? Replaced(cell, ",", ".") : cell);
   return number && std::isfinite(*number) ? number : std::nullopt;
 }
 

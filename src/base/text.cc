@@ -179,10 +179,10 @@ std::string Join(const std::vector<std::string>& parts, std::string_view separat
   return joined;
 }
 
-std::string Replaced(std::string text, std::string_view from, std::string_view to) {
+std::string Replaced(std::string_view text, std::string_view from, std::string_view to) {
   std::string replaced;  // in place, each replacement would move the rest of the text
   size_t begin = 0;
-  for (size_t at = 0; (at = text.find(from, begin)) != std::string::npos;
+  for (size_t at = 0; (at = text.find(from, begin)) != std::string_view::npos;
        begin = at + from.size()) {
     replaced.append(text, begin, at - begin) += to;
   }

@@ -61,7 +61,7 @@ std::vector<std::string> NamesOf(const Rows& rows) {
 }
 
 /// `text` with every `from` replaced by `to`.
-std::string Replaced(std::string text, std::string_view from, std::string_view to);
+std::string Replaced(std::string_view text, std::string_view from, std::string_view to);
 
 /// The last `digits` hexadecimal digits of a number.
 std::string HexDigits(uint64_t number, int digits);

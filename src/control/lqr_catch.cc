@@ -43,6 +43,7 @@ std::vector<Eigen::Vector4d> Directions() {
 bool AllSettle(const Lqr& lqr, double level, const std::vector<Eigen::Vector4d>& directions,
                int steps, PendulumModel& model) {
   std::vector<StateVector> x;
+  x.reserve(directions.size());
   for (const auto& d : directions) x.push_back(FromUpright(std::sqrt(level) * d));
   std::vector<double> u(x.size());
   for (int step = 0; step < steps; ++step) {

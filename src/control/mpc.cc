@@ -76,7 +76,7 @@ double MpcPolicy::Torque(const StateVector& deviation, size_t env, Memory& memor
     trajectory.u.erase(trajectory.u.begin());
     K.erase(K.begin());
     trajectory.u.push_back(lqr_.Torque(last));
-    K.push_back(-lqr_.K);
+    K.emplace_back(-lqr_.K);
     // Count full turns as the plan does.
     x = trajectory.x[0] + Difference(x, trajectory.x[0]);
     trajectory = optimizer.Follow(cost_, x, trajectory, K);

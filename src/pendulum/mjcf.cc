@@ -30,7 +30,7 @@ std::string Mjcf(const Plant& plant) {
 )";
   // @name stands for the parameter of this name, or for a part defined below.
   const auto fill = [&](const std::string& field, const std::string& text) {
-    mjcf = Replaced(std::move(mjcf), field, text);
+    mjcf = Replaced(mjcf, field, text);
   };
   const bool rotors = plant.rotor_inertia != 0, friction = plant.has_dry_friction();
   fill("@armature1", FormatNumber(Armature1(plant)));

@@ -7,6 +7,7 @@ namespace upswing {
 
 std::string WidthsText(const std::vector<int64_t>& widths) {
   std::vector<std::string> texts;
+  texts.reserve(widths.size());
   for (const int64_t width : widths) texts.push_back(std::to_string(width));
   return Join(texts, "-");
 }
