@@ -237,9 +237,9 @@ class ModelTest(ProgramTest):
 
     def test_good_model(self):
         self.write("m.xml", MODEL)
-        self.succeed("simulate", "--seconds", "1", "--model", "m.xml")
+        self.succeed("simulate", "--seconds", "1", "--model", "m.xml", "--csv", "m.csv")
         self.write("acrobot.xml", MODEL.replace('joint="a" ctrl', 'joint="b" ctrl'))
-        self.succeed("simulate", "--seconds", "1", "--model", "acrobot.xml")
+        self.succeed("simulate", "--seconds", "1", "--model", "acrobot.xml", "--csv", "m.csv")
 
     def test_missing(self):
         self.refuse(["simulate", "--model", "none.xml"], "none.xml", "No such file")

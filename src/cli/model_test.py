@@ -79,7 +79,7 @@ class BombTest(ProgramTest):
 
     def test_extras_are_left_out(self):
         self.write("m.xml", EXTRAS)
-        self.succeed("simulate", "--seconds", "1", "--model", "m.xml", preexec_fn=limits,
+        self.succeed("simulate", "--seconds", "1", "--model", "m.xml", "--csv", "m.csv", preexec_fn=limits,
                      timeout=PATIENCE)
 
     def test_in_a_policy(self):
@@ -238,6 +238,16 @@ class SaidTest(ProgramTest):
         self.assertEqual(given["model"], model | {"file": "m.xml"})
         plain = json.loads(self.succeed("eval", self.ours, *few, "--json"))
         self.assertEqual(plain["model"], "built-in")
+
+    def test_simulate(self):
+        self.write("m.xml", MODEL.replace('type="hinge"', 'type="hinge" ref="20"', 1))
+        model = rf"model  *m\.xml, {self.CAPTION}: q1 = -0\.349066 rad \+ a"
+        arguments = ("simulate", "--seconds", 0.1, "--model", "m.xml")
+        self.assertRegex(self.succeed(*arguments, "--csv", "m.csv"), "(?m)^  " + model)
+        done = self.run_here(*arguments)
+        self.assertEqual(done.returncode, 0)
+        self.assertEqual(done.stdout, (self.folder / "m.csv").read_text("utf-8"))
+        self.assertRegex(done.stderr, "^upswing: " + model)
 
     def test_figures(self):
         grid = ("--x", "mass2=0.9:1.1:2", "--y", "gravity=9:10:2", "--episodes", 1, "--physics",
