@@ -10,8 +10,8 @@ namespace {
 
 using nlohmann::json;
 
-constexpr Range kCounter{0, 9e15};   // integers that a double holds exactly
-constexpr Range kReturn{-1e9, 1e9};  // allowed return of an episode
+constexpr Range kCounter{0, 9e15};     // integers that a double holds exactly
+constexpr Range kReturn{-1e60, 1e60};  // more than a sum of float32 rewards
 constexpr Range kSeconds{1e-6, 1e3};
 constexpr size_t kMostInputs = 4096;
 constexpr size_t kLongestName = 64;

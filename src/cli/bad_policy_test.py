@@ -166,7 +166,7 @@ class PolicyFileTest(SmallRunTest):
             "seed": ("nan", "1e19", "-1", "7.5", "99999999999999999999"),
             "step": ("nan", "1e19", "-1", "many"),
             "success_rate": ("nan", "1e19", "-0.5", "2"),
-            "mean_return": ("nan", "1e19", "-inf"),
+            "mean_return": ("nan", "1e61", "-inf"),
             "gamma": ("nan", "2"), "reward_scale": ("0", "inf"),
             "agent": ("a\nself-check  passed", "\x1b[2J", "a" * 65),
             "upswing_version": ("0.3.0\n", "\u202e"),
