@@ -434,6 +434,17 @@ class Files(InFolder):
         self.assertEqual(upswing.train("sac", env=env, **SHORT).episodes,
                          upswing.train("sac", env=Reach, max_episode_steps=10, **SHORT).episodes)
 
+    def test_large_returns(self):
+        class Costly(Reach):
+            def step(self, action):
+                obs, _, *others = super().step(action)
+                return obs, -1e12, *others
+
+        training = upswing.train("sac", env=Costly, max_episode_steps=20, out=self.path / "run",
+                                 **SHORT)
+        self.assertAlmostEqual(training.best_return / -2e13, 1)
+        self.assertEqual(program("info", self.path / "run").returncode, 0)
+
     def test_a_run_has_its_files(self):
         run = self.path / "run"
         training = upswing.train("ppo", env="CartPole-v1", out=run, num_envs=2, horizon=64,
@@ -791,6 +802,26 @@ class BadInput(InFolder, BadInputTest):
         self.assertIn("RescaleAction(env, -1, 1)", str(caught[0].message))
         self.assertEqual(caught[0].filename, __file__)
         self.assertLessEqual(np.abs(training.last.act(np.zeros((1, 2)))).max(), 1)
+        # Reach refuses actions beyond its bounds, where a rounding would carry these.
+        for low, high in ((0.1, 0.4), (0.2, 0.7)):
+            for env in (Reach(low, high), SyncVectorEnv([lambda: Reach(low, high)] * 2)):
+                with self.assertWarnsRegex(UserWarning, "not symmetric"):
+                    upswing.train("dqn", env=env, max_episode_steps=20, levels=2, **SHORT)
+        # A function acts within the bounds themselves.
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            result = upswing.evaluate(lambda obs: [0.4], env=Reach(0.1, 0.4), episodes=1)
+        self.assertEqual(result["length"]["mean"], 20)
+
+    def test_a_policy_of_other_actions_is_not_evaluated(self):
+        discrete = upswing.train("dqn", env=lambda: OneStep(True), max_episode_steps=1, **SHORT).last
+        wide = upswing.train("sac", env=lambda: Reach(-3, 3), max_episode_steps=20, **SHORT).last
+        box = OneStep(True)
+        box.action_space = spaces.Box(-1, 1, (1,), np.float32)
+        for policy, env, got in ((discrete, box, "the actions [0.0, 1.0]"),
+                                 (wide, Reach(), "actions within ±[3.0]")):
+            self.refuse(f"got one of {policy.task} for {got}", upswing.evaluate, policy, env=env)
+        self.assertEqual(upswing.evaluate(wide, env=Reach(-3, 3), episodes=1)["length"]["mean"], 20)
 
 
 if __name__ == "__main__":

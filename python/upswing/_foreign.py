@@ -152,8 +152,9 @@ class Source:
         return json.dumps(description)
 
 
-def _make(env: EnvLike, name: str) -> Any:
-    """The environment itself, of an id or made by a function; with actions within ± a limit."""
+def _make(env: EnvLike, name: str, symmetric: bool = True) -> Any:
+    """The environment itself, of an id or made by a function. `symmetric`: with actions within ± a
+    limit."""
     if isinstance(env, str):
         try:
             made: Any = gym.make(env)
@@ -174,7 +175,7 @@ def _make(env: EnvLike, name: str) -> Any:
             f"that makes one, got {got}")
     if isinstance(made, VectorEnv) and made.closed:
         raise _upswing.InputError(f"{name}: expected an open environment, got a closed one")
-    return _symmetric(made)
+    return _symmetric(made) if symmetric else made
 
 
 def _symmetric(env: Any) -> Any:
@@ -191,7 +192,12 @@ def _symmetric(env: Any) -> Any:
         stacklevel=6)
     low = np.full(space.shape, -1, space.dtype)
     rescale: Any = RescaleVectorAction if isinstance(env, VectorEnv) else RescaleAction
-    return rescale(env, low, -low)
+    wrapped = rescale(env, low, -low)
+    # Rounding may carry an end of the scale beyond the bound.
+    scaler = wrapped.wrapper if isinstance(env, VectorEnv) else wrapped
+    scale = scaler.func
+    scaler.func = lambda action: np.clip(scale(action), space.low, space.high)
+    return wrapped
 
 
 def _copier(env: EnvLike, made: Any, name: str) -> Callable[[], Any]:
@@ -310,16 +316,14 @@ def run_episodes(policy: Callable[[npt.NDArray[np.float32]], Any], env: EnvLike,
                  ) -> tuple[str, dict[str, npt.NDArray[np.float64]]]:
     """The name of an environment, and return, length and termination of each episode of a policy.
     Raises InputError."""
-    made = _make(env, "env")
+    # A function acts within the environment's own bounds.
+    made = _make(env, "env", symmetric=isinstance(policy, Policy))
     if isinstance(made, VectorEnv):
         raise _upswing.InputError("env: expected a single environment, got a vector environment")
     space = Spaces(_single(made, "observation_space"), _single(made, "action_space"))
     limit = Limit(made, made, max_episode_steps)
-    if isinstance(policy, Policy) and (
-            (policy.obs_size, policy.action_size) != (space.obs_shape[0], len(space.limits))):
-        raise _upswing.InputError(
-            f"policy: expected one for {space}, got one of {policy.task} for {policy.obs_size} "
-            f"numbers of an observation and {policy.action_size} of an action")
+    if isinstance(policy, Policy):
+        _check_policy(policy, space)
     arrays = space.arrays(1)
     columns: dict[str, list[float]] = {"return": [], "length": [], "terminated": []}
     try:
@@ -341,6 +345,22 @@ def run_episodes(policy: Callable[[npt.NDArray[np.float32]], Any], env: EnvLike,
         if made.unwrapped is not getattr(env, "unwrapped", None):
             made.close()
     return _name_of(made), {name: np.array(column, np.float64) for name, column in columns.items()}
+
+
+def _check_policy(policy: Policy, space: Spaces) -> None:
+    """Raises InputError unless the policy was trained for such observations and actions."""
+    if (policy.obs_size, policy.action_size) != (space.obs_shape[0], len(space.limits)):
+        raise _upswing.InputError(
+            f"policy: expected one for {space}, got one of {policy.task} for {policy.obs_size} "
+            f"numbers of an observation and {policy.action_size} of an action")
+    told = re.search(r'^environment = (".+")$', policy.info["config"] or "", re.MULTILINE)
+    trained = json.loads(json.loads(told[1])) if told else {}
+    for name, wanted in (("choices", space.choices), ("action_limit", space.limits)):
+        if trained.get(name, wanted) != wanted:
+            choices, limits = trained["choices"], trained["action_limit"]
+            got = f"the actions {choices}" if choices else f"actions within ±{limits}"
+            raise _upswing.InputError(
+                f"policy: expected one for {space}, got one of {policy.task} for {got[:120]}")
 
 
 def _name_of(env: Env) -> str:
