@@ -160,6 +160,13 @@ class InputTest(ProgramTest):
             with self.subTest(arguments=arguments):
                 done = self.run_here(*arguments, **user)
                 self.assert_one_line(done, 2, "closed" if arguments[1] != "." else ".")
+        (self.folder / "open").mkdir()
+        (self.folder / "open").chmod(0o777)
+        kept = self.folder / self.write("open/kept.csv", "mine")
+        kept.chmod(0o444)
+        done = self.run_here("simulate", "--seconds", "1", "--csv", "open/kept.csv", **user)
+        self.assert_one_line(done, 2, "open/kept.csv: Permission denied")
+        self.assertEqual(kept.read_text("utf-8"), "mine")
 
     def test_a_page_of_something_else(self):
         self.succeed(*small(**TINY))

@@ -160,6 +160,8 @@ void WriteNamedFile(const fs::path& path, std::string_view text) {
   }
   if (S_ISDIR(info.st_mode)) throw PathError("cannot write", path, EISDIR);
   if (!S_ISREG(info.st_mode)) return WriteInPlace(path, text);
+  // Replacing a file needs no right to write it.
+  if (access(path.c_str(), W_OK) != 0) throw PathError("cannot write", path, errno);
   WriteFileAtomically(fs::canonical(path), text);
 }
 

@@ -55,8 +55,8 @@ void WriteIfOther(const std::filesystem::path& path, const std::string& text);
 void CheckNoLink(const std::filesystem::path& folder);
 
 /// Writes a file that the user named. Like WriteFileAtomically, but it follows a link and replaces
-/// the link's target. Writes in place if the path is not a regular file, such as a pipe or a
-/// device.
+/// the link's target, and refuses a read-only file. Writes in place if the path is not a regular
+/// file, such as a pipe or a device.
 void WriteNamedFile(const std::filesystem::path& path, std::string_view text);
 
 /// Throws BadInput, with `advice` in brackets, unless `folder` is missing or empty. Call it before
