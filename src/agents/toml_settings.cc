@@ -149,7 +149,7 @@ std::vector<FlagValue> ApplyTable(const Options& options, const toml::table& tab
       continue;
     }
     const bool is_known = std::ranges::find(sections, key) != sections.end();
-    if (section == nullptr && is_known) {
+    if (section == nullptr && is_known && options.Get(key) == nullptr) {  // [agent] has a namesake
       throw BadInput(
           Concat(PlaceOf(node, where), ": expected a table [", key, "], got another type"));
     }

@@ -437,6 +437,13 @@ class RunFolderTest(SmallRunTest):
                             ["info", "lqr", "--made-for", "p.toml"]):
                 self.refuse(command, "p.toml:1: expected a table [plant], got another type")
 
+    def test_settings_outside_their_section(self):
+        for text in ('agent = "fast"', "mass1 = 2"):
+            self.write("p.toml", text)
+            name, section = text.split()[0], "train" if "agent" in text else "plant"
+            self.refuse([*TRAIN, "--config", "p.toml"],
+                        f"p.toml:1: {name}: expected in section [{section}], got outside any section")
+
     def test_unwritable_csv(self):
         self.write("file", "mine")
         for csv in ("file/out.csv", "/proc/out.csv", "none/out.csv", "run"):
