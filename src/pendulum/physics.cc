@@ -59,7 +59,8 @@ const Engine kClosedForm{
     "closed-form", [](const PhysicsConfig& config) -> std::unique_ptr<Physics> {
       if (!config.mjcf.empty()) {
         throw BadInput(
-            "physics = closed-form: expected the built-in model, got another MJCF model");
+            "physics = closed-form: expected the built-in model, got another MJCF model, which "
+            "needs physics = mujoco");
       }
       return std::make_unique<ClosedFormPhysics>(config);
     }};
