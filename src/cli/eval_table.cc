@@ -83,8 +83,9 @@ void PrintEvalTable(const EvalReport& report) {
   if (!changes.empty()) fmt::print("  {:<15}{}\n", "with", changes);
   if (report.known_plant) {
     fmt::print(
-        "  designed for   the plant of each episode; {} of {} plants have no such controller\n",
-        e.episodes - NumDesigned(report), e.episodes);
+        "  designed for   the plant of each episode{}; {} of {} plants have no such controller\n",
+        report.model ? " without the model's differences" : "", e.episodes - NumDesigned(report),
+        e.episodes);
   }
   if (report.only_balances) {
     fmt::print(

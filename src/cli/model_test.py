@@ -232,6 +232,8 @@ class SaidTest(ProgramTest):
             self.assertRegex(self.succeed("eval", *arguments, *few),
                              rf"(?m)^  model  +{name}, {self.TEXT}$")
         self.assertNotIn("model", self.succeed("eval", self.ours, *few))
+        self.assertIn("the plant of each episode without the model's differences; 0 of 1 plants",
+                      self.succeed("eval", "lqr", "--known-plant", "--model", "m.xml", *few))
         model = json.loads(self.succeed("eval", self.trained, *few, "--json"))["model"]
         self.assertEqual((model["file"], model["differences"]), (None, ["armature1 0.02 kg·m²"]))
         given = json.loads(self.succeed("eval", self.ours, "--model", "m.xml", *few, "--json"))
