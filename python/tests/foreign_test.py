@@ -740,6 +740,27 @@ class BadInput(InFolder, BadInputTest):
             with self.assertRaisesRegex(upswing.InputError, r"expected infos\[.*, got " + got):
                 upswing.train("sac", env=env, eval_env=Reach, max_episode_steps=20, **SHORT)
 
+    def test_observations_in_the_same_array(self):
+        class Same(Reach):
+            """An environment whose observations are one array."""
+
+            def _obs(self):
+                self.array = getattr(self, "array", np.zeros(2, np.float32))
+                self.array[:] = super()._obs()
+                return self.array
+
+        for mode in AutoresetMode:
+            for kind in (SyncVectorEnv, AsyncVectorEnv):
+                env = kind([Same] * 2, autoreset_mode=mode)
+                self.addCleanup(env.close)
+                if mode == AutoresetMode.SAME_STEP:
+                    self.refuse_env("for AutoresetMode.SAME_STEP, got Same, which returns the same "
+                                    "array again", env)
+                elif kind is SyncVectorEnv:
+                    np.testing.assert_array_equal(
+                        upswing.train("sac", env=env, **SHORT).last.act([1, 1]),
+                        upswing.train("sac", env=Reach, num_envs=2, **SHORT).last.act([1, 1]))
+
     def test_episodes_that_do_not_repeat(self):
         class Drifting(Reach):
             drift = 0.0

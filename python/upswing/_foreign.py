@@ -22,7 +22,8 @@ from gymnasium.wrappers.vector import (DictInfoToList, HumanRendering, RecordEpi
 from gymnasium.wrappers.vector import RescaleAction as RescaleVectorAction
 
 from . import _upswing
-from ._lanes import Arrays, Lanes, VectorLanes, check_apart, check_reset
+from ._lanes import (Arrays, Lanes, VectorLanes, check_apart, check_last_observations,
+                     check_reset)
 from ._settings import whole_number
 from .policy import Policy
 from ._spaces import Spaces, brief, check_finite, one_line
@@ -78,6 +79,7 @@ class Source:
         self._try(trial)
         if isinstance(first, VectorEnv):
             check_reset(first)
+            check_last_observations(first, trial, self.space)
             self._try(first)
         # An environment that is passed itself needs a copy only for a second episode.
         if not isinstance(eval_env, gym.Env):

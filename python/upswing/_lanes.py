@@ -103,6 +103,23 @@ def check_reset(env: VecEnv) -> None:
                                   "changes every environment")
 
 
+def check_last_observations(env: VecEnv, single: Env, space: Spaces) -> None:
+    """Raises InputError if the reset of an environment like `single` would change its last
+    observation, of which a vector environment of such parts keeps no copy."""
+    inner = env
+    while isinstance(inner, VectorWrapper):
+        inner = inner.env
+    if not (_resets_itself(env) and isinstance(inner, (SyncVectorEnv, AsyncVectorEnv))):
+        return
+    first = single.reset(seed=0)[0]
+    later = single.step(space.action_of(space.any_actions(1)[0]))[0]
+    if first is later or np.shares_memory(first, later):
+        raise _upswing.InputError(
+            "env: expected observations that later steps do not change, for AutoresetMode.SAME_STEP, "
+            f"got {type(single.unwrapped).__name__}, which returns the same array again; return a "
+            "copy, or use NEXT_STEP")
+
+
 def _resets_itself(env: VecEnv) -> bool:
     """Whether ended episodes begin again in the step that ends them."""
     mode = env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP)
