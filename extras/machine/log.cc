@@ -92,13 +92,16 @@ std::string TextIn(const toml::node& node, const std::string& place) {
 }
 
 /// The scale that the end of a column's name states, such as `q1 [deg]`, `q1 (deg)` or `time_ms`; 1
-/// if it states none.
-double ScaleInName(std::string name, std::string_view quantity) {
-  if (name.ends_with(']') || name.ends_with(')')) name.pop_back();
-  const size_t before = name.find_last_of("[(_ ");
+/// if it states none. Throws BadInput for brackets with another text than a unit or an index.
+double ScaleInName(std::string name, std::string_view quantity, const std::string& place) {
+  const bool has_brackets = name.ends_with(']') || name.ends_with(')');
+  if (has_brackets) name.pop_back();
+  const size_t before = name.find_last_of(has_brackets ? "[(" : "_ ");
   if (before == std::string::npos) return 1;
+  const std::string unit = name.substr(before + 1);
+  if (has_brackets && !ParseNumber(unit)) return ScaleOf(unit, quantity, place);
   for (const LogUnit& known : kUnits) {
-    if (quantity == known.quantity && name.substr(before + 1) == known.name) return known.scale;
+    if (quantity == known.quantity && unit == known.name) return known.scale;
   }
   return 1;
 }
@@ -110,7 +113,7 @@ LogColumn ColumnIn(const toml::node& node, std::string_view quantity, const std:
   const toml::table* table = node.as_table();
   if (table == nullptr) {
     column.name = TextIn(node, place);
-    column.scale = ScaleInName(column.name, quantity);
+    column.scale = ScaleInName(column.name, quantity, place);
     return column;
   }
   bool states_scale = false;
@@ -136,7 +139,7 @@ LogColumn ColumnIn(const toml::node& node, std::string_view quantity, const std:
     }
   }
   if (column.name.empty()) throw BadInput(Concat(place, "expected a column, got none"));
-  if (!states_scale) column.scale *= ScaleInName(column.name, quantity);
+  if (!states_scale) column.scale *= ScaleInName(column.name, quantity, place);
   return column;
 }
 

@@ -300,6 +300,15 @@ TEST(MachineLog, BadColumnFilesGetOneLineWithThePlace) {
             "columns.toml:4: speed1: expected one ");
   EXPECT_EQ(ComplaintAboutColumns(good + "velocity1 = {column = \"w\", unit = \"deg\"}\n"),
             "columns.toml:4: velocity1: unit: expected rad/s, deg/s, turn/s, rpm, got \"deg\"");
+  for (const std::string name : {"w [degrees/s]", "w (1/min)", "w (raw)"}) {
+    EXPECT_EQ(
+        ComplaintAboutColumns(Concat(good, "velocity1 = {column = \"", name, "\", factor = -1}\n")),
+        Concat("columns.toml:4: velocity1: unit: expected rad/s, deg/s, turn/s, rpm, got \"",
+               name.substr(3, name.size() - 4), "\""));
+  }
+  EXPECT_EQ(ComplaintAboutColumns(good + "commanded1 = \"u [mN m]\"\n"),
+            "columns.toml:4: commanded1: unit: expected Nm, N·m, mNm, mN·m, got \"mN m\"");
+  EXPECT_EQ(ParseLogColumns(good + "commanded1 = \"u[1]\"\n", "").commanded[0].scale, 1);
   EXPECT_EQ(ComplaintAboutColumns(good + "velocity1 = {unit = \"rpm\"}\n"),
             "columns.toml:4: velocity1: expected a column, got none");
   EXPECT_EQ(ComplaintAboutColumns(good + "velocity1 = {column = \"w\", sign = -1}\n"),
