@@ -45,7 +45,7 @@ test('the claim about our study holds in its table', () => {
   expect(read('../../index.html').replace(/\s+/g, ' ')).toContain(
     'In our study with 20 seeds each, dueling halved the steps and Double made no clear difference.',
   );
-  const table = read('../../../docs/results/seeds.md');
+  const table = read('../../../docs/results/agents.md').split('<!-- table: dueling -->')[1]!;
   const steps = (variant: string) => {
     const cells = table.split(`\n| ${variant} | `)[1]!.split(' | ');
     return { iqm: Number(cells[1]!.replace(',', '')), interval: cells[2]! };
