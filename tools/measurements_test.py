@@ -61,7 +61,8 @@ class Results(unittest.TestCase):
                 import numpy  # noqa: F401  pylint: disable=import-outside-toplevel,unused-import
             except ImportError:
                 self.skipTest("needs NumPy")
-            self.succeed("tools/results/seeds/how_many.py", runs)
+            for tool in ("distribution", "how_many"):
+                self.succeed(f"tools/results/seeds/{tool}.py", runs, "--out", Path(folder, tool))
 
 
 if __name__ == "__main__":
