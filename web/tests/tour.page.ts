@@ -491,9 +491,7 @@ test('at any size, pendulum, words, control and buttons are on one screen', asyn
             });
             for (const element of groups.flat()) observer.observe(element);
           });
-          // The observer reports with a frame, which a still page does not draw.
-          const frames = setInterval(() => requestAnimationFrame(() => {}), 100);
-          void shares.then(() => clearInterval(frames));
+          await globalThis.drawn(); // the observer reports with a frame; a still page draws none
           return {
             counts: groups.map(({ length }) => length),
             least: Math.min(...(await shares)),
