@@ -115,18 +115,22 @@ int WriteDist(const DemoArguments& a, const fs::path& page) {
   return 0;
 }
 
-/// The page's folder of agents. With policies, their files and those of the page's own agents are
-/// in the new folder `temporary`, because the page may be read-only. `address`: as AddAgents
-/// returns.
-fs::path AgentsFolder(const DemoArguments& a, const fs::path& page,
-                      std::optional<Making>& temporary, std::string& address) {
-  if (a.policies.empty()) return page / kAgents;
+/// A folder of agents, and what AddAgents returned for it.
+struct PageAgents {
+  fs::path folder;
+  std::string address;
+};
+
+/// The page's agents. With policies, their files and those of the page's own agents are in the new
+/// folder `temporary`, because the page may be read-only.
+PageAgents AgentsOf(const DemoArguments& a, const fs::path& page,
+                    std::optional<Making>& temporary) {
+  if (a.policies.empty()) return {page / kAgents, ""};
   temporary.emplace(fs::temp_directory_path() / "upswing-demo", Making::Kind::kFolder);
   fs::path agents = temporary->path() / kAgents;
   fs::create_directory(agents);
   if (fs::is_directory(page / kAgents)) CopyContent(page / kAgents, agents);
-  address = AddAgents(a, agents);
-  return agents;
+  return {agents, AddAgents(a, agents)};
 }
 
 std::string Base64(std::string_view bytes) {
@@ -153,8 +157,8 @@ int WriteSingle(const DemoArguments& a, const fs::path& page) {
     throw Failure(Concat(page.string(), ": expected \"", kPlace, "\" in single.html, found none"));
   }
   std::optional<Making> temporary;
-  std::string files, address;
-  for (const fs::path& folder : {page / "assets", AgentsFolder(a, page, temporary, address)}) {
+  std::string files;
+  for (const fs::path& folder : {page / "assets", AgentsOf(a, page, temporary).folder}) {
     for (const auto& entry : fs::directory_iterator(folder)) {
       const fs::path& file = entry.path();
       const std::string type = file.extension().string();
@@ -175,8 +179,7 @@ int ServePage(const DemoArguments& a, const fs::path& page) {
   std::string job = Concat(kPatience, '\n', a.port == 0 ? kUsualPort : a.port, '\n',
                            a.port == 0 ? kLastPort : a.port, '\n', fs::absolute(page).string());
   std::optional<Making> temporary;
-  std::string address;
-  const fs::path agents = AgentsFolder(a, page, temporary, address);
+  const auto [agents, address] = AgentsOf(a, page, temporary);
   if (temporary) job += '\n' + agents.string();
   PythonChild server("demo", DemoServer(), job);
   while (const auto port = server.Next()) {
