@@ -41,7 +41,8 @@ Sac::Sac(const SacConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
   for (size_t i = 0; i < num_critics(); ++i) {
     TrainedNetwork network(config.Shape(D_ + A_, 1), B_, Rng(seed, "initial critic", i));
     AlignedVector<float> target(network.theta().begin(), network.theta().end());
-    critics_.push_back({std::move(network), std::move(target), y_, y_, y_, inputs_});
+    const AlignedVector<float> zeros(B_);
+    critics_.push_back({std::move(network), std::move(target), zeros, zeros, zeros, inputs_});
   }
 }
 
