@@ -115,7 +115,7 @@ int WriteDist(const DemoArguments& a, const fs::path& page) {
   return 0;
 }
 
-/// A folder of agents, and what AddAgents returned for it.
+/// A folder of agents, and the end of the address that shows the first one added (may be empty).
 struct PageAgents {
   fs::path folder;
   std::string address;
