@@ -227,14 +227,19 @@ void AdamPolyakStep(const AdamConstants& constants, std::span<const Real> g, std
   const Vec step = hn::Set(d, constants.step);
   const Vec epsilon = hn::Set(d, constants.epsilon);
   const Vec tau = hn::Set(d, constants.tau);
+  const Vec least = hn::Set(d, kLeastMoment);
+  const auto or_zero = [least](Vec moment) HWY_ATTR {
+    return hn::IfThenElseZero(hn::Ge(hn::Abs(moment), least), moment);
+  };
   ForVectors(g.size(), [&](size_t i, size_t count, auto partial) HWY_ATTR {
     const auto load = [&](auto values)
                           HWY_ATTR { return Load<partial.value>(values.data() + i, count); };
     const auto store = [&](Vec value, std::span<Real> to)
                            HWY_ATTR { Store<partial.value>(value, to.data() + i, count); };
     const Vec gradient = hn::Mul(load(g), scale);
-    const Vec m_new = hn::MulAdd(beta1, load(m), hn::Mul(rest1, gradient));
-    const Vec v_new = hn::MulAdd(beta2, load(v), hn::Mul(rest2, hn::Mul(gradient, gradient)));
+    const Vec m_new = or_zero(hn::MulAdd(beta1, load(m), hn::Mul(rest1, gradient)));
+    const Vec v_new =
+        or_zero(hn::MulAdd(beta2, load(v), hn::Mul(rest2, hn::Mul(gradient, gradient))));
     const Vec move = hn::Div(hn::Mul(step, m_new), hn::Add(hn::Sqrt(v_new), epsilon));
     const Vec p_new = hn::Sub(load(p), move);
     store(m_new, m);

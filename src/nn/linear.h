@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <span>
 
 #include "base/matrix.h"
@@ -71,6 +72,12 @@ struct AdamConstants {
   Real step, epsilon;  // corrected step size and ε
   Real tau;            // rate of Polyak averaging
 };
+
+/// Smaller moments become 0. Without gradients, as behind a unit that is never active, the moments
+/// would decay into subnormal numbers, stay there by rounding, and make each step several times as
+/// slow. Their product with a step size is still a normal number.
+inline constexpr Real kLeastMoment =
+    std::numeric_limits<Real>::min() / std::numeric_limits<Real>::epsilon();
 
 /// One pass, with the scaled gradient g: m ← β1 m + (1-β1) g, v ← β2 v + (1-β2) g²,
 /// p ← p - step · m / (sqrt(v) + ε), target ← target + tau · (p - target) unless `target` is empty.

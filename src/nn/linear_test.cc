@@ -309,5 +309,22 @@ TEST_P(KernelTest, AdamAndPolyakInOnePass) {
   }
 }
 
+TEST_P(KernelTest, MomentsWithoutGradientEndAtZero) {
+  const AdamConstants c{1, Real(0.9), Real(0.99), Real(0.01), Real(1e-8), 0};
+  for (const int n : {1, 50}) {
+    Table g(1, n, "g"), m(1, n, "m"), v(1, n, "v"), p(1, n, "p");
+    std::ranges::fill(g.row(), Real(0));
+    std::ranges::fill(m.row(), Real(-1.01) * kLeastMoment);
+    std::ranges::fill(v.row(), Real(1.05) * kLeastMoment);
+    std::ranges::fill(p.row(), Real(1));
+    AdamPolyakStep(c, g.row(), m.row(), v.row(), p.row(), {});
+    for (int k = 0; k < n; ++k) {
+      EXPECT_EQ(m.view(0, k), 0);
+      EXPECT_EQ(v.view(0, k), Real(0.99) * (Real(1.05) * kLeastMoment));
+      EXPECT_EQ(p.view(0, k), 1);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace upswing
