@@ -53,12 +53,17 @@ class TrainingEvaluator : public Evaluator {
 
  private:
   Evaluation EvaluateIn(const Engine& engine, const Policy& policy, int64_t step) const {
-    EnvConfig config = EvaluationEnvironments(config_, step);
-    config.pool = &pool_;
-    config.engine = &engine;
-    config.make_foreign = make_foreign_;
-    const std::unique_ptr<VectorEnv> env = MakeEnv(config);
-    return upswing::Evaluate(policy, *env, &pool_);
+    EnvConfig env = config_.Environments();
+    env.num_envs = static_cast<int>(config_.train.eval_episodes);  // one per episode
+    env.episode_seconds = SpecOf(env).evaluation.seconds;
+    env.start = StartStates();
+    env.reward = RewardConfig();
+    env.stream = Concat("evaluation at step ", step);
+    env.for_evaluation = true;
+    env.pool = &pool_;
+    env.engine = &engine;
+    env.make_foreign = make_foreign_;
+    return upswing::Evaluate(policy, *MakeEnv(env), &pool_);
   }
 
   const Config& config_;
@@ -71,17 +76,6 @@ class TrainingEvaluator : public Evaluator {
 
 bool IsScreened(const Config& config) {
   return config.eval_physics == kScreened && config.mjcf.empty() && !config.is_foreign();
-}
-
-EnvConfig EvaluationEnvironments(const Config& config, int64_t step) {
-  EnvConfig env = config.Environments();
-  env.num_envs = static_cast<int>(config.train.eval_episodes);
-  env.episode_seconds = SpecOf(env).evaluation.seconds;
-  env.start = StartStates();
-  env.reward = RewardConfig();
-  env.stream = Concat("evaluation at step ", step);
-  env.for_evaluation = true;
-  return env;
 }
 
 Training::Training(Config config, const Host& host)

@@ -11,10 +11,6 @@
 
 namespace upswing {
 
-/// The environments of the evaluation at a step of a training with these settings: one per episode.
-/// The engine is the training's.
-EnvConfig EvaluationEnvironments(const Config& config, int64_t step);
-
 /// Whether evaluations run in the closed form and MuJoCo confirms the evaluations that solve the
 /// task. With the same setting, a model of your own, which has no closed form, is evaluated in
 /// MuJoCo.

@@ -124,36 +124,6 @@ void PrintPair(const Comparison& comparison, const PairSummary& pair) {
   fmt::print("\n");
 }
 
-/// Prints the figures of a policy, which has no seeds.
-void PrintPolicy(const JudgedPolicy& policy, const std::string& task) {
-  const Evaluation& e = policy.figures;
-  const auto print = [](const char* name, const std::string& text) {
-    fmt::print("  {:<16}{}\n", name, text);
-  };
-  fmt::print("{}\n", Printable(policy.name));
-  if (!task.empty()) print("task", Printable(task));
-  print("episodes", fmt::format("{}, from the final evaluations of {}", FormatCount(e.episodes),
-                                policy.runs == 1 ? "one run" : Concat(policy.runs, " runs")));
-  print("success", EstimateText({e.success_rate(), e.success_interval}, Percent));
-  const bool upright = e.successes > 0;
-  if (upright) print("swing-up time", QuartilesText(e.swing_up_seconds));
-  print("return", MomentsText(e.reward_sum));
-  print("rms torque", Concat(Torque(e.rms_torque.mean), " N·m"));
-  print("torque change", Concat(Torque(e.torque_variation.mean), " N·m/s"));
-  if (upright) print("  once upright", Concat(Torque(e.goal_variation.mean), " N·m/s"));
-  fmt::print("\n");
-}
-
-void PrintAgainst(const Comparison& comparison, const AgainstPolicy& against) {
-  const RunGroup& group = comparison.groups[against.group];
-  fmt::print("{} against {}\n", Printable(group.label),
-             Printable(comparison.policies[against.policy].name));
-  fmt::print("  {:<16}in {} of {} runs (95% {} to {}); IQM minus the policy's return: {}\n\n",
-             "higher return", against.higher, group.runs.size(),
-             Percent(against.higher_interval.low), Percent(against.higher_interval.high),
-             EstimateText(against.difference, Signed));
-}
-
 /// JSON writes null for a number that is not finite, such as the time to solve of an unsolved run.
 ordered_json EstimateJson(const Estimate& e) {
   ordered_json j{{"value", e.value}, {"interval_95", nullptr}};
@@ -202,11 +172,7 @@ void PrintComparison(const Comparison& comparison) {
     return fmt::format("{} ({})", task + 1, comparison.task_texts[static_cast<size_t>(task)]);
   };
   for (const RunGroup& group : comparison.groups) PrintGroup(group, task_text(group.task));
-  for (const JudgedPolicy& policy : comparison.policies) {
-    PrintPolicy(policy, task_text(policy.task));
-  }
   for (const PairSummary& pair : comparison.pairs) PrintPair(comparison, pair);
-  for (const AgainstPolicy& against : comparison.against) PrintAgainst(comparison, against);
   for (const std::string& note : comparison.notes) fmt::print("Note: {}\n", Printable(note));
   const bool fewer = std::ranges::any_of(comparison.groups, [](const RunGroup& group) {
     return ResamplesOf(std::ssize(group.runs)) < kResamples;
@@ -216,11 +182,6 @@ void PrintComparison(const Comparison& comparison) {
       "bootstrap "
       "with\n{}{} resamples of the runs.\n",
       fewer ? "at most " : "", FormatCount(kResamples));
-  if (!comparison.policies.empty()) {
-    fmt::print(
-        "A policy has no seeds: its return is the mean ± the standard deviation over episodes. "
-        "Intervals of\ndifferences to it cover only the spread of the runs.\n");
-  }
 }
 
 void PrintWritten(const std::vector<std::string>& files) {
@@ -248,21 +209,6 @@ std::string ComparisonJson(const Comparison& comparison) {
                           {"solve_steps_difference", difference(pair.steps)},
                           {"higher_return", EstimateJson(pair.final_return.better)},
                           {"return_difference", difference(pair.final_return)}});
-  }
-  j["policies"] = ordered_json::array();
-  for (const JudgedPolicy& policy : comparison.policies) {
-    ordered_json p{{"policy", policy.name}, {"task", policy.task + 1}, {"runs", policy.runs}};
-    AddFigures(policy.figures, false, p);
-    j["policies"].push_back(p);
-  }
-  j["against_policies"] = ordered_json::array();
-  for (const AgainstPolicy& against : comparison.against) {
-    j["against_policies"].push_back(
-        {{"group", comparison.groups[against.group].label},
-         {"policy", comparison.policies[against.policy].name},
-         {"higher_return", against.higher},
-         {"higher_return_interval_95", {against.higher_interval.low, against.higher_interval.high}},
-         {"return_difference", EstimateJson(against.difference)}});
   }
   return PrintableJson(j);
 }

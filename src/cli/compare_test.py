@@ -4,7 +4,6 @@
 import csv
 import json
 import re
-import shutil
 import statistics
 import unittest
 import xml.etree.ElementTree as ET
@@ -203,7 +202,7 @@ class CompareTest(ProgramTest):
         refuse([], "compare: expected RUN|FOLDER")
         refuse(["none"], "none: no such file or folder")
         refuse(["r", "none"], "none: no such file or folder")
-        refuse(["file"], "file: expected a run folder or a policy.safetensors, got another file")
+        refuse(["file"], "file: expected a run folder, got another file")
         refuse(["empty"], "empty", "config.toml", "got neither")
         refuse(["r", "r/seed2"], "r/seed2", "got it twice")
         refuse(["begun"], "begun", "unfinished", "2,000 of 4,000", "--unfinished")
@@ -388,52 +387,16 @@ class CompareTest(ProgramTest):
         self.assertEqual(group["runs"][0]["steps"], 4000)
         self.assertEqual(group["runs"][0]["seconds"], rows[1]["seconds"])
 
-    def test_a_policy_is_judged_on_the_episodes_of_the_final_evaluation(self):
-        self.succeed(*small(eval_every=4000, eval_physics="closed-form", mass2=1.1))
-        (row,) = read_csv(self.folder / "run/evals.csv")
-        names = ["run", "run/policy.safetensors", "lqr"]
-        answer = self.compare(*names)
-        own, lqr = answer["policies"]
-        self.assertEqual(own["return"]["mean"], row["mean_return"])  # to the last bit
-        self.assertEqual(own["rms_torque"]["mean"], row["rms_torque"])
-        self.assertEqual((lqr["policy"], lqr["successes"], lqr["runs"]), ("lqr", 0, 1))
-        self.assertEqual(lqr["episodes"], own["episodes"])
-        against = answer["against_policies"]
-        self.assertEqual([a["policy"] for a in against], ["run/policy.safetensors", "lqr"])
-        self.assertEqual(against[0]["return_difference"], {"value": 0, "interval_95": None})
-        self.assertEqual(against[1]["return_difference"]["value"],
-                         row["mean_return"] - lqr["return"]["mean"])
-        # A controller is designed for the plant of the runs, unless another plant is named.
-        pfl = lambda *flags: self.compare("run", "pfl", *flags)["policies"][0]["return"]
-        self.assertEqual(pfl("--made-for", "mass2=1.1"), pfl())
-        self.assertNotEqual(pfl("--made-for", "mass2=1"), pfl())
-        text = self.succeed("compare", *names, "--out", "out")
-        self.assertRegex(text, r"lqr\n  episodes +4, from the final evaluations of one run\n"
-                               r"  success +0\.0% \(95% 0\.0% to 49\.0%\)\n  return ")
-        self.assertIn("d3qn-small against lqr\n", text)
-        svg = (self.folder / "out/curves.svg").read_text(encoding="utf-8")
-        self.assertIn("lqr", svg)
-        self.assertNotIn("policy.safetensors", svg)  # a path would not fit
-        # Policies in folders with the same name are distinguished by the parent folders.
-        (self.folder / "copy/run").mkdir(parents=True)
-        shutil.copy(self.folder / "run/policy.safetensors", self.folder / "copy/run")
-        self.succeed("compare", *names[:2], "copy/run/policy.safetensors", "--out", "two")
-        svg = (self.folder / "two/curves.svg").read_text(encoding="utf-8")
-        for title in ("run", "copy/run"):
-            self.assertIn(f">{title}<", svg)
-        self.refuse(["compare", *names[:2], "./run/../run/policy.safetensors"], "got it twice")
-
-    def test_refuses_policies_without_runs_or_for_another_joint(self):
+    def test_refuses_policies_and_controllers(self):
         self.make_group("r", [1, 2])
+        self.write("r/seed1/policy.safetensors", "")
         refuse = lambda arguments, *words: self.refuse(["compare", *arguments], *words)
-        refuse(["lqr", "tvlqr"], "expected runs too, whose episodes lqr tvlqr", "bounds lqr tvlqr")
-        refuse(["r", "lqr", "--different-tasks"], "--different-tasks", "got lqr")
-        refuse(["r", "--lqr-torque", "2"], "--lqr-torque: expected a controller (", "with it, got none")
-        refuse(["r", "lqr", "--made-for", "actuated_joint=2"],
-               "lqr (for actuated_joint 2): expected a policy for a motor at joint 1, as in the runs, got "
-               "one for joint 2")
-        refuse(["r", "lqr", "lqr"], "lqr: expected each policy once, got it twice")
+        for name in ("lqr", "sac", "r/seed1/policy.safetensors"):
+            refuse(["r", name], f"{name}: expected a run or a folder of runs, got a policy or controller",
+                   f"`upswing eval {name}` judges")
         refuse(["r", "none.safetensors"], "none.safetensors: no such file")
+        refuse(["r", "lqr", "--made-for", "mass2=1"], "unknown flag --made-for", "upswing eval")
+        refuse(["r", "--threads", "2"], "unknown flag --threads", "upswing eval")
 
 
 if __name__ == "__main__":

@@ -13,6 +13,22 @@
 namespace upswing {
 namespace {
 
+/// Mean and deviation, such as `34.18 ± 0.57`. The deviation has two digits, or more if its whole
+/// part has more. The mean has as many decimals as the deviation.
+std::string MomentsText(const Moments& m, double scale = 1) {
+  constexpr double kLeast = 1e-6;  // smaller numbers are rounding errors
+  const double mean = scale * m.mean, deviation = scale * m.deviation;
+  if (deviation < kLeast) return fmt::format("{:.4g} ± 0", std::abs(mean) < kLeast ? 0 : mean);
+  const int decimals = std::max(0, 1 - static_cast<int>(std::floor(std::log10(deviation))));
+  return fmt::format("{:.{}f} ± {:.{}f}", mean, decimals, deviation, decimals);
+}
+
+/// Median and quartiles, such as `2.74 s   (median; middle half 2.70 to 2.78 s)`.
+std::string QuartilesText(const Quartiles& q) {
+  return fmt::format("{:.2f} s   (median; middle half {:.2f} to {:.2f} s)", q.median, q.low,
+                     q.high);
+}
+
 /// Length of the episodes: the common length, or the mean if some end earlier.
 std::string LengthText(const Moments& seconds) {
   constexpr double kSame = 1e-6;  // s
@@ -58,19 +74,6 @@ void PrintTorques(const Evaluation& e) {
 
 bool ValueIsOff(double expected, double attained) {
   return std::abs(expected - attained) > 0.25 * std::abs(attained);
-}
-
-std::string MomentsText(const Moments& m, double scale) {
-  constexpr double kLeast = 1e-6;  // smaller numbers are rounding errors
-  const double mean = scale * m.mean, deviation = scale * m.deviation;
-  if (deviation < kLeast) return fmt::format("{:.4g} ± 0", std::abs(mean) < kLeast ? 0 : mean);
-  const int decimals = std::max(0, 1 - static_cast<int>(std::floor(std::log10(deviation))));
-  return fmt::format("{:.{}f} ± {:.{}f}", mean, decimals, deviation, decimals);
-}
-
-std::string QuartilesText(const Quartiles& q) {
-  return fmt::format("{:.2f} s   (median; middle half {:.2f} to {:.2f} s)", q.median, q.low,
-                     q.high);
 }
 
 void PrintEvalTable(const EvalReport& report) {

@@ -50,7 +50,7 @@ class InfoTest(ProgramTest):
         self.assert_says(self.succeed("info"), "policies    d3qn, d3qn-adaptive, ", "sac (shipped)")
         self.assert_says(self.succeed("info", "sac"), "sac\n", "agent sac", "self-check  passed")
         self.refuse(["info", "sax"], "a shipped policy or a controller (d3qn, ", "did you mean sac?")
-        self.refuse(["compare", "sac"], "expected runs too, whose episodes sac")
+        self.refuse(["compare", "sac"], "sac: expected a run or a folder of runs, got a policy")
         (self.folder / "sac").mkdir()  # a folder here comes first
         self.refuse(["info", "sac"], "sac: expected a run with a policy.safetensors, got another folder")
 

@@ -8,6 +8,7 @@
 #include "base/csv.h"
 #include "base/error.h"
 #include "base/format.h"
+#include "base/json.h"
 #include "base/text.h"
 #include "pendulum/upright_modes.h"
 
@@ -64,6 +65,31 @@ void AddCells(const EvalReport& report, const JudgedEpisode& episode, CsvTable& 
   }
 }
 
+/// Adds the figures of an evaluation to its JSON document.
+void AddFigures(const EvalReport& report, ordered_json& j) {
+  const Evaluation& e = report.figures;
+  const bool upright = e.successes > 0;
+  const bool settled = upright && e.settled > 0;
+  j["episodes"] = e.episodes;
+  j["successes"] = e.successes;
+  j["success_rate"] = e.success_rate();
+  j["success_interval_95"] = {e.success_interval.low, e.success_interval.high};
+  j["settled"] = upright ? e.settled : 0;
+  j["steady_tilt_degrees"] = nullptr;
+  if (upright) {
+    j["steady_tilt_degrees"] = {{"link1", FigureJson(e.tilt[0], kDegrees)},
+                                {"link2", FigureJson(e.tilt[1], kDegrees)}};
+  }
+  for (size_t k = 0; k < e.term_means.size(); ++k) {
+    j["reward_terms"][kRewardTermNames[k]] = e.term_means[k];
+  }
+  for (const EvaluationFigure& figure : EvaluationFigures()) {
+    ordered_json& value = j[figure.name] = nullptr;
+    if (!IsKnown(figure, upright, settled, report.knows_values)) continue;
+    value = std::visit([&](auto member) { return FigureJson(e.*member); }, figure.summary);
+  }
+}
+
 using DesignFor = decltype(LoadedPolicy::design_for);
 
 /// Evaluates the episodes of `config`, each with a controller designed for its plant.
@@ -106,29 +132,6 @@ void JudgeEpisodes(const Policy& policy, const DesignFor* design_for,
 }
 
 }  // namespace
-
-void AddFigures(const Evaluation& e, bool knows_values, ordered_json& j) {
-  const bool upright = e.successes > 0;
-  const bool settled = upright && e.settled > 0;
-  j["episodes"] = e.episodes;
-  j["successes"] = e.successes;
-  j["success_rate"] = e.success_rate();
-  j["success_interval_95"] = {e.success_interval.low, e.success_interval.high};
-  j["settled"] = upright ? e.settled : 0;
-  j["steady_tilt_degrees"] = nullptr;
-  if (upright) {
-    j["steady_tilt_degrees"] = {{"link1", FigureJson(e.tilt[0], kDegrees)},
-                                {"link2", FigureJson(e.tilt[1], kDegrees)}};
-  }
-  for (size_t k = 0; k < e.term_means.size(); ++k) {
-    j["reward_terms"][kRewardTermNames[k]] = e.term_means[k];
-  }
-  for (const EvaluationFigure& figure : EvaluationFigures()) {
-    ordered_json& value = j[figure.name] = nullptr;
-    if (!IsKnown(figure, upright, settled, knows_values)) continue;
-    value = std::visit([&](auto member) { return FigureJson(e.*member); }, figure.summary);
-  }
-}
 
 EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& trial, int64_t episodes,
                           ThreadPool& pool, const Progress& progress) {
@@ -186,7 +189,7 @@ std::string EvalJson(const EvalReport& report) {
     if (option.name == "posterior" && conditions.randomization.posterior.empty()) continue;
     j[option.section][option.name] = JsonOf(option);
   }
-  AddFigures(report.figures, report.knows_values, j);
+  AddFigures(report, j);
   return PrintableJson(j);
 }
 

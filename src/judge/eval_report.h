@@ -6,7 +6,6 @@
 
 #include "agents/config.h"
 #include "agents/loaded_policy.h"
-#include "base/json.h"
 #include "judge/trial.h"
 #include "pendulum/pendulum_env.h"
 #include "rl/evaluate.h"
@@ -44,9 +43,6 @@ EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& tria
 
 /// Number of episodes with a controller designed for their plant.
 int64_t NumDesigned(const EvalReport& report);
-
-/// Adds the figures of an evaluation to a JSON document.
-void AddFigures(const Evaluation& e, bool knows_values, nlohmann::ordered_json& j);
 
 /// The report as a JSON document.
 std::string EvalJson(const EvalReport& report);

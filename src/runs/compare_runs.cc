@@ -15,6 +15,7 @@
 #include "os/file.h"
 #include "os/making.h"
 #include "runs/config_files.h"
+#include "runs/find_policy.h"
 #include "runs/finished_run.h"
 #include "runs/model_info.h"
 #include "runs/run_folder.h"
@@ -66,19 +67,28 @@ void AddRuns(const fs::path& folder, Found& found, std::vector<fs::path>& paths)
   }
 }
 
+/// Throws BadInput if a path is the name or the file of a policy or controller.
+void ExpectNoPolicy(const fs::path& path) {
+  std::error_code error;
+  const bool is_name = IsController(path.string()) && !Exists(path);
+  const bool is_file = path.extension() == ".safetensors" && fs::is_regular_file(path, error);
+  if (!is_name && !is_file && ShippedPolicy(path).empty()) return;
+  throw BadInput(Concat(path.string(), ": expected a run or a folder of runs, got a policy or ",
+                        "controller, which `upswing eval ", path.string(), "` judges"));
+}
+
 /// The run folders in a folder, in alphabetical order.
 std::vector<fs::path> RunsIn(const fs::path& folder, Found& found) {
   if (IsKept(folder)) return {folder};
+  ExpectNoPolicy(folder);
   if (!Exists(folder)) {
-    throw BadInput(Concat(folder.string(),
-                          ": no such file or folder; expected a run, a folder of runs, ",
-                          "a policy.safetensors or a controller (", Join(ControllerNames(), ", "),
-                          ")", DidYouMean(folder.string(), ControllerNames())));
+    throw BadInput(
+        Concat(folder.string(), ": no such file or folder; expected a run or a folder of runs"));
   }
   std::vector<fs::path> paths;
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
-    found.LeaveOut(folder, "expected a run folder or a policy.safetensors, got another file");
+    found.LeaveOut(folder, "expected a run folder, got another file");
     return paths;
   }
   const size_t problems = found.left_out.size();

@@ -120,7 +120,7 @@ std::vector<double> CurveGrid(const RunGroup& group, const CurveAxis& x, double 
   return grid;
 }
 
-Figure LearningCurves(const std::vector<RunGroup>& groups, const std::vector<Level>& levels) {
+Figure LearningCurves(const std::vector<RunGroup>& groups) {
   const auto parts = Parts(groups);
   Figure figure;
   figure.columns = 2;
@@ -139,11 +139,7 @@ Figure LearningCurves(const std::vector<RunGroup>& groups, const std::vector<Lev
     for (size_t k = 0; k < std::size(axes); ++k) {
       // One legend, at the right of the upper row.
       const double end = LastOf(groups, axes[k].x);
-      Panel& panel = figure.panels.emplace_back(CurvesPanel(part, axes[k], end, k == 1));
-      for (const Level& level : levels) {
-        const double y = axes[k].y_label == kSuccess ? 100 * level.success_rate : level.mean_return;
-        panel.lines.push_back({k == 1 ? level.name : "", {0, end}, {y, y}, {}, {}});
-      }
+      figure.panels.push_back(CurvesPanel(part, axes[k], end, k == 1));
     }
   }
   std::vector<const Panel*> returns;
@@ -153,7 +149,6 @@ Figure LearningCurves(const std::vector<RunGroup>& groups, const std::vector<Lev
     for (const Line& line : panel.lines) dotted = dotted || line.dotted_from;
   }
   if (dotted) figure.caption += " Dotted: a run has ended and keeps its last value.";
-  if (!levels.empty()) figure.caption += " Level lines: policies that were not trained here.";
   const auto return_range = RangeFromZero(returns);
   for (Panel& panel : figure.panels) {
     panel.y_range = panel.y_label == kReturn ? return_range : std::pair(0.0, 102.0);

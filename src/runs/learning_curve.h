@@ -24,16 +24,9 @@ std::vector<double> CurveGrid(const RunGroup& group, const CurveAxis& x, double 
 
 inline constexpr size_t kMostCurves = 5;  // in one panel
 
-/// A policy or controller without learning, drawn next to learning curves.
-struct Level {
-  std::string name;
-  double success_rate, mean_return;  // success_rate 0 to 1
-};
-
 /// Success and return over steps and over training time: four panels with a curve for each group.
 /// More than kMostCurves groups are split into parts with four panels each, all with the same axes.
-/// A curve is dotted where at least one of its runs has ended and keeps its last value. Levels are
-/// horizontal lines.
-Figure LearningCurves(const std::vector<RunGroup>& groups, const std::vector<Level>& levels = {});
+/// A curve is dotted where at least one of its runs has ended and keeps its last value.
+Figure LearningCurves(const std::vector<RunGroup>& groups);
 
 }  // namespace upswing
