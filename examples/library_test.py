@@ -33,7 +33,7 @@ def run(*command, **more):
 
 
 PORTABLE = ["base", "nn", "pendulum", "rl", "control"]
-EXAMPLES = ["control_loop", "dqn_on_one_page", "library_tour", "own_task", "train_and_judge"]
+EXAMPLES = ["control_loop", "dqn_on_one_page", "own_task", "train_and_judge"]
 
 # A project that finds the library, with one target for each part to build.
 PROJECT = f"""cmake_minimum_required(VERSION 3.25)
@@ -145,12 +145,6 @@ class Library(unittest.TestCase):
                              encoding="utf-8", stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         self.assertEqual((bad.returncode, bad.stdout), (2, ""))
         self.assertIn("four numbers", bad.stderr)
-
-    def test_library_tour(self):
-        lines = run(self.build("library_tour")).splitlines()
-        self.assertRegex(lines[-1], r"20000 steps, a checkpoint of \d{6,} bytes")
-        for begin in ("reward of random torques: ", "return of a brake: ", "loss "):
-            self.assertEqual(sum(line.startswith(begin) for line in lines), 1, begin)
 
     def test_every_target_and_example_is_documented(self):
         text = (ROOT / "docs/howto/cpp-library.md").read_text(encoding="utf-8")
