@@ -8,8 +8,8 @@
 
 /// Kernels for small networks. B = batch size.
 ///
-/// Every kernel is compiled for several instruction sets (base/simd.h). Only linear.cc, product.cc
-/// and the rooflines contain vector code.
+/// Every kernel is compiled for several instruction sets (base/simd.h). Only linear.cc and
+/// product.cc contain vector code.
 ///
 /// The order of each sum depends only on the sizes, not on a row's position in the batch. Splitting
 /// a batch into slices therefore changes no bit.

@@ -28,8 +28,6 @@ using BenchWork = std::function<void()>;
 struct BenchCase {
   std::string name;  // such as "gradient/plain/256-256/batch:128/threads:1"
   double count = 1;  // items, such as steps, in one call of the work
-  double flops = 0;  // additions and multiplications that one call needs at least; 0: unknown
-  int threads = 1;   // threads that work at the same time
   /// Makes the work and everything that it needs.
   std::function<BenchWork()> prepare = {};
 };
@@ -37,11 +35,6 @@ using BenchCases = std::vector<BenchCase>;
 
 /// Number of torque levels of agents with discrete actions.
 inline constexpr int kBenchActions = 9;
-
-/// Makes multiply-adds in registers at the processor's peak rate, with the vector instructions in
-/// use: `rounds` on each of many independent chains. Returns their number. `result` depends on all
-/// of them.
-int64_t MultiplyAddChains(int64_t rounds, float& result);
 
 // Cases of each part.
 BenchCases GradientCases(const BenchOptions& options);

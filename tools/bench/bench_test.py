@@ -33,10 +33,6 @@ class BenchTest(ProgramTest):
         for name, entry in cases.items():
             with self.subTest(name):
                 self.assertGreater(entry["items_per_second"], 0)
-                self.assertEqual("gflops" in entry, name in GRADIENT)
-                # The margin is generous, because other load may have disturbed the measurement of
-                # the peak.
-                self.assertLess(entry.get("gflops", 0), 3 * float(context["peak_gflops/threads:1"]))
         self.assertIn(f"upswing {context['upswing_version']}", self.succeed("--version"))
         self.assertTrue(context["cpu_model"])
 
@@ -46,19 +42,6 @@ class BenchTest(ProgramTest):
         names = [f"gradient/plain/24-16/batch:8/threads:{threads}" for threads in (1, 2)]
         env = [f"env/mujoco/envs:8/threads:{threads}" for threads in (1, 2)]
         self.assertEqual(list(cases), [*names, *env])
-        # Two forward passes, the gradients of weights, and the gradients of inputs without the
-        # observations.
-        layers = [8 * 24, 24 * 16, 16 * 9]
-        flops = 2 * 8 * (3 * sum(layers) + sum(layers[1:]))
-        for name in names:
-            rate = cases[name]["gflops"] / cases[name]["items_per_second"]
-            self.assertAlmostEqual(rate * 1e9, flops, delta=1e-3)
-
-    def test_dueling_counts_three_forward_passes(self):
-        _, cases = self.bench("gradient/dueling/256-256/batch:128", "--threads=1")
-        (entry,) = cases.values()
-        flops = 2 * 128 * (5 * 134_400 - 2048)
-        self.assertAlmostEqual(entry["gflops"] / entry["items_per_second"] * 1e9, flops, delta=1)
 
     def test_repetitions(self):
         table = self.succeed("bench", ENV[0], "--seconds", "0.001",

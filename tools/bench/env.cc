@@ -29,7 +29,6 @@ std::vector<double> RandomTorques(int num_envs) {
 BenchCase EnvCase(const std::string& physics, int num_envs, int threads) {
   return {.name = fmt::format("env/{}/envs:{}/threads:{}", physics, num_envs, threads),
           .count = static_cast<double>(num_envs),
-          .threads = threads,
           .prepare = [=]() -> BenchWork {
             const auto pool = std::make_shared<ThreadPool>(threads);
             PendulumEnvConfig config;

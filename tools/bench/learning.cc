@@ -29,20 +29,6 @@ DqnConfig BareDqn(bool dueling, const Widths& hidden, int64_t batch) {
   return config;
 }
 
-/// Operations of a gradient step: all forward passes, the gradients of all inputs except the
-/// observations, and the gradients of all weights.
-double UpdateFlops(const DqnConfig& config) {
-  const NetworkShape shape = config.Shape(kObservationSize, kBenchActions);
-  double all = 0;  // multiply-adds of a forward pass of one row
-  const Network network(shape);
-  for (const ParameterBlock& block : network.blocks()) {
-    if (block.in > 0) all += static_cast<double>(block.size());
-  }
-  const double first = static_cast<double>(shape.inputs) * shape.hidden.front();
-  const double forward = (config.double_q ? 3 : 2) * all;
-  return 2 * static_cast<double>(config.batch) * (forward + 2 * all - first);
-}
-
 /// A replay memory with `size` random transitions, 2% of which terminate.
 std::shared_ptr<Replay> FilledReplay(int64_t size) {
   Rng rng(1, "benchmark");
@@ -75,8 +61,6 @@ BenchCase GradientCase(const DqnConfig& config, const std::shared_ptr<Replay>& r
   return {.name = fmt::format("gradient/{}/{}/batch:{}/threads:{}",
                               config.dueling ? "dueling" : "plain", fmt::join(config.hidden, "-"),
                               config.batch, threads),
-          .flops = UpdateFlops(config),
-          .threads = threads,
           .prepare = [=]() -> BenchWork {
             const auto parts = std::make_shared<Parts>(config, threads);
             return [=] {

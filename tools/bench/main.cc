@@ -2,16 +2,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
-#include <chrono>
 #include <iostream>
-#include <map>
-#include <thread>
 
 #include "base/error.h"
 #include "base/simd.h"
 #include "base/text.h"
-#include "base/thread_pool.h"
 #include "cli/program.h"
 #include "os/host.h"
 #include "os/streams.h"
@@ -20,45 +15,12 @@
 namespace upswing {
 namespace {
 
-/// Single-precision multiplications and additions per second, in GFLOP/s, that `threads` threads
-/// reach together with the vector instructions in use, without access to memory. This is the best
-/// of several rounds of milliseconds. A fused multiply-add counts as two.
-double MeasurePeakGflops(int threads) {
-  // Long enough to have all processors without other load for some rounds.
-  constexpr std::chrono::milliseconds kDuration(300);
-  constexpr int64_t kRounds = 1 << 19;  // a few milliseconds
-  using Clock = std::chrono::steady_clock;
-  ThreadPool pool(threads);
-  double best = 0;
-  for (const auto end = Clock::now() + kDuration; Clock::now() < end;) {
-    std::atomic<int> arrived{0};
-    std::atomic<int64_t> multiply_adds{0};
-    std::vector<Clock::time_point> began(static_cast<size_t>(threads));
-    pool.ParallelFor(threads, [&](int thread) {
-      // Wait until all threads are here. No thread takes a second task before its first has ended.
-      ++arrived;
-      while (arrived < threads) std::this_thread::yield();
-      began[static_cast<size_t>(thread)] = Clock::now();
-      float result = 0;
-      multiply_adds += MultiplyAddChains(kRounds, result);
-      benchmark::DoNotOptimize(result);
-    });
-    const std::chrono::duration<double> elapsed = Clock::now() - *std::ranges::min_element(began);
-    best = std::max(best, 2e-9 * static_cast<double>(multiply_adds) / elapsed.count());
-  }
-  return best;
-}
-
-/// Measures a case. Counters are rates: items and GFLOP per second.
+/// Measures a case. The counter is a rate: items per second.
 void Measure(benchmark::State& state, const BenchCase& c) {
   const BenchWork work = c.prepare();
   for ([[maybe_unused]] auto iteration : state) work();
-  const auto calls = static_cast<double>(state.iterations());
-  const auto rate = [&](const std::string& name, double amount) {
-    if (amount > 0) state.counters[name] = {amount * calls, benchmark::Counter::kIsRate};
-  };
-  rate("items_per_second", c.count);
-  rate("gflops", 1e-9 * c.flops);
+  state.counters["items_per_second"] = {c.count * static_cast<double>(state.iterations()),
+                                        benchmark::Counter::kIsRate};
 }
 
 /// The cases whose names begin as wanted. Throws BadInput if there is none for a name.
@@ -112,14 +74,7 @@ int RunBench(BenchOptions options) {
   benchmark::AddCustomContext("upswing_version", UPSWING_VERSION);
   benchmark::AddCustomContext("cpu_model", CpuModel());
   benchmark::AddCustomContext("simd_path", SimdPath());
-  std::map<int, double> peaks;  // GFLOP/s by number of threads
   for (const BenchCase& c : cases) {
-    double& peak = peaks[c.threads];
-    if (c.flops > 0 && peak == 0) {
-      peak = MeasurePeakGflops(c.threads);
-      benchmark::AddCustomContext(Concat("peak_gflops/threads:", c.threads),
-                                  fmt::format("{:.1f}", peak));
-    }
     benchmark::RegisterBenchmark(c.name.c_str(), Measure, c)
         ->UseRealTime()
         ->MeasureProcessCPUTime();
@@ -154,9 +109,7 @@ void AddBench(CommandLine& line) {
       "Cases:\n"
       "  gradient  updates of DQN: sample a minibatch and learn from it\n"
       "  env       environment steps: physics, observation, reward, reset\n"
-      "\nGFLOP/s counts only the necessary multiplications and additions. The peak is measured\n"
-      "first: multiply-adds in registers on the same number of threads. CPU time is the sum\n"
-      "over all threads; other load affects it less than wall time.\n\n"
+      "\nCPU time is the sum over all threads; other load affects it less than wall time.\n\n"
       "Examples:\n"
       "  ./upswing bench                               everything, about half a minute\n"
       "  ./upswing bench gradient env --threads 1,2\n"
