@@ -109,7 +109,6 @@ nb::tuple MapHandle(const PolicyHandle& policy, const SettingTexts& settings,
     a.trial.set.push_back(flag.name + "=" + flag.text);
   a.trial.plant = plant;
   a.trial.unknown_plant = unknown_plant;
-  a.out = out;
   PythonProgress python_progress(progress);
   std::vector<MapResult> maps(1);
   MapResult& map = maps.front();
@@ -118,9 +117,10 @@ nb::tuple MapHandle(const PolicyHandle& policy, const SettingTexts& settings,
     const nb::gil_scoped_release unlocked;
     map = PlanMap(a, policy.loaded());
     const std::filesystem::path folder =
-        out.empty() ? std::filesystem::path() : MapFolder(a, policy.loaded(), map);
+        out.empty() ? std::filesystem::path()
+                    : FigureFolder(out, policy.loaded(), map.folder_name());
     ThreadPool pool(ResolveThreads(threads), threads == 0);
-    FillMap(policy.loaded(), pool, std::ref(python_progress), map);
+    map.cells = RunMap(map.config, *policy.loaded().policy, pool, std::ref(python_progress));
     if (!out.empty()) {
       MakeNewFolder(folder);
       WriteMaps(maps, folder);

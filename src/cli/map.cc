@@ -25,6 +25,7 @@ namespace fs = std::filesystem;
 struct MapCommand : MapArguments {
   std::vector<std::string> policies;
   PolicyArguments controllers;  // of the controllers among the policies
+  std::string out;
   int64_t threads = 0;
   bool as_json = false;
 };
@@ -55,9 +56,6 @@ void PrintMapTable(const MapResult& map) {
   } else {
     fmt::print("  swing-up   none: no episode stays upright\n");
   }
-  fmt::print("  rate       {} episodes in {}: {} per second\n", FormatCount(map.episodes()),
-             FormatDuration(map.seconds),
-             FormatCount(static_cast<double>(map.episodes()) / map.seconds));
   fmt::print("  written    {}\n", Printable(Join(map.files, ", ")));
 }
 
@@ -68,19 +66,15 @@ int RunMapCommand(const MapCommand& a) {
                           Join(a.policies, ", ")));
   }
   const std::vector<LoadedPolicy> policies = GetPolicies(a.policies, a.controllers);
-  const std::vector<std::string> titles = TitlesOf(policies);
   std::vector<MapResult> maps;
-  for (size_t i = 0; i < policies.size(); ++i) {
-    maps.push_back(PlanMap(a, policies[i]));
-    maps[i].title = titles[i];
-  }
+  for (const LoadedPolicy& loaded : policies) maps.push_back(PlanMap(a, loaded));
   CheckSameAxes(maps);
-  const fs::path folder = MapFolder(a, policies.front(), maps.front());
+  const fs::path folder = FigureFolder(a.out, policies.front(), maps.front().folder_name());
   SayIfNoFigures();
   ThreadPool pool(ResolveThreads(a.threads));
   for (size_t i = 0; i < maps.size(); ++i) {
     EpisodeProgress progress(a.as_json);
-    FillMap(policies[i], pool, std::ref(progress), maps[i]);
+    maps[i].cells = RunMap(maps[i].config, *policies[i].policy, pool, std::ref(progress));
   }
   MakeNewFolder(folder);
   WriteMaps(maps, folder);

@@ -87,15 +87,14 @@ class Show {
   /// One episode per policy, in their order; `policies` must outlive them.
   Show(const ViewArguments& a, const std::vector<LoadedPolicy>& policies)
       : recording_(!a.record.empty()) {
-    const std::vector<std::string> titles = TitlesOf(policies);
-    const auto add = [&](const LoadedPolicy* loaded, const std::string& title) {
+    const auto add = [&](const LoadedPolicy* loaded) {
       RolloutConfig config = TrialEpisode(a.trial, loaded);
-      config.title = title;
+      config.title = loaded != nullptr ? ShortTitle(*loaded) : "no policy";
       config.seconds = kForEver;
       episodes_.emplace_back(std::move(config));
     };
-    for (size_t i = 0; i < policies.size(); ++i) add(&policies[i], titles[i]);
-    if (policies.empty()) add(nullptr, "no policy");
+    for (const LoadedPolicy& loaded : policies) add(&loaded);
+    if (policies.empty()) add(nullptr);
   }
 
   /// Adds names and plants.

@@ -159,14 +159,6 @@ MapAxis ParseMapAxis(const std::string& text, const MapPoint& training, const st
   return axis;
 }
 
-void CheckDifferent(const MapAxis& x, const MapAxis& y) {
-  for (const std::string& setting : x.settings) {
-    if (!y.Sets(setting)) continue;
-    throw BadInput(Concat("--x and --y: expected two different quantities, got ", x.name, " and ",
-                          y.name, ", which both set ", setting));
-  }
-}
-
 MapPoint MapConfig::PointOf(int64_t cell) const {
   MapPoint result = point;
   const Options options = OptionsOf(result);

@@ -45,9 +45,6 @@ struct MapAxis {
 /// message that begins with `where`.
 MapAxis ParseMapAxis(const std::string& text, const MapPoint& training, const std::string& where);
 
-/// Throws BadInput if both axes set the same quantity.
-void CheckDifferent(const MapAxis& x, const MapAxis& y);
-
 /// The definition of a map.
 struct MapConfig {
   MapPoint point;            // conditions on neither axis

@@ -131,8 +131,6 @@ ordered_json JsonOf(const MapResult& map) {
     j["success_rate"][i / columns].push_back(RateOf(map, map.cells[i]));
     j["swing_up_seconds"][i / columns].push_back(map.cells[i].swing_up_seconds);
   }
-  j["seconds"] = map.seconds;
-  j["episodes_per_second"] = static_cast<double>(map.episodes()) / map.seconds;
   j["files"] = map.files;
   return j;
 }
@@ -142,7 +140,7 @@ ordered_json JsonOf(const MapResult& map) {
 double MapResult::mean_success() const {
   double sum = 0;
   for (const MapCell& cell : cells) sum += static_cast<double>(cell.successes);
-  return sum / static_cast<double>(episodes());
+  return sum / static_cast<double>(config.cells() * config.episodes);
 }
 
 double MapResult::always_success() const {

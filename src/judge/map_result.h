@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/text.h"
 #include "judge/map_grid.h"
 #include "runs/model_info.h"
 
@@ -18,10 +19,10 @@ struct MapResult {
   std::string changes;             // differences from the training, without the axes; empty: none
   std::string dot;                 // label of the training's point; empty: it is not on the map
   std::vector<MapCell> cells;      // (ny × nx)
-  double seconds = 0;              // wall time
   std::vector<std::string> files;  // written files
 
-  int64_t episodes() const { return config.cells() * config.episodes; }
+  /// Name of the map's folder without --out, such as `map-mass2-length2`.
+  std::string folder_name() const { return Concat("map-", config.x.name, "-", config.y.name); }
   double mean_success() const;     // success rate over all episodes
   double always_success() const;   // share of cells in which every episode succeeds
   double median_swing_up() const;  // median of the cells' medians, s; NaN if there are none

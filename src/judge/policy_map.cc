@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 
 #include "agents/config.h"
 #include "base/error.h"
@@ -15,9 +14,6 @@
 
 namespace upswing {
 namespace {
-
-namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
 
 constexpr int64_t kMostEpisodes = 10000000;
 
@@ -77,6 +73,15 @@ std::string DotOf(const MapConfig& config, const DesignConditions& design, bool 
   return Concat(piece(x), ", ", piece(y));
 }
 
+/// Throws BadInput if both axes set the same quantity.
+void CheckDifferent(const MapAxis& x, const MapAxis& y) {
+  for (const std::string& setting : x.settings) {
+    if (!y.Sets(setting)) continue;
+    throw BadInput(Concat("--x and --y: expected two different quantities, got ", x.name, " and ",
+                          y.name, ", which both set ", setting));
+  }
+}
+
 MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
                    const DesignConditions& design) {
   MapConfig config;
@@ -129,19 +134,9 @@ MapResult PlanMap(const MapArguments& a, const LoadedPolicy& loaded) {
   map.changes = ChangesOf(map.config, design);
   map.dot = DotOf(map.config, design, !map.changes.empty());
   map.policy = loaded.name;
+  map.title = ShortTitle(loaded);
   map.model = InfoOfModel(loaded.mjcf, "");
   return map;
-}
-
-fs::path MapFolder(const MapArguments& a, const LoadedPolicy& loaded, const MapResult& map) {
-  return FigureFolder(a.out, loaded, Concat("map-", map.config.x.name, "-", map.config.y.name));
-}
-
-void FillMap(const LoadedPolicy& loaded, ThreadPool& pool, const Progress& progress,
-             MapResult& map) {
-  const auto begin = Clock::now();
-  map.cells = RunMap(map.config, *loaded.policy, pool, progress);
-  map.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
 }  // namespace upswing

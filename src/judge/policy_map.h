@@ -1,11 +1,9 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <string>
 
 #include "agents/loaded_policy.h"
-#include "base/thread_pool.h"
 #include "judge/map_result.h"
 #include "judge/trial.h"
 
@@ -13,7 +11,7 @@ namespace upswing {
 
 /// The arguments of a policy's map: its axes, and the conditions on neither axis.
 struct MapArguments {
-  std::string x = "mass2=-50%:+50%", y = "length2=-50%:+50%", out;
+  std::string x = "mass2=-50%:+50%", y = "length2=-50%:+50%";
   TrialArguments trial;  // its `set` may also name noise, delay and the start
   int64_t episodes = 0;  // per cell; 0: the usual number
 
@@ -26,14 +24,5 @@ struct MapArguments {
 
 /// The map that the arguments ask for, with no cell computed yet. Throws BadInput.
 MapResult PlanMap(const MapArguments& a, const LoadedPolicy& loaded);
-
-/// The folder for a map's files, which does not exist yet. Throws BadInput, also if no figure can
-/// be drawn on this machine.
-std::filesystem::path MapFolder(const MapArguments& a, const LoadedPolicy& loaded,
-                                const MapResult& map);
-
-/// Runs all cells. `progress` counts episodes.
-void FillMap(const LoadedPolicy& loaded, ThreadPool& pool, const Progress& progress,
-             MapResult& map);
 
 }  // namespace upswing

@@ -193,41 +193,15 @@ LoadedPolicy ReadPolicy(const Tensors& file) {
   return loaded;
 }
 
-namespace {
-
-/// The last `parts` parts of a policy's path, without the file name for a run.
-std::string EndOfPath(const LoadedPolicy& loaded, int parts) {
-  if (loaded.path.empty()) return loaded.name;
-  const fs::path path = loaded.path;
-  fs::path rest = path.parent_path(), end = path.stem();
-  if (end == "policy" && rest.has_filename()) {
-    end = rest.filename();
-    rest = rest.parent_path();
+std::string ShortTitle(const LoadedPolicy& loaded) {
+  fs::path title = loaded.name;
+  if (title.filename() == RunFolder::kPolicy && title.has_parent_path()) {
+    title = title.parent_path();
+  } else if (title.extension() == ".safetensors") {
+    title.replace_extension();
   }
-  for (int part = 1; part < parts && rest.has_filename(); ++part) {
-    end = rest.filename() / end;
-    rest = rest.parent_path();
-  }
-  return end;
-}
-
-}  // namespace
-
-std::vector<std::string> TitlesOf(const std::vector<LoadedPolicy>& policies) {
-  constexpr int kMostParts = 20;
-  std::vector<std::string> titles;
-  for (const LoadedPolicy& loaded : policies) {
-    const auto is_own = [&](int parts) {
-      return std::ranges::count(policies, EndOfPath(loaded, parts), [&](const LoadedPolicy& other) {
-               return EndOfPath(other, parts);
-             }) == 1;
-    };
-    int parts = 1;
-    while (parts < kMostParts && !is_own(parts)) ++parts;
-    constexpr size_t kLongest = 30;  // bytes
-    titles.push_back(Shortened(EndOfPath(loaded, parts), kLongest));
-  }
-  return titles;
+  constexpr size_t kLongest = 30;  // bytes
+  return Shortened(title.string(), kLongest);
 }
 
 }  // namespace upswing

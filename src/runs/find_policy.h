@@ -46,9 +46,8 @@ LoadedPolicy LoadPolicy(const std::filesystem::path& path);
 /// Makes the policy of a file that has been read. Throws as LoadPolicy does.
 LoadedPolicy ReadPolicy(const Tensors& file);
 
-/// Short titles of several policies for pictures: the folder's name of a run, or the stem of
-/// another file. Parent folders are added until the titles differ, and a long title keeps only its
-/// end.
-std::vector<std::string> TitlesOf(const std::vector<LoadedPolicy>& policies);
+/// Short title of a policy for pictures: the folder of a run, or a file without its extension. A
+/// long title keeps only its end.
+std::string ShortTitle(const LoadedPolicy& loaded);
 
 }  // namespace upswing
