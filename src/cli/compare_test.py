@@ -302,7 +302,7 @@ class CompareTest(ProgramTest):
         self.assertNotIn("times", " ".join(self.compare("r")["notes"]))
         log("r/seed3", begin(1, "B\x1b[2J", "AVX-512"), end(0.9, 10))
         notes = " ".join(self.compare("r")["notes"])
-        self.assertIn("different numbers of threads: 1 (1 run), 2 (2 runs)", notes)
+        self.assertIn("different numbers of threads: 1; 2", notes)
         self.assertIn("different processors: A; B\\x1b[2J", notes)
         self.assertIn("different vector instructions: AVX-512; AVX2", notes)
         self.assertNotIn("loads", notes)

@@ -4,7 +4,6 @@
 #include <iterator>
 #include <optional>
 
-#include "agents/config.h"
 #include "agents/loaded_policy.h"
 #include "base/csv.h"
 #include "base/text.h"
@@ -50,9 +49,12 @@ std::string Caption(const PlotArguments& a, const RolloutConfig& config, const R
   }
   parts.push_back(Concat("seed ", a.trial.seed));
   parts.push_back(a.trial.physics);
-  for (const std::string& text :
-       {PlantChangesText(rollout.plant, loaded), ChangesText(config.env)}) {
-    if (!text.empty()) parts.push_back(text);
+  for (const auto& [now, before] : Differences(OptionsOf(rollout.plant), OptionsOf(loaded.plant))) {
+    parts.push_back(fmt::format("{} {:.4g} {} ({}: {:.4g})", now.name, now.number(), now.unit,
+                                loaded.origin(), before->number()));
+  }
+  if (const std::string changes = ChangesText(config.env); !changes.empty()) {
+    parts.push_back(changes);
   }
   return Join(parts, "; ");
 }

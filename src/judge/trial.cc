@@ -1,7 +1,5 @@
 #include "judge/trial.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 
@@ -97,15 +95,6 @@ std::string ChangesText(const PendulumEnvConfig& env) {
     texts.push_back(Concat(option.name, " ", option.text()));
   }
   if (env.assumed_plant) texts.emplace_back("the plant unknown to the policy");
-  return Join(texts, ", ");
-}
-
-std::string PlantChangesText(const Plant& plant, const LoadedPolicy& loaded) {
-  std::vector<std::string> texts;
-  for (const auto& [now, before] : Differences(OptionsOf(plant), OptionsOf(loaded.plant))) {
-    texts.push_back(fmt::format("{} {:.4g} {} ({}: {:.4g})", now.name, now.number(), now.unit,
-                                loaded.origin(), before->number()));
-  }
   return Join(texts, ", ");
 }
 

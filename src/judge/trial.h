@@ -2,8 +2,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,8 +23,8 @@ struct TrialArguments {
   int64_t seed = 0;
   bool unknown_plant = false;
   bool known_plant = false;  // design a controller for each episode's plant; only in eval
-  // The single episode of `simulate`, `plot` and `view`: its start (empty: hanging), or its index in
-  // `eval` (negative: none).
+  // The single episode of `simulate`, `plot` and `view`: its start (empty: hanging), or its index
+  // in `eval` (negative: none).
   std::string start;
   int64_t episode = -1;
 
@@ -57,10 +55,6 @@ PendulumEnv OneEpisode(PendulumEnvConfig config, int index);
 
 /// Conditions that differ from the defaults, such as `delay 0.02, …`; empty if there are none.
 std::string ChangesText(const PendulumEnvConfig& env);
-
-/// Differences of a plant from the policy's own plant, such as `mass2 1.3 kg (training: 1), …`;
-/// empty if there are none.
-std::string PlantChangesText(const Plant& plant, const LoadedPolicy& loaded);
 
 /// The folder for figures of a policy: `out`; if that is empty, NAME in the run folder,
 /// runs/NAME-FILE for another policy file or runs/NAME-CONTROLLER for a controller, with -2, -3, …

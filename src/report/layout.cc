@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "base/format.h"
 #include "base/text.h"
 
 namespace upswing {
@@ -61,11 +62,7 @@ std::vector<std::string> CaptionLines(const Figure& figure) {
 }
 
 std::string FittedTitle(const Figure& figure) {
-  const size_t room = CharactersIn(figure, kTitleScale);
-  if (Columns(figure.title) <= room) return figure.title;
-  std::string_view end = figure.title;
-  while (Columns(end) > room - 1 || (end.front() & 0xC0) == 0x80) end.remove_prefix(1);
-  return Concat("…", end);
+  return Shortened(figure.title, CharactersIn(figure, kTitleScale));
 }
 
 bool HasLegend(const Panel& panel) {

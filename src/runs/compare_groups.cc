@@ -134,35 +134,23 @@ void NoteLoads(const std::vector<RunRecord>& runs, std::vector<std::string>& not
 
 /// Adds notes on conditions that change the times and differ between runs, other than settings.
 void NoteTimes(const std::vector<RunRecord>& runs, std::vector<std::string>& notes) {
-  std::map<int64_t, int> threads;  // number of threads → number of runs
-  std::set<std::string> processors, vectors;
+  std::set<std::string> threads, processors, vectors;
   std::set<int64_t> intervals;
-  for (const RunRecord& f : runs) {
-    const RunConditions& c = f.conditions;
-    intervals.insert(f.config.train.eval_every);
-    for (const int64_t count : c.threads) ++threads[count];
+  for (const RunRecord& run : runs) {
+    const RunConditions& c = run.conditions;
+    intervals.insert(run.config.train.eval_every);
+    for (const int64_t count : c.threads) threads.insert(std::to_string(count));
     for (const std::string& name : c.processors) processors.insert(Printable(name));
     for (const std::string& name : c.vectors) vectors.insert(Printable(name));
   }
-  const auto join = [](const std::set<std::string>& names) {
-    return Join({names.begin(), names.end()}, "; ");
+  const auto note = [&](std::string_view what, const std::set<std::string>& names) {
+    if (names.size() < 2) return;
+    notes.push_back(
+        Concat("times were measured ", what, ": ", Join({names.begin(), names.end()}, "; ")));
   };
-  if (threads.size() > 1) {
-    std::vector<std::string> counts;
-    counts.reserve(threads.size());
-    for (const auto& [count, of_runs] : threads) {
-      counts.push_back(fmt::format("{} ({})", count, Counted(of_runs, "run")));
-    }
-    notes.push_back(
-        Concat("times were measured with different numbers of threads: ", Join(counts, ", ")));
-  }
-  if (processors.size() > 1) {
-    notes.push_back(Concat("times were measured on different processors: ", join(processors)));
-  }
-  if (vectors.size() > 1) {
-    notes.push_back(
-        Concat("times were measured with different vector instructions: ", join(vectors)));
-  }
+  note("with different numbers of threads", threads);
+  note("on different processors", processors);
+  note("with different vector instructions", vectors);
   NoteLoads(runs, notes);
   if (intervals.size() > 1) {
     notes.push_back(fmt::format(
