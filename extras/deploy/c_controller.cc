@@ -1,7 +1,5 @@
-#include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "agents/controllers.h"
 #include "base/error.h"

@@ -9,7 +9,6 @@
 
 #include "base/error.h"
 #include "base/text.h"
-#include "cli/commands.h"
 #include "cli/python_child.h"
 #include "cli/signals.h"
 #include "extras/deploy/export.h"

@@ -1,11 +1,8 @@
 #include "extras/realaigym/boards.h"
 
-#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <utility>
 
-#include "base/error.h"
 #include "base/json.h"
 #include "base/text.h"
 #include "extras/machine/control_loop.h"

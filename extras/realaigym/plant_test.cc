@@ -8,7 +8,6 @@
 #include "base/rng.h"
 #include "control/linearize.h"
 #include "control/testing.h"
-#include "extras/realaigym/rules.h"
 #include "pendulum/closed_form.h"
 #include "runs/plant_file.h"
 

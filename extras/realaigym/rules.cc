@@ -1,6 +1,5 @@
 #include "extras/realaigym/rules.h"
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <numeric>

@@ -9,7 +9,6 @@
 #include <set>
 #include <vector>
 
-#include "base/rng.h"
 #include "extras/realaigym/hardware.h"
 #include "extras/realaigym/simulation.h"
 #include "pendulum/closed_form.h"

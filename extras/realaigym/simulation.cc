@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <mutex>
-#include <utility>
 
 #include "base/rng.h"
 #include "pendulum/runge_kutta.h"

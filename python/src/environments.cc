@@ -9,7 +9,6 @@
 #include <array>
 #include <cmath>
 #include <concepts>
-#include <memory>
 #include <mutex>
 #include <optional>
 

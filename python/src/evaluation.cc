@@ -6,7 +6,6 @@
 #include <functional>
 
 #include "agents/arguments.h"
-#include "base/error.h"
 #include "base/text.h"
 #include "judge/eval_report.h"
 #include "judge/policy_map.h"

@@ -1,7 +1,5 @@
 #include "agents/loaded_policy.h"
 
-#include <algorithm>
-
 #include "base/error.h"
 #include "base/text.h"
 #include "nn/network_policy.h"

@@ -2,7 +2,6 @@
 
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "agents/config.h"
 #include "base/tensors.h"

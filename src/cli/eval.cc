@@ -3,7 +3,6 @@
 #include <functional>
 
 #include "agents/arguments.h"
-#include "agents/config.h"
 #include "agents/loaded_policy.h"
 #include "base/error.h"
 #include "base/text.h"

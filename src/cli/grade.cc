@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <functional>
 
-#include "base/error.h"
 #include "base/format.h"
 #include "base/text.h"
 #include "base/thread_pool.h"

@@ -1,6 +1,5 @@
 #include "control/controller.h"
 
-#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>

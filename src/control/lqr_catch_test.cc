@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <vector>
-
 #include "base/rng.h"
 #include "control/testing.h"
 

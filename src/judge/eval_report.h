@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "agents/config.h"
 #include "agents/loaded_policy.h"
 #include "judge/trial.h"
 #include "pendulum/pendulum_env.h"

@@ -8,7 +8,6 @@
 #include "base/options.h"
 #include "base/progress.h"
 #include "base/thread_pool.h"
-#include "pendulum/task.h"
 #include "rl/evaluate.h"
 
 /// Grades of all policies of a class. The same files give the same grades on every machine: with

@@ -6,7 +6,6 @@
 #include <numeric>
 
 #include "base/format.h"
-#include "base/text.h"
 
 namespace upswing {
 namespace {

@@ -2,15 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "agents/config.h"
 #include "base/error.h"
 #include "base/format.h"
 #include "base/text.h"
 #include "mujoco/engines.h"
 #include "os/file.h"
-#include "report/figure.h"
 
 namespace upswing {
 namespace {

@@ -10,6 +10,7 @@
 #include "base/csv.h"
 #include "base/error.h"
 #include "base/text.h"
+#include "rl/evaluate.h"
 
 namespace upswing {
 namespace {

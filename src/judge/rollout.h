@@ -10,7 +10,6 @@
 #include "base/policy.h"
 #include "base/sample.h"
 #include "pendulum/pendulum_env.h"
-#include "rl/evaluate.h"
 
 /// Rollouts: one episode, step by step, that `simulate` writes and `plot` draws.
 namespace upswing {

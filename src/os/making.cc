@@ -15,7 +15,6 @@
 #include <utility>
 
 #include "base/checksum.h"
-#include "base/error.h"
 #include "base/text.h"
 #include "os/file.h"
 #include "os/host.h"

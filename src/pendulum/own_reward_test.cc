@@ -2,12 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <numeric>
 #include <string>
 
 #include "base/error.h"
-#include "pendulum/task.h"
 #include "pendulum/testing.h"
 
 namespace upswing {

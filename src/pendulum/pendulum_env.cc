@@ -4,7 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "base/error.h"
 #include "base/text.h"
 #include "pendulum/observation.h"
 

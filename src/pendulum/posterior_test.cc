@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "base/error.h"
-#include "base/text.h"
 
 namespace upswing {
 namespace {

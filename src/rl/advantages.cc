@@ -1,7 +1,6 @@
 #include "rl/advantages.h"
 
 #include <cmath>
-#include <numeric>
 
 namespace upswing {
 namespace {

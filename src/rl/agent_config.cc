@@ -1,6 +1,5 @@
 #include "rl/agent_config.h"
 
-#include "base/format.h"
 #include "base/text.h"
 
 namespace upswing {

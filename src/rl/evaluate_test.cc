@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <array>
 #include <numbers>
 
 #include "nn/network_policy.h"

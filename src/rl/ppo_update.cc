@@ -1,5 +1,4 @@
 // A gradient step of PPO. Symbols: see rl/ppo.h.
-#include <algorithm>
 #include <cmath>
 
 #include "base/error.h"

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <numeric>
 
-#include "base/error.h"
-#include "base/text.h"
 #include "nn/linear.h"
 #include "rl/sac.h"
 

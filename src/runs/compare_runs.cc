@@ -7,7 +7,6 @@
 #include <optional>
 #include <set>
 
-#include "agents/config.h"
 #include "agents/controllers.h"
 #include "base/error.h"
 #include "base/format.h"
@@ -17,7 +16,6 @@
 #include "runs/config_files.h"
 #include "runs/find_policy.h"
 #include "runs/finished_run.h"
-#include "runs/model_info.h"
 #include "runs/run_folder.h"
 #include "runs/study_plan.h"
 

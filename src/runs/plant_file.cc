@@ -10,7 +10,6 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "os/file.h"
-#include "os/streams.h"
 #include "pendulum/posterior.h"
 #include "runs/covariance.h"
 

@@ -11,7 +11,6 @@
 #include "pendulum/pendulum_env.h"
 #include "rl/dqn.h"
 #include "rl/replay.h"
-#include "rl/torque_levels.h"
 #include "tools/bench/bench.h"
 
 namespace upswing {

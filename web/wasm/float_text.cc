@@ -1,7 +1,6 @@
 // Doubles as text, and back, by printf and strtod, because charconv.cpp of libc++ has tables of 130
 // kB. Both round correctly and give the same bits. 46 of the 2,098 powers of two, 2^-24 for one,
 // get a digit more here.
-#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
