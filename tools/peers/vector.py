@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Measures environment steps per second from Python, from C++ and by Gymnasium's own vector.
+"""Measures environment steps per second from Python, next to Gymnasium's own vector.
 
-The C++ rate is that of the same call. Gymnasium's vector steps MuJoCo's Python package.
+Gymnasium's vector steps MuJoCo's Python package.
 
     ./upswing python tools/peers/vector.py --rounds 5
 
@@ -23,8 +23,6 @@ import gymnasium as gym
 
 import upswing  # noqa: F401  # pylint: disable=unused-import
 
-ROOT = Path(__file__).resolve().parents[2]
-PROGRAM = os.environ.get("UPSWING", ROOT / "build/release/bin/upswing")
 ENVS = 1024
 GYMNASIUM = "MuJoCo's Python package, Gymnasium's SyncVectorEnv"
 
@@ -42,21 +40,8 @@ def make(side, threads):
                         threads=threads, episode_seconds=10, copy=copies == "copies")
 
 
-def in_cpp(physics, threads, seconds):
-    """The C++ rate by `upswing bench`, by the wall clock and by CPU time."""
-    done = subprocess.run(
-        [PROGRAM, "bench", "env", "--threads", str(threads), "--seconds", str(seconds),
-         "--repetitions", "1", "--json", "-"], capture_output=True, check=True)
-    name = f"env/{physics}/envs:{ENVS}/threads:{threads}"
-    for case in json.loads(done.stdout)["benchmarks"]:
-        if case["name"].startswith(name):
-            unit = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1}[case["time_unit"]]
-            return (ENVS / (case["real_time"] * unit), ENVS / (case["cpu_time"] * unit))
-    raise SystemExit(f"vector.py: bench has no case {name}")
-
-
-def in_python(side, threads, seconds):
-    """The rate of a vector environment, measured in a separate process."""
+def in_new_process(side, threads, seconds):
+    """The rate of a side, measured in a separate process."""
     done = subprocess.run([sys.executable, __file__, "--threads", str(threads), "--seconds",
                            str(seconds), "--side", side], stdout=subprocess.PIPE, check=True)
     return json.loads(done.stdout)
@@ -91,30 +76,19 @@ def main():
         print(json.dumps(measure(a.side, a.threads, a.seconds)))
         return
 
-    sides = {}
-    for physics in ("mujoco", "closed-form"):
-        sides[f"{physics}, C++ (upswing bench env)"] = (
-            lambda physics=physics: in_cpp(physics, a.threads, a.seconds))
-        for copies in ("copies", "views"):
-            side = f"{physics}, Python, {copies}"
-            sides[side] = lambda side=side: in_python(side, a.threads, a.seconds)
-    sides[GYMNASIUM] = lambda: in_python(GYMNASIUM, a.threads, a.seconds)
-
-    results = {name: [] for name in sides}
+    sides = [f"{physics}, gym.make_vec, {copies}" for physics in ("mujoco", "closed-form")
+             for copies in ("copies", "views")] + [GYMNASIUM]
+    results = {side: [] for side in sides}
     for _ in range(a.rounds):
-        for name, run in sides.items():
-            results[name].append(run())
+        for side in sides:
+            results[side].append(in_new_process(side, a.threads, a.seconds))
     print(f"{ENVS} environments, {a.threads} threads, medians of {a.rounds} rounds, "
           f"load {os.getloadavg()[0]:.1f}")
-    print(f"{'environment steps/s':<55} {'wall':>12} {'CPU':>12}  of C++ (CPU)")
-    for name, rates in results.items():
+    print(f"{'environment steps/s':<55} {'wall':>12} {'CPU':>12}  ratio (CPU)")
+    for side, rates in results.items():
         wall, cpu = (statistics.median(column) for column in zip(*rates))
-        base = f"{name.split(',')[0]}, C++ (upswing bench env)"
-        share = ""
-        if base in results:
-            ratios = [rate[1] / cpp[1] for rate, cpp in zip(rates, results[base])]
-            share = f"{statistics.median(ratios):6.0%}"
-        print(f"{name:<55} {wall:12,.0f} {cpu:12,.0f}  {share}")
+        ratio = statistics.median(rate[1] / peer[1] for rate, peer in zip(rates, results[GYMNASIUM]))
+        print(f"{side:<55} {wall:12,.0f} {cpu:12,.0f}  {ratio:11.3g}")
 
 
 if __name__ == "__main__":

@@ -376,17 +376,6 @@ def lqr_catch(lab):
     return ["flags", "caught at once"], rows
 
 
-@recipe("perf-rates")
-def processor_rates(lab):
-    """Rates of one thread per second of processor time, which other load disturbs less."""
-    text = lab.run("bench", "gradient", "env", "--threads", 1, "--batch", 128, "--repetitions",
-                   2 if lab.few else 5, "--json", "-")
-    return ["case", "per second of processor time"], [
-        [f"`{entry['run_name'].split('/threads')[0]}`",
-         format_number(entry["items_per_second"] * entry["real_time"] / entry["cpu_time"], 3)]
-        for entry in json.loads(text)["benchmarks"] if entry.get("aggregate_name") == "median"]
-
-
 @recipe("robustness-randomized")
 def told_and_untold(lab):
     rows = []
