@@ -36,7 +36,6 @@ LAYERS = {
     "extras/realaigym": PRODUCT | {"extras/machine"},
     "extras/deploy": PRODUCT,
     "commands": PRODUCT | EXTRAS | {"src/cli"},
-    "tools/bench": PRODUCT | EXTRAS | {"src/cli", "examples"},
     "tools/fuzz": PRODUCT | EXTRAS,
     "python": PRODUCT | EXTRAS,
     "web": PRODUCT | EXTRAS,
@@ -56,8 +55,8 @@ ALLOWED_FILES = {
     "Eigen": re.compile(r"src/(control/|nn/[^/]*_test\.cc$)|extras/(machine|realaigym)/"),
 }
 
-# Tests and benchmarks of the portable layers may include headers of the operating system.
-MAY_ASK_SYSTEM = re.compile(r"(_test|_bench)\.cc$|/testing\.h$")
+# Tests of the portable layers may include headers of the operating system.
+MAY_ASK_SYSTEM = re.compile(r"_test\.cc$|/testing\.h$")
 SYSTEM = re.compile(r"(unistd|fcntl|poll|sched|signal|csignal|filesystem|fstream|cstdio|stdio)(\.h)?$|"
                     r"sys/")
 

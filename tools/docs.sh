@@ -46,8 +46,7 @@ docs() {
 
   if [ "$setup" = yes ]; then
     set_up_docs
-    packages="$packages $bench_packages"
-    set_up release upswing upswing-bench
+    set_up release upswing
     build_docs
   fi
   [ -f "$docs/index.html" ] || fail "the documentation is not built: run ./upswing docs once" \

@@ -1,7 +1,7 @@
 # shellcheck shell=sh
 # ./upswing package: builds packages for people without a compiler. Read by ./upswing, whose functions it
 # uses, after tools/web.sh, tools/demo.sh and tools/docs.sh.
-: "${root:?}" "${setup:?}" "${packages:?}" "${bench_packages:?}"
+: "${root:?}" "${setup:?}" "${packages:?}"
 
 package_usage() {
   cat <<'END_OF_USAGE'
@@ -56,7 +56,7 @@ package() {
   [ "$setup" = yes ] || bad_input "expected ./upswing package without --no-setup"
   [ "$(uname -m)" = x86_64 ] || bad_input "expected an x86-64 machine, got $(uname -m)"
 
-  packages="$packages $deb_packages $bench_packages python3-dev"
+  packages="$packages $deb_packages python3-dev"
   # Check before a build of ten minutes.
   # shellcheck disable=SC2086  # lists of words
   (install_packages $packages && cd "$root" &&
@@ -90,6 +90,6 @@ set_up_arm64() {
     esac
     install_packages $arm64_packages
     # shellcheck disable=SC2046  # a list of words
-    build arm64 upswing $(extra_programs | grep -v upswing-bench)
+    build arm64 upswing $(extra_programs)
   ) </dev/null || exit 1
 }

@@ -16,8 +16,8 @@ std::vector<std::string> SimdPaths();
 /// The path in use: the first of SimdPaths, unless UseSimdPath chose another.
 std::string SimdPath();
 
-/// Switches to another path, for tests and benchmarks. No kernel may be running. Throws BadInput if
-/// this processor does not support the path.
+/// Switches to another path. No kernel may be running. Throws BadInput if this processor does not
+/// support the path.
 void UseSimdPath(std::string_view path);
 
 /// Switches to the first of SimdPaths. Returns true.

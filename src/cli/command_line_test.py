@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """Tests of the command line: help, numbers, `-` for standard streams, and error messages."""
 
-import json
 import os
 import re
 import shutil
@@ -12,7 +11,7 @@ import unittest
 from testing import ROOT, UPSWING, ProgramTest, small, train_once
 
 COMMANDS = ("train", "eval", "simulate", "map", "plot", "info", "compare", "study", "export",
-            "realaigym", "bench")
+            "realaigym")
 # Phrases of the command-line library that must not appear in our messages.
 FOREIGN = ("not in range", "Could not convert", "is required", "required but received", "missing",
            "Value ", "RequiredError", "At Most", "The following argument")
@@ -135,10 +134,8 @@ class NumberTest(ProgramTest):
             (["map", "x", "--threads", "1.5"], '--threads: expected an integer in [0, 256]'),
             (["plot", "x", "--seconds", "nan"],
              '--seconds: expected a multiple of 0.02 in [0.1, 1000], got "nan"'),
-            (["bench", "--threads", "1,x"],
-             '--threads: expected a list of integers in [1, 256], got "1,x"'),
-            (["bench", "--repetitions", "0"],
-             '--repetitions: expected an integer in [1, 1000], got "0"'),
+            (["train", "--hidden", "64,x"],
+             '--hidden: expected a list of integers in [1, 4096], got "64,x"'),
             (["train", "--seeds", "3", "--jobs", "0"],
              '--jobs: expected an integer in [1, 4096], got "0"'),
             (["train", "--seeds", ""], "--seeds: expected a number of seeds or a list"),
@@ -264,8 +261,6 @@ class StreamTest(ProgramTest):
         self.succeed("simulate", "--seconds", "0.1", "--csv", "out.csv")
         self.assertEqual((self.folder / "out.csv").read_text(encoding="utf-8"), csv)
         (self.folder / "out.csv").unlink()
-        text = self.succeed("bench", "env/mujoco/envs:8/threads:1", "--seconds", "0.001", "--json", "-")
-        self.assertEqual(len(json.loads(text)["benchmarks"]), 1)
         self.assertEqual(list(self.folder.iterdir()), [])
 
     def feed(self, text, *arguments):
@@ -311,11 +306,11 @@ class StreamTest(ProgramTest):
         self.assertIn("finished at step 2000",
                       (self.folder / "unread/log.txt").read_text(encoding="utf-8"))
 
-    def test_a_file_that_bench_could_not_write_is_refused_before_it_measures(self):
+    def test_a_file_that_eval_could_not_write_is_refused_before_it_evaluates(self):
         self.write("file", "")
-        for path in ("nodir/x.json", "file/x.json", "/proc/x.json"):
+        for path in ("nodir/x.csv", "file/x.csv", "/proc/x.csv"):
             with self.subTest(path=path):
-                self.refuse(["bench", "--seconds", "1000", "--json", path], "--json", path)
+                self.refuse(["eval", "mpc", "--episodes", 1000000, "--episodes-csv", path], "--episodes-csv", path)
 
 
 class LauncherTest(ProgramTest):

@@ -103,7 +103,7 @@ class InfoTest(ProgramTest):
 
     def test_version_and_help(self):
         self.assertRegex(self.succeed("--version"), r"^upswing \d+\.\d+\.\d+\n$")
-        for command in ([], ["train"], ["eval"], ["simulate"], ["info"], ["compare"], ["bench"]):
+        for command in ([], ["train"], ["eval"], ["simulate"], ["info"], ["compare"]):
             self.assertIn("Examples:", self.succeed(*command, "--help"))
 
 

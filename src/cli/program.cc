@@ -47,7 +47,6 @@ constexpr CommandEntry kTable[] = {
     {"machine", "Check logs of a real machine, identify its twin, validate it", "upswing-machine"},
     {"run", "Drive a real machine or its twin with a policy", "upswing-machine"},
     {"fake", "Play a machine for `run`: a twin behind UDP or a terminal", "upswing-machine"},
-    {"bench", "Measure the speed of the program on this machine", "upswing-bench"},
     {"demo", "Serve the page in which policies swing up the pendulum live", "upswing-deploy"},
     {"docs", "Build the documentation, or the whole web site", ""},
     {"package", "Build packages: tarball, Debian package, Python wheels", ""},

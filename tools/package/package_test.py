@@ -92,7 +92,7 @@ class PackageTest(unittest.TestCase):
             self.assertNotIn("./upswing", text)
         commands = call(self.tree / "bin/upswing", "--help").stdout
         self.assertRegex(commands, r"\n  demo +")
-        self.assertNotRegex(commands, r"\n  (bench|docs|package|python|test) +")
+        self.assertNotRegex(commands, r"\n  (docs|package|python|test) +")
         (deb,) = (self.folder / "first").glob("*.deb")
         call("dpkg-deb", "-x", deb, self.folder / "deb")
         manual = gzip.decompress((self.folder / "deb/usr/share/man/man1/upswing.1.gz").read_bytes())
