@@ -347,37 +347,28 @@ def lqr_catch():
 
 @figure("pareto")
 def pareto():
-    """Missing return to the bound, against torque change, for all agents and controllers."""
+    """Return against torque change, for all agents and controllers with at least 90% of mpc's return."""
     columns, rows = table("overview")
     share, variation = (next(k for k, column in enumerate(columns) if column.startswith(name))
-                        for name in ("return / bound", "torque variation"))
-    success = columns.index("success")
-    unreliable = {row[0] for row in rows if number(row[success]) != 100}
-    points = [(row[0], number(row[variation]), number(row[share])) for row in rows
-              if number(row[variation]) is not None and number(row[share]) is not None]
+                        for name in ("return / mpc", "torque variation"))
+    points = [(row[0], number(row[variation]), number(row[share])) for row in rows if number(row[share]) >= 90]
     fig = canvas(800, 500)
     axes = panel(fig, 80, 40, 700, 390)
     axes.set_xscale("log")
-
-    def height(percent):  # missing share of the bound, on a logarithmic scale
-        return -math.log10(max(100 - percent, 0.5))
-
     smallest, largest = min(x for _, x, _ in points), max(x for _, x, _ in points)
     axes.set_xlim(smallest / 1.5, largest * 1.8)
-    axes.set_ylim(min(height(y) for _, _, y in points) - 0.12, max(height(y) for _, _, y in points) + 0.12)
-    ticks = [tick for tick in (0, 50, 80, 90, 95, 98, 99) if axes.get_ylim()[0] <= height(tick) <= axes.get_ylim()[1]]
-    axes.set_yticks([height(tick) for tick in ticks], [f"{100 - tick}" for tick in ticks])
+    axes.set_ylim(min(y for _, _, y in points) - 1, max(y for _, _, y in points) + 1)
     decades = [tick for tick in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500)
                if axes.get_xlim()[0] <= tick <= axes.get_xlim()[1]]
     axes.set_xticks(decades, [f"{tick:g}" for tick in decades])
     axes.minorticks_off()
     axes.set_xlabel("torque change [N·m/s] (less is smoother)")
-    axes.set_ylabel("return, missing to the bound [%]")
+    axes.set_ylabel("return / mpc [%]")
 
     best, front = -math.inf, []
-    for name, x, y in sorted(points, key=lambda point: (point[1], -point[2])):
-        if y > best and name not in unreliable:
-            front.append((x, height(y)))
+    for _, x, y in sorted(points, key=lambda point: (point[1], -point[2])):
+        if y > best:
+            front.append((x, y))
             best = y
     corners = [front[0]]
     for x, y in front[1:]:
@@ -385,21 +376,19 @@ def pareto():
     corners = [(front[0][0], axes.get_ylim()[0]), *corners, (axes.get_xlim()[1], corners[-1][1])]
     axes.plot(*zip(*corners), color=MUTED, linewidth=1.3, linestyle=(0, (4, 3)), zorder=1)
 
-    pixels = {name: axes.transData.transform((x, height(y))) for name, x, y in points}
+    pixels = {name: axes.transData.transform((x, y)) for name, x, y in points}
     taken = [(x - 8, y - 8, x + 8, y + 8) for x, y in pixels.values()]
     steps = axes.transData.transform(corners)
     taken += [(min(a[0], b[0]), min(a[1], b[1]), max(a[0], b[0]) + 1, max(a[1], b[1]) + 1) for a, b in zip(steps, steps[1:])]
     for name, x, y in points:
-        axes.plot(x, height(y), "s" if name in CONTROLLERS else "o", markersize=11, zorder=3,
-                  **(dict(markerfacecolor=PAPER, markeredgecolor=AGENTS[name], markeredgewidth=2) if name in unreliable
-                     else dict(color=AGENTS[name], markeredgecolor=PAPER, markeredgewidth=1)))
+        axes.plot(x, y, "s" if name in CONTROLLERS else "o", markersize=11, zorder=3, color=AGENTS[name],
+                  markeredgecolor=PAPER, markeredgewidth=1)
         place_label(axes, name, pixels[name], taken)
     from matplotlib.lines import Line2D
     marks = [Line2D([], [], color=MUTED, marker=marker, linestyle="none", markersize=10) for marker in "os"]
-    marks.append(Line2D([], [], color=MUTED, markerfacecolor=PAPER, marker="s", linestyle="none", markersize=10))
     marks.append(Line2D([], [], color=MUTED, linewidth=1.3, linestyle=(0, (4, 3))))
-    axes.legend(marks, ["agent", "controller", "hollow: some episodes fail", "best trade-offs"], loc="lower center",
-                bbox_to_anchor=(0.5, 1.0), ncols=4, borderpad=0, handletextpad=0.4)
+    axes.legend(marks, ["agent", "controller", "best trade-offs"], loc="lower center",
+                bbox_to_anchor=(0.5, 1.0), ncols=3, borderpad=0, handletextpad=0.4)
     return fig
 
 

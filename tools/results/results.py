@@ -305,24 +305,23 @@ def overview(lab):
                                 *(["--steps", 4000] if lab.few else [])) for k, out in enumerate(outs)]
         seconds[agent] = format_number(statistics.median(times), 2)
         policies[agent] = str(shown if (ROOT / shown).exists() else outs[0])
-    policies |= {name: name for name in (CONTROLLERS[:1] if lab.few else CONTROLLERS)}
-    swing_up = ["--swing-up", PAGE_AGENTS / "fast.safetensors"]  # for hybrid
+    policies |= {name: name for name in (CONTROLLERS[-1:] if lab.few else CONTROLLERS)}
     policies["hybrid"] = "hybrid"
-    bounds = lab.json("bounds", *policies.values(), *swing_up, "--episodes", episodes)
-    # The last rows of the bounds are the policies, in order.
-    shares = dict(zip(policies, [row["share"] for row in bounds["rows"]][-len(policies):]))
-    rows = []
+    nominal, box = {}, {}
     for name, policy in policies.items():
-        more = swing_up if name == "hybrid" else []
-        nominal = lab.json("eval", policy, *more, "--episodes", episodes)
+        more = ["--swing-up", PAGE_AGENTS / "fast.safetensors"] if name == "hybrid" else []
+        nominal[name] = lab.json("eval", policy, *more, "--episodes", episodes)
         plants = 2 if lab.few else 100 if name in SLOW else 1000
-        box = lab.json("eval", policy, *more, "--randomize", 0.25, "--episodes", plants)
-        median = (nominal["swing_up_seconds"] or {}).get("median")  # null: no episode swings up
-        rows.append([f"`{name}`", percent(nominal["success_rate"]),
-                     NONE if median is None else f"{median:.2f}", percent(shares[name]),
-                     percent(box["success_rate"]),
-                     f"{nominal['torque_variation']['mean']:.1f}", seconds.get(name, NONE)])
-    return ["agent", "success", "swing-up [s]", "return / bound", "±25% plants",
+        box[name] = lab.json("eval", policy, *more, "--randomize", 0.25, "--episodes", plants)
+    rows = []
+    for name, figures in nominal.items():
+        median = (figures["swing_up_seconds"] or {}).get("median")  # null: no episode swings up
+        rows.append([f"`{name}`", percent(figures["success_rate"]),
+                     NONE if median is None else f"{median:.2f}",
+                     percent(figures["return"]["mean"] / nominal["mpc"]["return"]["mean"]),
+                     percent(box[name]["success_rate"]),
+                     f"{figures['torque_variation']['mean']:.1f}", seconds.get(name, NONE)])
+    return ["agent", "success", "swing-up [s]", "return / mpc", "±25% plants",
             "torque variation [N·m/s]", "time to train [s]"], rows
 
 
