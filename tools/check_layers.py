@@ -50,8 +50,8 @@ ALLOWED_FILES = {
     "google": re.compile(r"(src/runs|extras/deploy)/"),
     "nanobind": re.compile(r"python/"),
     "muParser.h": re.compile(r"src/pendulum/own_reward\.cc$"),
-    "hwy": re.compile(r"(src/(base/simd(_test)?|nn/(linear|product|registers-inl)|"
-                      r"pendulum/(closed_form|sine_cosine-inl)))\.(h|cc)$"),
+    "hwy": re.compile(r"src/(base/simd(_test)?|nn/(linear|product|registers-inl)|"
+                      r"pendulum/(closed_form|sine_cosine-inl))\.(h|cc)$"),
     "Eigen": re.compile(r"src/(control/|nn/[^/]*_test\.cc$)|extras/(machine|realaigym)/"),
 }
 

@@ -263,7 +263,7 @@ class PolicyFileTest(SmallRunTest):
         self.change({"task": "gymnasium/CartPole-v1"})
         self.succeed("export", policy, "--onnx", "policy.onnx")
         self.assertIn("task        gymnasium/CartPole-v1", self.succeed("info", policy))
-        for command in (["eval"], ["simulate"], ["plot"], ["map"], ["bounds"], ["realaigym", "score"],
+        for command in (["eval"], ["simulate"], ["plot"], ["map"], ["realaigym", "score"],
                         ["view", "--record", "x.png"], ["export", "--page", "page"]):
             self.refuse([*command, policy], f"{policy}: expected a policy of double-pendulum, got one "
                         "of gymnasium/CartPole-v1")

@@ -12,7 +12,6 @@ namespace upswing {
 
 // Declarations of the commands; each has a source file with its name.
 void AddTrain(CommandLine& line);
-void AddBounds(CommandLine& line);
 void AddEval(CommandLine& line);
 void AddSimulate(CommandLine& line);
 void AddGrade(CommandLine& line);

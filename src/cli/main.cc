@@ -7,7 +7,6 @@ namespace {
 constexpr Command kCommands[] = {
     {"train", AddTrain},
     {"eval", AddEval},
-    {"bounds", AddBounds},
     {"simulate", AddSimulate},
     {"grade", AddGrade},
     {"map", AddMap},

@@ -76,16 +76,13 @@ class PlantTest(ProgramTest):
             self.succeed("eval", "lqr", "--made-for", "realaigym", "--made-for", "mass1=0.6", *known),
             self.succeed("eval", "lqr", "--made-for", "mass1=0.6", "--made-for", "realaigym", *known))
 
-    def test_maps_and_bounds(self):
+    def test_maps(self):
         grid = ("--x", "center2=0.1:0.2:2", "--y", "inertia1=0.01:0.03:2", "--episodes", 1)
         mapped = json.loads(self.succeed("map", "lqr", "--plant", "m.toml", *grid, "--out", "map",
                                          "--json", "--set", "mass2=1.2"))
         self.assertLessEqual({"armature": 0.002, "mass1": 0.8, "mass2": 1.2}.items(),
                              mapped["plant"].items())
         self.assertIn("delay 0.02", mapped["changes"])
-        few = ("--set", "coulomb2=0", "--episodes", 1, "--guesses", 2, "--torques", 3, "--physics", "closed-form")
-        self.assertEqual(self.succeed("bounds", "lqr", "--plant", "m.toml", *few),
-                         self.succeed("bounds", "lqr", *SETS, *few))
 
     def test_a_run_holds_the_values(self):
         self.write("c.toml", "[plant]\nmass1 = 2\nmass2 = 2\n")
@@ -125,8 +122,7 @@ class PlantTest(ProgramTest):
         self.write("bad.toml", "[plant]\nmas1 = 1\n")
         self.write("other.toml", "[sensor]\n")
         self.write("m.xml", MODEL)
-        for command in (["simulate"], ["eval", "lqr"], ["plot", "lqr"], ["map", "lqr"], ["bounds"],
-                        ["view"], small()):
+        for command in (["simulate"], ["eval", "lqr"], ["plot", "lqr"], ["map", "lqr"], ["view"], small()):
             self.refuse([*command, "--plant", "bad.toml"], "bad.toml:2: [plant]", "did you mean mass1?")
             self.refuse([*command, "--plant", "none"], "--plant: expected a plant file", "realaigym",
                         'got "none"')

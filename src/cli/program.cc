@@ -33,7 +33,6 @@ constexpr CommandEntry kTable[] = {
     {"train", "Train an agent until it solves the task", "upswing"},
     {"eval", "Evaluate a policy over many episodes", "upswing"},
     {"grade", "Rank the policies of a class, as a table and a page", "upswing"},
-    {"bounds", "Search for the best episodes and compare policies with them", "upswing"},
     {"simulate", "Write one rollout of a policy or of given torques as CSV", "upswing"},
     {"map", "Map success over two quantities of plant, sensors or start", "upswing"},
     {"plot", "Draw one episode of a policy as figures", "upswing"},
