@@ -60,13 +60,13 @@ CostExpansion QuadraticCost::ExpandFinal(const StateVector& x) const {
   return l;
 }
 
-Trajectory TrajectoryOptimizer::Follow(const TrajectoryCost& cost, const StateVector& start,
+Trajectory TrajectoryOptimizer::Follow(const QuadraticCost& cost, const StateVector& start,
                                        const std::vector<double>& torques) {
   return Follow(cost, start, torques.size(),
                 [&](size_t t, const StateVector&) { return torques[t]; });
 }
 
-Trajectory TrajectoryOptimizer::Follow(const TrajectoryCost& cost, const StateVector& start,
+Trajectory TrajectoryOptimizer::Follow(const QuadraticCost& cost, const StateVector& start,
                                        const Trajectory& planned,
                                        std::span<const Eigen::RowVector4d> K) {
   return Follow(cost, start, planned.u.size(), [&](size_t t, const StateVector& x) {
@@ -75,7 +75,7 @@ Trajectory TrajectoryOptimizer::Follow(const TrajectoryCost& cost, const StateVe
 }
 
 template <typename Torque>
-Trajectory TrajectoryOptimizer::Follow(const TrajectoryCost& cost, const StateVector& start,
+Trajectory TrajectoryOptimizer::Follow(const QuadraticCost& cost, const StateVector& start,
                                        size_t steps, const Torque& torque) {
   const double limit = model_.plant().torque_limit;
   Trajectory result;
@@ -92,7 +92,7 @@ Trajectory TrajectoryOptimizer::Follow(const TrajectoryCost& cost, const StateVe
   return Priced(cost, std::move(result));
 }
 
-Trajectory TrajectoryOptimizer::Priced(const TrajectoryCost& cost, Trajectory trajectory) {
+Trajectory TrajectoryOptimizer::Priced(const QuadraticCost& cost, Trajectory trajectory) {
   trajectory.cost = cost.Final(trajectory.x.back());
   for (size_t t = 0; t < trajectory.u.size(); ++t) {
     trajectory.cost += cost.Running(trajectory.x[t], trajectory.u[t]);
@@ -100,14 +100,12 @@ Trajectory TrajectoryOptimizer::Priced(const TrajectoryCost& cost, Trajectory tr
   return trajectory;
 }
 
-int TrajectoryOptimizer::Improve(const TrajectoryCost& cost, double tolerance, int iterations,
-                                 Trajectory& trajectory) {
+void TrajectoryOptimizer::Improve(const QuadraticCost& cost, double tolerance, int iterations,
+                                  Trajectory& trajectory) {
   models_.resize(trajectory.u.size());
   double regularization = kFirst;
   bool moved = true;
-  int iteration = 0;
-  while (iteration < iterations && regularization < kLargest) {
-    ++iteration;
+  for (int i = 0; i < iterations && regularization < kLargest; ++i) {
     if (moved) {
       model_.Linearize({trajectory.x.data(), trajectory.u.size()}, trajectory.u, models_);
     }
@@ -116,10 +114,9 @@ int TrajectoryOptimizer::Improve(const TrajectoryCost& cost, double tolerance, i
     regularization = moved ? std::max(kLeast, regularization / kFactor) : regularization * kFactor;
     if (moved && before - trajectory.cost < tolerance * std::abs(before)) break;
   }
-  return iteration;
 }
 
-bool TrajectoryOptimizer::Backward(const TrajectoryCost& cost, const Trajectory& trajectory,
+bool TrajectoryOptimizer::Backward(const QuadraticCost& cost, const Trajectory& trajectory,
                                    double regularization) {
   const size_t steps = trajectory.u.size();
   const double limit = model_.plant().torque_limit;
@@ -153,7 +150,7 @@ bool TrajectoryOptimizer::Backward(const TrajectoryCost& cost, const Trajectory&
   return true;
 }
 
-bool TrajectoryOptimizer::Forward(const TrajectoryCost& cost, Trajectory& trajectory) {
+bool TrajectoryOptimizer::Forward(const QuadraticCost& cost, Trajectory& trajectory) {
   const size_t steps = trajectory.u.size();
   const double limit = model_.plant().torque_limit;
   trial_x_.resize((steps + 1) * kTrials);

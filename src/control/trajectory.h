@@ -30,29 +30,19 @@ struct CostExpansion {
   double uu = 0;                                 //
 };
 
-/// The minimised cost: Σ Running(x_t, u_t) + Final(x_T).
-class TrajectoryCost {
- public:
-  virtual ~TrajectoryCost() = default;
-
-  virtual double Running(const StateVector& x, double u) const = 0;
-  virtual double Final(const StateVector& x) const = 0;
-  virtual CostExpansion ExpandRunning(const StateVector& x, double u) const = 0;
-  /// Expands the final cost, which depends only on the state.
-  virtual CostExpansion ExpandFinal(const StateVector& x) const = 0;
-};
-
-/// The cost d' Q d + R u² of each step and d' P d at the end, where d is the deviation from the
-/// nearest upright whose angles, with their full turns, are within `angle_range` (rad, at least π).
-class QuadraticCost : public TrajectoryCost {
+/// The minimised cost: Σ Running(x_t, u_t) + Final(x_T). It is d' Q d + R u² for each step and
+/// d' P d at the end, where d is the deviation from the nearest upright whose angles, with their
+/// full turns, are within `angle_range` (rad, at least π).
+class QuadraticCost {
  public:
   QuadraticCost(const Eigen::Matrix4d& Q, double R, const Eigen::Matrix4d& P,
                 double angle_range = std::numeric_limits<double>::infinity());
 
-  double Running(const StateVector& x, double u) const override;
-  double Final(const StateVector& x) const override;
-  CostExpansion ExpandRunning(const StateVector& x, double u) const override;
-  CostExpansion ExpandFinal(const StateVector& x) const override;
+  double Running(const StateVector& x, double u) const;
+  double Final(const StateVector& x) const;
+  CostExpansion ExpandRunning(const StateVector& x, double u) const;
+  /// Expands the final cost, which depends only on the state.
+  CostExpansion ExpandFinal(const StateVector& x) const;
 
  private:
   StateVector Deviation(const StateVector& x) const;
@@ -70,19 +60,19 @@ class TrajectoryOptimizer {
   explicit TrajectoryOptimizer(const Plant& plant) : model_(plant) {}
 
   /// The trajectory from `start` under torques (T), N·m, cut at the limit, and its cost.
-  Trajectory Follow(const TrajectoryCost& cost, const StateVector& start,
+  Trajectory Follow(const QuadraticCost& cost, const StateVector& start,
                     const std::vector<double>& torques);
 
   /// The trajectory from `start` under the torques of `planned` with feedback K (T) about it.
-  Trajectory Follow(const TrajectoryCost& cost, const StateVector& start, const Trajectory& planned,
+  Trajectory Follow(const QuadraticCost& cost, const StateVector& start, const Trajectory& planned,
                     std::span<const Eigen::RowVector4d> K);
 
   /// The trajectory with its cost filled in.
-  static Trajectory Priced(const TrajectoryCost& cost, Trajectory trajectory);
+  static Trajectory Priced(const QuadraticCost& cost, Trajectory trajectory);
 
   /// Improves a trajectory with its cost. Stops when an iteration gains less than `tolerance` times
-  /// the cost, or after `iterations`. Returns the number of iterations.
-  int Improve(const TrajectoryCost& cost, double tolerance, int iterations, Trajectory& trajectory);
+  /// the cost, or after `iterations`.
+  void Improve(const QuadraticCost& cost, double tolerance, int iterations, Trajectory& trajectory);
 
   /// Feedback (T) about the trajectory of the last iteration: u = u_t + K_t (x - x_t). K_t is 0
   /// where the best torque lies beyond the limit.
@@ -95,13 +85,13 @@ class TrajectoryOptimizer {
   static constexpr int kTrials = 16;
 
   template <typename Torque>
-  Trajectory Follow(const TrajectoryCost& cost, const StateVector& start, size_t steps,
+  Trajectory Follow(const QuadraticCost& cost, const StateVector& start, size_t steps,
                     const Torque& torque);
   /// Computes k_ and K_ about the trajectory. Returns false if the cost curves down along the
   /// torque; the caller then increases the regularisation.
-  bool Backward(const TrajectoryCost& cost, const Trajectory& trajectory, double regularization);
+  bool Backward(const QuadraticCost& cost, const Trajectory& trajectory, double regularization);
   /// Replaces `trajectory` with the best of the trials if that costs less.
-  bool Forward(const TrajectoryCost& cost, Trajectory& trajectory);
+  bool Forward(const QuadraticCost& cost, Trajectory& trajectory);
 
   PendulumModel model_;
   std::vector<LinearModel> models_;    // (T) along the trajectory

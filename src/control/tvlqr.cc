@@ -21,8 +21,10 @@ constexpr double kPlanTolerance = 1e-7;  // relative gain of an iteration
 /// The policy moves to another place of the plan if that costs less than this share.
 constexpr double kCheaper = 0.25;
 
-}  // namespace
-
+/// A swing-up from hanging of `steps` control periods, found by trajectory optimisation from a
+/// random guess. The guess is a sine wave of torque with a period of 1 to 2 s; amplitude, length
+/// and the price of the way against its end are random. The regulator holds from the wave's end to
+/// the plan's end. Returns nothing if the result does not end where `upright` catches.
 std::optional<Trajectory> GuessSwingUp(const LqrConfig& lqr, const LqrCatch& upright, int steps,
                                        Rng& rng, TrajectoryOptimizer& optimizer) {
   const double limit = optimizer.model().plant().torque_limit;
@@ -47,6 +49,28 @@ std::optional<Trajectory> GuessSwingUp(const LqrConfig& lqr, const LqrCatch& upr
   }
   return trajectory;
 }
+
+/// The time-varying linear-quadratic regulator about a trajectory, with the final cost x' P x:
+/// Tedrake, "Underactuated Robotics", chapter 8. `model` is a model of the same plant.
+SwingUp Tracking(Trajectory trajectory, const LqrConfig& lqr, const Eigen::Matrix4d& P,
+                 PendulumModel& model) {
+  const size_t T = trajectory.u.size();
+  std::vector<LinearModel> models(T);
+  model.Linearize({trajectory.x.data(), T}, trajectory.u, models);
+  SwingUp plan{std::move(trajectory), std::vector<Eigen::RowVector4d>(T),
+               std::vector<Eigen::Matrix4d>(T + 1)};
+  plan.P[T] = P;
+  for (size_t t = T; t-- > 0;) {
+    const auto& [A, B] = models[t];
+    const Eigen::Matrix4d PA = plan.P[t + 1] * A;
+    plan.K[t] = B.transpose() * PA / (lqr.torque + B.dot(plan.P[t + 1] * B));
+    plan.P[t] = WeightsOf(lqr) + A.transpose() * PA - PA.transpose() * B * plan.K[t];
+    plan.P[t] = (plan.P[t] + plan.P[t].transpose()).eval() / 2;
+  }
+  return plan;
+}
+
+}  // namespace
 
 SwingUp PlanSwingUp(const LqrConfig& lqr, const SwingUpConfig& config, const LqrCatch& upright,
                     const Plant& plant) {
@@ -73,24 +97,6 @@ SwingUp PlanSwingUp(const LqrConfig& lqr, const SwingUpConfig& config, const Lqr
                           "--tvlqr-reserve 0, which gives the plan the whole torque limit"));
   }
   return Tracking(*std::move(best), lqr, upright.lqr().P, model);
-}
-
-SwingUp Tracking(Trajectory trajectory, const LqrConfig& lqr, const Eigen::Matrix4d& P,
-                 PendulumModel& model) {
-  const size_t T = trajectory.u.size();
-  std::vector<LinearModel> models(T);
-  model.Linearize({trajectory.x.data(), T}, trajectory.u, models);
-  SwingUp plan{std::move(trajectory), std::vector<Eigen::RowVector4d>(T),
-               std::vector<Eigen::Matrix4d>(T + 1)};
-  plan.P[T] = P;
-  for (size_t t = T; t-- > 0;) {
-    const auto& [A, B] = models[t];
-    const Eigen::Matrix4d PA = plan.P[t + 1] * A;
-    plan.K[t] = B.transpose() * PA / (lqr.torque + B.dot(plan.P[t + 1] * B));
-    plan.P[t] = WeightsOf(lqr) + A.transpose() * PA - PA.transpose() * B * plan.K[t];
-    plan.P[t] = (plan.P[t] + plan.P[t].transpose()).eval() / 2;
-  }
-  return plan;
 }
 
 TvlqrPolicy::TvlqrPolicy(LqrConfig lqr, SwingUpConfig config, const Plant& plant)

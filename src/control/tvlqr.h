@@ -1,10 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <optional>
 #include <vector>
 
-#include "base/rng.h"
 #include "control/lqr_catch.h"
 #include "control/trajectory.h"
 
@@ -17,20 +15,9 @@ struct SwingUp {
   std::vector<Eigen::Matrix4d> P;     // (T + 1) cost of a deviation: (x - x_t)' P_t (x - x_t)
 };
 
-/// The time-varying linear-quadratic regulator about a trajectory, with the final cost x' P x:
-/// Tedrake, "Underactuated Robotics", chapter 8. `model` is a model of the same plant.
-SwingUp Tracking(Trajectory trajectory, const LqrConfig& lqr, const Eigen::Matrix4d& P,
-                 PendulumModel& model);
-
-/// A swing-up from hanging of `steps` control periods, found by trajectory optimisation from a
-/// random guess. The guess is a sine wave of torque with a period of 1 to 2 s; amplitude, length
-/// and the price of the way against its end are random. The regulator holds from the wave's end to
-/// the plan's end. Returns nothing if the result does not end where `upright` catches.
-std::optional<Trajectory> GuessSwingUp(const LqrConfig& lqr, const LqrCatch& upright, int steps,
-                                       Rng& rng, TrajectoryOptimizer& optimizer);
-
-/// Improves the best plan of sixteen tries of GuessSwingUp, and adds the regulator about it. Throws
-/// as SolveLqr does, and BadInput if no plan ends where `upright` catches.
+/// Finds a swing-up by trajectory optimisation from sixteen random guesses, and adds the regulator
+/// about the best one. Throws as SolveLqr does, and BadInput if no plan ends where `upright`
+/// catches.
 SwingUp PlanSwingUp(const LqrConfig& lqr, const SwingUpConfig& config, const LqrCatch& upright,
                     const Plant& plant);
 
