@@ -32,7 +32,7 @@ def every_setting():
 def python_type(option):
     if option["choices"]:
         return f"Literal[{', '.join(map(repr, option['choices']))}]"
-    if option["name"] in ("model", "plant", "start_policy"):
+    if option["name"] in ("plant", "start_policy"):
         return "Union[str, bytes, os.PathLike[str], os.PathLike[bytes]]"
     return PYTHON_TYPES[option["type"]]
 

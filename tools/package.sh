@@ -27,7 +27,7 @@ END_OF_USAGE
 
 deb_packages="help2man lintian git"
 arm64_packages="g++-aarch64-linux-gnu qemu-user libhwy-dev:arm64 libfmt-dev:arm64 \
-libtomlplusplus-dev:arm64 libprotobuf-dev:arm64 libtinyxml2-dev:arm64 zlib1g-dev:arm64 \
+libtomlplusplus-dev:arm64 libprotobuf-dev:arm64 zlib1g-dev:arm64 \
 libmuparser-dev:arm64 libpython3-dev:arm64"
 
 package() {

@@ -1,6 +1,6 @@
-// Trains with only the portable layers (base, nn, pendulum, rl, control, agents): in memory, in closed
-// form, with a checkpoint in safetensors format. The program links all of these libraries and no
-// others of ours. portable_test.py checks its requirements on the system.
+// Trains with only the portable layers (base, nn, pendulum, rl, control, agents): in memory, in
+// closed form, with a checkpoint in safetensors format. The program links all of these libraries
+// and no others of ours. portable_test.py checks its requirements on the system.
 #include <algorithm>
 #include <cstdio>
 #include <vector>
@@ -8,7 +8,6 @@
 #include "agents/training.h"
 #include "base/error.h"
 #include "base/safetensors.h"
-#include "base/text.h"
 
 namespace upswing {
 namespace {
@@ -24,16 +23,13 @@ Config SmallSettings() {
                                      {"head", "8"},
                                      {"learning_starts", "200"},
                                      {"threads", "2"}};
-  return ParseConfig("", "", flags, [](const std::string& path, bool /*in_file*/) -> ModelFile {
-    throw BadInput(Concat(path, ": expected no model"));
-  });
+  return ParseConfig("", "", flags);
 }
 
 /// A small training with two threads.
 Training SmallTraining() {
-  static constexpr const Engine* kEngines[] = {&kClosedForm};
   constexpr int64_t kMemory = int64_t{1} << 30;
-  return Training(SmallSettings(), {kEngines, kMemory, 2});
+  return Training(SmallSettings(), {nullptr, kMemory, 2});
 }
 
 /// The training's checkpoint as a file in memory.

@@ -161,12 +161,6 @@ PageAgent ReadAgent(const fs::path& path, const std::string& given_id, int64_t c
   const LoadedPolicy loaded = LoadPolicy(path);
   const std::string where = loaded.path;
   ExpectPendulum(loaded);
-  if (!loaded.mjcf.empty()) {
-    throw BadInput(
-        Concat(where,
-               ": expected a policy of the built-in model, the only one of the page, got "
-               "one of another MJCF model"));
-  }
   if (loaded.plant.actuated_joint != 1) {
     throw BadInput(Concat(where,
                           ": expected a policy for a motor at joint 1, as in the page, got one for "

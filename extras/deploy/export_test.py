@@ -12,7 +12,7 @@ import unittest
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "src/cli"))
-from testing import (MODEL, ROOT, ProgramTest, read_csv, read_tensors, small, with_number,  # noqa: E402
+from testing import (ROOT, ProgramTest, read_csv, read_tensors, small, with_number,  # noqa: E402
                      write_tensors)
 
 
@@ -158,8 +158,8 @@ class PageTest(ProgramTest):
         write_tensors(self.folder / "nameless.safetensors",
                       {key: text for key, text in metadata.items() if key != "agent"}, tensors)
         write_tensors(self.folder / "lost.safetensors", metadata | {"step": "many"}, tensors)
-        self.write("model.xml", MODEL)
-        self.succeed(*small(model="model.xml", out="own-model"))
+        write_tensors(self.folder / "own-model.safetensors", metadata | {"model": "<mujoco/>"},
+                      tensors)
         self.succeed("export", "run", "--page", "page")
         (self.folder / "broken").mkdir()
         self.write("broken/agents.json", '{"agents": [{"name": 3}]}')
@@ -169,7 +169,7 @@ class PageTest(ProgramTest):
                 (["run", "wrong.safetensors", *page], "wrong.safetensors", "nan"),
                 (["nameless.safetensors", *page], "nameless.safetensors", "agent"),
                 (["lost.safetensors", *page], "lost.safetensors", "step", "many"),
-                (["own-model", *page], "own-model", "built-in"),
+                (["own-model.safetensors", *page], "own-model.safetensors", 'metadata "model"'),
                 (["nothing", *page], "nothing"),
                 (["a/run", "b/run", *page], "a/run", "b/run", "--id"),
                 (["a/run", "b/run", "--id", "x", *page], "--id", "single"),
@@ -186,15 +186,16 @@ class PageTest(ProgramTest):
         metadata, tensors = read_tensors(self.folder / "run/policy.safetensors")
         evil = "x; touch y; $(id)`id`'"
 
-        def command_of(model):
-            config = metadata["config"].replace('\nmodel = ""\n', f"\nmodel = {model}\n")
+        def command_of(start):
+            config = metadata["config"].replace('\nstart_policy = ""\n',
+                                                f"\nstart_policy = {start}\n")
             self.assertNotEqual(config, metadata["config"])
             write_tensors(self.folder / "evil.safetensors", metadata | {"config": config}, tensors)
             self.succeed("export", "evil.safetensors", "--id", "evil", "--page", "page")
             return self.index()[0].get("command")
 
         words = shlex.split(command_of(f'"{evil}"'))
-        self.assertEqual(words[words.index("--model") + 1], evil)
+        self.assertEqual(words[words.index("--start-policy") + 1], evil)
         # A shell also reads each word as one.
         printed = command_of(f'"{evil}"').replace("./upswing", "printf '%s\\n'")
         shown = subprocess.run(["sh", "-c", printed], cwd=self.folder, check=True,

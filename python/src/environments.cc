@@ -60,7 +60,7 @@ Config ConfigOf(const std::string& num_envs, const SettingTexts& settings) {
 
 PendulumEnvConfig EnvConfigOf(const Config& config, ThreadPool& pool) {
   PendulumEnvConfig environments = config.Environments();
-  environments.engine = &FindEngine(config.physics, "physics");
+  environments.engine = &EngineCalled(config.physics);
   environments.pool = &pool;
   return environments;
 }

@@ -59,8 +59,7 @@ class PythonProgress {
 std::pair<std::string, std::string> EvaluateHandle(const PolicyHandle& policy,
                                                    const SettingTexts& settings,
                                                    const SettingTexts& arguments,
-                                                   const std::string& plant,
-                                                   const std::string& model, bool unknown_plant,
+                                                   const std::string& plant, bool unknown_plant,
                                                    const nb::object& progress) {
   TrialArguments trial;
   int64_t episodes = 100, threads = 0;
@@ -72,7 +71,6 @@ std::pair<std::string, std::string> EvaluateHandle(const PolicyHandle& policy,
   SetArguments(own, arguments);
   SetSurroundings(FlagsOf(settings), trial);
   trial.plant = plant;
-  trial.model = model;
   trial.unknown_plant = unknown_plant;
   PythonProgress python_progress(progress);
   const nb::gil_scoped_release unlocked;
@@ -135,7 +133,7 @@ nb::tuple MapHandle(const PolicyHandle& policy, const SettingTexts& settings,
 
 void BindEvaluation(nb::module_& m) {
   m.def("evaluate", &EvaluateHandle, nb::arg("policy"), nb::arg("settings"), nb::arg("arguments"),
-        nb::arg("plant"), nb::arg("model"), nb::arg("unknown_plant"), nb::arg("progress").none());
+        nb::arg("plant"), nb::arg("unknown_plant"), nb::arg("progress").none());
   m.def("map", &MapHandle, nb::arg("policy"), nb::arg("settings"), nb::arg("arguments"),
         nb::arg("x"), nb::arg("y"), nb::arg("plant"), nb::arg("unknown_plant"), nb::arg("out"),
         nb::arg("progress").none());

@@ -339,7 +339,7 @@ class BadInput(BadInputTest):
                 'got "acrobot-v1"; train on Gymnasium': {"agent": "acrobot-v1"},
                 'got "fsat"': {"agent": "fsat"},
                 "render_mode: expected": {"render_mode": "ansi"},
-                "/nothing/here.xml": {"model": "/nothing/here.xml"}}.items():
+                "model: expected no setting model, which was removed": {"model": "own.xml"}}.items():
             if settings is not None:
                 self.refuse(text, lambda settings=settings: upswing.DoublePendulumEnv(**settings))
         for number in (0, 4097, "x", -1):

@@ -47,7 +47,7 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
             `environment` in `upswing.settings()`: agent, which sets the defaults; physics ("mujoco"
             or "closed-form"), episode_seconds, random_start_share, start_noise, memory; the plant
             (mass1, …, torque_limit, actuated_joint, rotor_inertia, gear_ratio, coulomb1, coulomb2,
-            center1, center2, inertia1, inertia2, armature, model); plant, a plant file (TOML with a
+            center1, center2, inertia1, inertia2, armature); plant, a plant file (TOML with a
             table [plant]) or a shipped plant such as "realaigym", which these change; sensor_noise, delay, encoder_counts, velocity_window, velocity_filter,
             sensor_latency; randomize, …; the reward weights
 

@@ -51,7 +51,6 @@ def evaluate(
     seed: int = 0,
     physics: str = "mujoco",
     plant: PathLike | None = None,
-    model: PathLike | None = None,
     unknown_plant: bool = False,
     threads: int = 0,
     memory: int = 0,
@@ -79,7 +78,6 @@ def evaluate(
         physics: "mujoco" or "closed-form"
         plant: plant file (TOML with a table [plant]) or shipped plant such as "realaigym", instead
             of the policy's own plant; `settings` change it
-        model: MJCF file that replaces the policy's model
         unknown_plant: scale observed energy and height by the training's plant, not the episode's
         threads: number of threads (0: one per processor, at most 8)
         memory: for a function, the number of past control steps in its observations
@@ -92,10 +90,9 @@ def evaluate(
     """
     arguments = {"episodes": episodes, "seed": seed, "threads": threads, "physics": physics}
     if env is not None:
-        others = arguments | {"plant": plant, "model": model, "unknown_plant": unknown_plant,
-                              "memory": memory}
-        usual = {"threads": 0, "physics": "mujoco", "plant": None, "model": None,
-                 "unknown_plant": False, "memory": 0}
+        others = arguments | {"plant": plant, "unknown_plant": unknown_plant, "memory": memory}
+        usual = {"threads": 0, "physics": "mujoco", "plant": None, "unknown_plant": False,
+                 "memory": 0}
         wrong = [*settings, *(name for name, value in usual.items() if others[name] != value)]
         if wrong:
             raise _upswing.InputError(f"{wrong[0]}: expected none with env")
@@ -105,7 +102,7 @@ def evaluate(
         raise _upswing.InputError("max_episode_steps: expected env with it, got none")
     figures, table = _upswing.evaluate(
         handle_of(policy, memory), texts_of(dict(settings)), texts_of(arguments),
-        path_of("plant", plant), path_of("model", model), bool(unknown_plant), progress)
+        path_of("plant", plant), bool(unknown_plant), progress)
     return Evaluation(json.loads(figures), _columns(table))
 
 
@@ -192,8 +189,7 @@ def map(  # pylint: disable=redefined-builtin
             start: q1, q2 [°], w1, w2 [rad/s]. Defaults: mass2 and length2 within ±50%
         episodes: number of episodes per cell (default 10; 1 if the start is given)
         seed: seed of starts and noise
-        physics: "closed-form" or "mujoco" (default closed-form; mujoco for a policy with its own
-            model)
+        physics: "closed-form" (default) or "mujoco"
         plant: plant file or shipped plant, as for `evaluate`
         unknown_plant: scale observed energy and height by the training's plant, not the cell's
         threads: number of threads (0: one per processor, at most 8)

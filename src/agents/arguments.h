@@ -21,12 +21,10 @@ inline void DescribeThreads(Options& o, int64_t* threads) {
   o.Add(threads, "threads", {0, 256}, "", "number of threads; 0: one per processor, at most 8");
 }
 
-/// Argument "physics", for FindEngine.
+/// Argument "physics", one of EngineNames().
 inline void DescribePhysics(Options& o, std::string* physics) {
-  Option& option =
-      o.AddChoice(physics, "physics", EngineNames(),
-                  "physics engine; closed-form is faster than mujoco, with the same physics");
-  if (physics->empty()) option.usual = "closed-form; mujoco for a policy with its own model";
+  o.AddChoice(physics, "physics", EngineNames(),
+              "physics engine; closed-form is faster than mujoco, with the same physics");
 }
 
 /// Argument "episodes": number of episodes of an evaluation.

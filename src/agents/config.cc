@@ -60,7 +60,6 @@ void Config::DescribeEnvironment(Options& o) {
               "physics engine of evaluations; screened: closed-form, and mujoco confirms a solved "
               "task");
   o.Section("plant");
-  o.Add(&model, "model", "MJCF file that replaces the built-in model");
   plant.Describe(o);
   disturbance.Describe(o);
   randomization.Describe(o);
@@ -90,7 +89,6 @@ EnvConfig Config::Environments() const {
   env.reward = reward;
   env.seed = static_cast<uint64_t>(train.seed);
   env.stream = "training environment";
-  env.mjcf = mjcf;
   return env;
 }
 

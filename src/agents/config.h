@@ -32,14 +32,13 @@ const std::vector<std::string>& AlgorithmNames();
 struct Config {
   std::string agent = "d3qn";  // named agent whose settings are the defaults
   std::string algorithm;       // one of AlgorithmNames
-  std::string model;           // path of an MJCF file; empty: the built-in model
   TrainConfig train;
   std::string start_policy;  // PATH#CHECKSUM of the policy to start from (BuildConfig); or empty
   std::string environment;   // description of a foreign task's environment; empty: double pendulum
   double episode_seconds = 4, random_start_share = 0.9, random_start_velocity = 5;
   int64_t memory = 0;
   bool identify = false;
-  std::string physics = "mujoco";       // engine of the training, see FindEngine
+  std::string physics = "mujoco";       // engine of the training
   std::string eval_physics{kScreened};  // engine of evaluations, or kScreened
   Plant plant;
   Disturbance disturbance;
@@ -48,8 +47,6 @@ struct Config {
   DqnConfig dqn;
   SacConfig sac;
   PpoConfig ppo;
-
-  std::string mjcf;  // text of `model`; not a setting
 
   /// The default settings of an algorithm.
   explicit Config(std::string_view algorithm_name = AlgorithmNames().front())
@@ -93,21 +90,11 @@ struct FlagValue {
 /// Applies flags to the options. Throws BadInput.
 void SetFlags(const Options& options, const std::vector<FlagValue>& flags);
 
-/// A model file: its path in the settings, its text and its plant.
-struct ModelFile {
-  std::string path, mjcf;
-  Plant plant;
-};
-
-/// Reads the model at a path in the settings. `in_file`: the path is from a configuration file and
-/// relative to its folder. Throws BadInput.
-using ModelReader = std::function<ModelFile(const std::string& path, bool in_file)>;
-
 /// Builds the settings from four layers, each over the one before: defaults, named agent,
-/// configuration file (`text`), flags. The plant of a model file counts as defaults. `where` names
-/// the file in messages. Throws BadInput, also if settings contradict each other.
+/// configuration file (`text`), flags. `where` names the file in messages. Throws BadInput, also if
+/// settings contradict each other.
 Config ParseConfig(std::string_view text, const std::string& where,
-                   const std::vector<FlagValue>& flags, const ModelReader& read_model);
+                   const std::vector<FlagValue>& flags);
 
 /// Settings, such as agent.gamma, that the TOML text of a run lacks because another version of the
 /// program wrote it.

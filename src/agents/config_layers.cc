@@ -26,14 +26,13 @@ const NamedAgent& FindAgent(const std::string& name, const std::string& where) {
 /// place of that value for messages.
 struct EarlySetting {
   std::string value, where;
-  bool in_file = false;
 };
 
 EarlySetting FindEarly(std::string_view section, std::string_view key, const toml::table& file,
                        const std::string& file_name, const std::vector<FlagValue>& flags) {
   EarlySetting setting;
   if (const auto* node = file[section][key].as_string()) {
-    setting = {node->get(), Concat(PlaceOf(*node, file_name), ": ", key), true};
+    setting = {node->get(), Concat(PlaceOf(*node, file_name), ": ", key)};
   }
   for (const auto& [name, text, where] : flags) {
     if (name == key) setting = {text, where.empty() ? FlagOf(name) : where};
@@ -155,22 +154,13 @@ void ApplyToml(const Options& options, std::string_view text, const std::string&
 }
 
 Config ParseConfig(std::string_view text, const std::string& where,
-                   const std::vector<FlagValue>& flags, const ModelReader& read_model) {
+                   const std::vector<FlagValue>& flags) {
   const toml::table table = ParseToml(text, where);
   const ChosenAgent agent = ChooseAgent(table, where, flags);
   const bool foreign = !FindEarly("task", "environment", table, where, flags).value.empty();
   Config config(agent.algorithm);
   config.agent = agent.name;
   const Options options = KnownOptions(config);
-
-  // A model file has its own plant; other settings may change it.
-  const EarlySetting named = FindEarly("plant", "model", table, where, flags);
-  ModelFile model;
-  if (!named.value.empty()) {
-    model = read_model(named.value, named.in_file);
-    config.plant = model.plant;
-    config.mjcf = model.mjcf;
-  }
 
   if (foreign) {
     ApplyToForeign(options, agent);
@@ -180,7 +170,6 @@ Config ParseConfig(std::string_view text, const std::string& where,
   ApplyTable(options, table, where, false);
   SetFlags(options, flags);
   config.agent = agent.name;
-  config.model = model.path;
   if (foreign) {
     const EarlySetting decay = FindEarly("agent", "learning_rate_steps", table, where, flags);
     const bool decay_in_file = table["agent"]["learning_rate_steps"].is_number();

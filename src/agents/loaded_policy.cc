@@ -79,16 +79,21 @@ Plant TrainingPlant(const PolicyInfo& info, const std::string& where) {
 
 }  // namespace
 
-LoadedPolicy PolicyIn(const Tensors& file) {
+LoadedPolicy ReadPolicy(const Tensors& file) {
   const std::string& where = file.where();
+  if (file.metadata.contains("model")) {
+    throw BadInput(Concat(where,
+                          ": metadata \"model\": expected none, got an MJCF model of version "
+                          "0.5.0; ",
+                          kInsteadOfModel));
+  }
   const auto policy = std::make_shared<const NetworkPolicy>(NetworkPolicy::From(file));
   const PolicyInfo& info = policy->info();
   const std::string task = info.task.empty() ? kDoublePendulum : info.task;
-  LoadedPolicy loaded{where, where, policy, task, Plant(), ""};
+  LoadedPolicy loaded{where, where, policy, task, Plant()};
   CheckTask(loaded, where);
   if (loaded.is_foreign()) return loaded;
   loaded.plant = TrainingPlant(info, where);
-  loaded.mjcf = info.model;
   return loaded;
 }
 
@@ -120,7 +125,6 @@ PolicyInfo InfoOf(const Config& config) {
   if (config.is_foreign()) return info;
   for (const auto& [name, value] : PlantValues(config.plant)) info.plant[name] = value;
   info.observation = ObservationInfoOf(config.memory, config.identify);
-  info.model = config.mjcf;
   return info;
 }
 

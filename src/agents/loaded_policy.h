@@ -17,9 +17,7 @@ struct LoadedPolicy {
   std::string path;  // its file; empty for a controller
   std::shared_ptr<const Policy> policy;
   std::string task;  // kDoublePendulum, or that of an environment of Gymnasium
-  // Of the double pendulum:
-  Plant plant;       // plant of the training or of the design
-  std::string mjcf;  // empty: the built-in model
+  Plant plant;       // of the training or of the design, for the double pendulum
   // Designs the controller for another plant; empty for a learned policy. Throws BadInput if no
   // such controller exists.
   std::function<std::shared_ptr<const Policy>(const Plant&)> design_for = {};
@@ -34,9 +32,9 @@ struct LoadedPolicy {
   const char* origin() const { return path.empty() ? "design" : "training"; }
 };
 
-/// The policy in a file. Its MJCF model is not checked. Throws BadInput also for a task that this
-/// program lacks: another control period or other observations.
-LoadedPolicy PolicyIn(const Tensors& file);
+/// The policy in a file. Throws BadInput also for a task that this program lacks: another control
+/// period, other observations, or a model that a 0.5.0 training had from an MJCF file.
+LoadedPolicy ReadPolicy(const Tensors& file);
 
 /// Throws BadInput unless the policy is for the double pendulum.
 void ExpectPendulum(const LoadedPolicy& loaded);

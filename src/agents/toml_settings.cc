@@ -22,6 +22,7 @@ constexpr RemovedSetting kRemoved[] = {
 bool IsRemoved(std::string_view section, std::string_view name, const toml::node& node,
                const std::string& where) {
   const std::string text = TextOf(node).value_or("another type");
+  if (name == "model" && text.empty()) return true;  // Plant::Describe explains another text
   std::vector<std::string> possible;
   for (const RemovedSetting& removed : kRemoved) {
     if (section != removed.section || name != removed.name) continue;
@@ -144,7 +145,7 @@ std::vector<FlagValue> ApplyTable(const Options& options, const toml::table& tab
     const std::string key(name.str());
     const auto* section = node.as_table();
     if (flat && section == nullptr) {
-      if (IsRemoved("task", key, node, where)) continue;  // the only such setting of old studies
+      if (IsRemoved("task", key, node, where)) continue;  // old studies may have task and model
       settings.push_back(ApplyNode(options, "", key, node, where));
       continue;
     }

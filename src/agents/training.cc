@@ -20,11 +20,19 @@ Config Checked(Config config, const Host& host) {
   return config;
 }
 
+/// The engine of this name, a setting. Throws BadInput that begins with `where`.
+const Engine& EngineOf(const Host& host, const std::string& name, const std::string& where) {
+  if (name == kClosedForm.name) return kClosedForm;
+  if (host.mujoco != nullptr) return *host.mujoco;
+  throw BadInput(
+      Concat(where, ": expected ", kClosedForm.name, ", the only engine here, got ", name));
+}
+
 /// Makes the environments of the settings. The threads of the pool share their work.
 std::unique_ptr<VectorEnv> MakeTrainingEnv(const Config& config, const Host& host,
                                            ThreadPool& pool) {
   EnvConfig env = config.Environments();
-  env.engine = &FindEngine(host.engines, config.physics, "--physics");
+  env.engine = &EngineOf(host, config.physics, "--physics");
   env.make_foreign = host.make_foreign;
   env.pool = &pool;
   return MakeEnv(env);
@@ -39,8 +47,7 @@ class TrainingEvaluator : public Evaluator {
   TrainingEvaluator(const Config& config, const Host& host, ThreadPool& pool)
       : config_(config), make_foreign_(host.make_foreign), pool_(pool) {
     const bool screened = config.eval_physics == kScreened;
-    engine_ = &FindEngine(host.engines, screened ? kMuJoCoName : config.eval_physics.c_str(),
-                          "--eval-physics");
+    engine_ = &EngineOf(host, screened ? kMuJoCoName : config.eval_physics, "--eval-physics");
   }
 
   Evaluation Evaluate(const Policy& policy, int64_t step) override {
@@ -75,7 +82,7 @@ class TrainingEvaluator : public Evaluator {
 }  // namespace
 
 bool IsScreened(const Config& config) {
-  return config.eval_physics == kScreened && config.mjcf.empty() && !config.is_foreign();
+  return config.eval_physics == kScreened && !config.is_foreign();
 }
 
 Training::Training(Config config, const Host& host)
@@ -107,8 +114,7 @@ Tensors Training::Checkpoint() {
   Tensors checkpoint;
   checkpoint.metadata = {{"format", std::string(kCheckpointFormat)},
                          {"upswing_version", UPSWING_VERSION},
-                         {"config", ConfigToml(config_, true)},
-                         {"model", config_.mjcf}};
+                         {"config", ConfigToml(config_, true)}};
   State(Archive::Saver(checkpoint));
   return checkpoint;
 }
@@ -126,11 +132,6 @@ void Training::Load(const Tensors& checkpoint) {
   const Config old_config = ConfigIn(checkpoint.Metadata("config"), checkpoint.where());
   ExpectSameSettings(old_config, config_, checkpoint.where(),
                      [](const Option& option) { return option.identity(); });
-  if (checkpoint.Metadata("model") != config_.mjcf) {
-    throw BadInput(Concat(checkpoint.where(),
-                          ": expected a checkpoint of the same model, got one of another than ",
-                          config_.model));
-  }
   State(Archive::Loader(checkpoint));
 }
 

@@ -11,14 +11,13 @@
 namespace upswing {
 
 /// Whether evaluations run in the closed form and MuJoCo confirms the evaluations that solve the
-/// task. With the same setting, a model of your own, which has no closed form, is evaluated in
-/// MuJoCo.
+/// task.
 bool IsScreened(const Config& config);
 
 /// Computer on which a training runs.
 struct Host {
-  Engines engines;
-  int64_t memory;  // free memory, bytes
+  const Engine* mujoco;  // null: only the closed form
+  int64_t memory;        // free memory, bytes
   int threads = 1;
   ForeignMaker make_foreign = {};  // for trainings on a foreign task
 };

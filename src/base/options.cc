@@ -234,6 +234,7 @@ void Options::AddMissing(const Options& others) {
     const auto same = [&](const AliasEntry& own) { return own.name == alias.name; };
     if (std::ranges::none_of(aliases_, same)) aliases_.push_back(alias);
   }
+  missing_.insert(others.missing_.begin(), others.missing_.end());
 }
 
 void Options::Explain(std::string_view name, std::string_view why) {

@@ -117,7 +117,7 @@ class Options {
     for (Option& option : options_) option.read_only = true;
   }
 
-  /// Adds each setting of `others` whose name is missing here.
+  /// Adds each setting and explanation of `others` whose name is missing here.
   void AddMissing(const Options& others);
 
   /// Sets the message with which Find rejects a name that is not a setting.

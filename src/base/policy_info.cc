@@ -140,7 +140,6 @@ PolicyInfo ParsePolicyInfo(const std::map<std::string, std::string>& metadata,
   info.plant = reader.Json("plant", ParsePlant).value_or(info.plant);
   info.control_period = reader.Number("control_period", kSeconds);
   info.observation = reader.Json("observation", ParseObservation);
-  info.model = reader.Text("model");
   info.gamma = reader.Number("gamma", kUnit);
   info.reward_scale = reader.Number("reward_scale", kPositive);
   return info;
@@ -165,7 +164,6 @@ std::map<std::string, std::string> PolicyMetadata(const PolicyInfo& info) {
   if (!info.plant.empty()) metadata["plant"] = json(info.plant).dump();
   number("control_period", info.control_period);
   if (info.observation) metadata["observation"] = ObservationText(*info.observation);
-  text("model", info.model);
   number("gamma", info.gamma);
   number("reward_scale", info.reward_scale);
   return metadata;

@@ -47,7 +47,6 @@ struct PolicyInfo {
   std::map<std::string, double> plant;   // parameters of the plant in training
   std::optional<double> control_period;  // s, for which a torque is held
   std::optional<ObservationInfo> observation;
-  std::string model;  // MJCF of a plant that is not built in
 
   // A Q-value estimates the sum of gamma^k · reward_scale · reward.
   std::optional<double> gamma, reward_scale;

@@ -21,7 +21,6 @@ const Metadata kWhole{
     {"control_period", "0.02"},
     {"observation", R"({"max_velocity":[10.0,20.0],"memory":{"names":["a"],"steps":2,)"
                     R"("torque":5.0,"velocity":1.0},"names":["cos q1"]})"},
-    {"model", "<mujoco/>"},
     {"gamma", "0.99"},
     {"reward_scale", "0.1"},
 };
@@ -37,7 +36,6 @@ TEST(PolicyInfo, HoldsTheMetadata) {
   EXPECT_EQ(info.control_period, 0.02);
   EXPECT_EQ(info.observation->max_velocity, (std::vector<double>{10, 20}));
   EXPECT_EQ(info.observation->memory->steps, 2);
-  EXPECT_EQ(info.model, "<mujoco/>");
   EXPECT_EQ(info.gamma, 0.99);
   EXPECT_EQ(info.reward_scale, 0.1);
   EXPECT_EQ(PolicyMetadata(info), kWhole);

@@ -8,7 +8,7 @@ import os
 import subprocess
 import unittest
 
-from testing import (MODEL, PATIENCE, UPSWING, ProgramTest, SmallRunTest, limits, small, train_once)
+from testing import PATIENCE, UPSWING, ProgramTest, SmallRunTest, limits, small, train_once
 
 # If one of these is wrongly accepted, the test stays short.
 TRAIN = ["train", "--steps", "8", "--eval-episodes", "1", "--out", "run"]
@@ -25,7 +25,7 @@ class CommandLineTest(ProgramTest):
     def test_empty_path(self):
         for command in (["train", "--resume", ""], ["train", "--out", ""], ["train", "--config", ""],
                         ["eval", ""], ["info", ""], ["compare", ""], ["simulate", "--torque", ""],
-                        ["simulate", "--csv", ""], ["simulate", "--model", ""], [*TRAIN, "--model", ""]):
+                        ["simulate", "--csv", ""]):
             with self.subTest(command=command):
                 self.refuse(command, "empty")
 
@@ -99,14 +99,13 @@ class CommandLineTest(ProgramTest):
                 words = ["--physics", "expected one of mujoco, closed-form", f'got "{engine}"']
                 self.refuse([*TRAIN, "--physics", engine], *words)
                 self.refuse(["eval", "run", "--physics", engine], *words)
-        self.write("m.xml", MODEL)
-        self.refuse([*TRAIN, "--physics", "closed-form", "--model", "m.xml"],
-                    "physics = closed-form: expected the built-in model")
 
     def test_flags_of_version_0_5(self):
         for words, instead in ((["study", "x.toml", "--slurm", "4"], "examples/slurm.sh"),
                                (["study", "x.toml", "--tasks=4"], "examples/slurm.sh"),
-                               (["train", "--task", "pendulum-v1"], "upswing.train(env=...)")):
+                               (["train", "--task", "pendulum-v1"], "upswing.train(env=...)"),
+                               ([*TRAIN, "--model", "m.xml"], "docs/howto/gymnasium.md"),
+                               (["eval", "lqr", "--model=m.xml"], "docs/howto/gymnasium.md")):
             with self.subTest(words=words):
                 self.refuse(words, "unknown flag --", instead)
 
@@ -229,57 +228,6 @@ class TomlTest(ProgramTest):
         self.refuse(["train", "--config", "s.toml"], "s.toml:1:")
 
 
-class ModelTest(ProgramTest):
-    def refuse_model(self, text, *words):
-        self.write("m.xml", text)
-        for command in (["simulate", "--seconds", "1"], small()):
-            self.refuse([*command, "--model", "m.xml"], "m.xml", *words)
-
-    def test_good_model(self):
-        self.write("m.xml", MODEL)
-        self.succeed("simulate", "--seconds", "1", "--model", "m.xml", "--csv", "m.csv")
-        self.write("acrobot.xml", MODEL.replace('joint="a" ctrl', 'joint="b" ctrl'))
-        self.succeed("simulate", "--seconds", "1", "--model", "acrobot.xml", "--csv", "m.csv")
-
-    def test_missing(self):
-        self.refuse(["simulate", "--model", "none.xml"], "none.xml", "No such file")
-
-    def test_a_file_that_is_no_mjcf_or_does_not_compile(self):
-        self.refuse_model("<mujoco><worldbody>", "XML")
-        self.refuse_model("", "XML")
-        self.refuse_model("no XML at all", "XML")
-        self.refuse_model(MODEL.replace('mass="1"', 'mas="1"', 1),
-                          "m.xml:6: <geom> takes no", "mas", "did you mean mass?")
-        self.refuse_model(MODEL.replace("<motor", "<moter"), "did you mean motor?")
-        self.refuse_model(MODEL.replace('joint="a" ctrl', 'joint="z" ctrl'), "z")
-        self.refuse_model(MODEL.replace('mass="1"', 'mass="-1"', 1), "mass")
-
-    def test_not_a_double_pendulum(self):
-        two_bodies = MODEL.replace('<body pos="0 0 -0.5">', '</body>\n<body pos="0 0 -0.5">')
-        two_bodies = two_bodies.replace("      </body>\n    </body>\n", "      </body>\n")
-        for text in (
-                "<mujoco/>",
-                two_bodies,
-                MODEL.replace('type="hinge"', 'type="slide"', 1),
-                MODEL.replace('axis="0 1 0"', 'axis="1 0 0"', 1),
-                MODEL.replace('ctrllimited="true" ctrlrange="-5 5"', ""),
-                MODEL.replace("<actuator>", '<actuator><motor joint="b"/>'),
-                MODEL.replace('<joint name="b"', '<joint name="b" stiffness="1" springref="5"')):
-            with self.subTest(model=text):
-                self.refuse_model(text, "m.xml: expected")
-
-    def test_what_the_settings_cannot_express_is_not_silently_changed(self):
-        body = '<joint name="a"'
-        for text in (MODEL.replace('ctrlrange="-5 5"', 'ctrlrange="-1 5"'),
-                     MODEL.replace(body, '<inertial pos="0.1 0 -0.25" mass="1" '
-                                              'diaginertia="0.1 0.1 0.1"/>' + body)):
-            with self.subTest(model=text):
-                self.refuse_model(text, "expected")
-
-    def test_timestep_that_does_not_divide_the_control_period(self):
-        self.refuse_model(MODEL.replace("0.005", "0.007", 1), "timestep", "0.02", "0.007")
-
-
 class TorqueFileTest(SmallRunTest):
     def refuse_torques(self, text, *words):
         self.write("torques.csv", text)
@@ -326,7 +274,7 @@ class UntrustedFileTest(ProgramTest):
     # Commands and the place of the file, marked as FILE.
     READERS = (["study", "FILE"], [*TRAIN, "--config", "FILE"], [*TRAIN, "--plant", "FILE"],
                ["simulate", "--torque", "FILE"], ["simulate", "--plant", "FILE"],
-               ["simulate", "--model", "FILE"], ["eval", "FILE"], ["eval", "lqr", "--made-for", "FILE"],
+               ["eval", "FILE"], ["eval", "lqr", "--made-for", "FILE"],
                ["info", "FILE"], ["machine", "check", "FILE"],
                ["machine", "check", "log.csv", "--columns", "FILE"],
                ["machine", "validate", "FILE", "log.csv"], ["run", "lqr", "--link", "FILE"],

@@ -20,7 +20,7 @@ namespace {
 /// The placeholder of a setting's value in --help.
 std::string TypeName(const Option& option) {
   constexpr std::array kNames{"", "INTEGER", "NUMBER", "TEXT", "LIST"};  // in the order of Target
-  return option.name == "model" ? "FILE" : kNames.at(option.target.index());
+  return kNames.at(option.target.index());
 }
 
 CLI::Validator NotEmpty(std::string_view what) {
@@ -50,7 +50,7 @@ void AddFlag(CLI::App& app, const Option& option, const std::string& group, cons
                           ->type_name(TypeName(option));
   // Files of settings may have an empty text. On a command line it is an unset shell variable.
   if (std::holds_alternative<std::string*>(option.target) && option.choices.empty()) {
-    flag->check(NotEmpty(option.name == "model" ? kPath : "a value"));
+    flag->check(NotEmpty("a value"));
   }
 }
 

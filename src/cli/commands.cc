@@ -79,7 +79,7 @@ void AddTrialOptions(CommandLine& line, TrialArguments& a, const std::string& se
   AddSeed(line, a.seed, seed_of);
   AddPlant(line, a.plant);
   AddSet(line, a.set);
-  line.Text("--model", a.model, "FILE", "MJCF file that replaces the policy's model");
+  line.Removed("--model", kInsteadOfModel);
   AddPhysics(line, a.physics);
   AddUnknownPlant(line, a.unknown_plant);
   const TrialConditions defaults;

@@ -39,7 +39,7 @@ void AddSeed(CommandLine& line, int64_t& seed, const std::string& what);
 /// Adds --threads, the argument of ResolveThreads.
 void AddThreads(CommandLine& line, int64_t& threads);
 
-/// Adds --physics, the argument of FindEngine.
+/// Adds --physics, the name of an engine.
 void AddPhysics(CommandLine& line, std::string& physics);
 
 /// Adds --seeds and --jobs, for many runs; 0 jobs: one per processor.
@@ -57,8 +57,8 @@ void AddPlant(CommandLine& line, std::string& plant);
 /// Adds --unknown-plant: on another plant, observations are still scaled as in training.
 void AddUnknownPlant(CommandLine& line, bool& unknown_plant);
 
-/// Adds --plant, --set, --model, --physics, --seed (of `seed_of`), --unknown-plant, and the
-/// settings of Disturbance and Randomization: the conditions of `eval`, `simulate` and `plot`.
+/// Adds --plant, --set, --physics, --seed (of `seed_of`), --unknown-plant, and the settings of
+/// Disturbance and Randomization: the conditions of `eval`, `simulate` and `plot`.
 void AddTrialOptions(CommandLine& line, TrialArguments& a, const std::string& seed_of);
 
 /// Says on standard error why there will be tables only, if figures cannot be drawn.

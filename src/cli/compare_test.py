@@ -8,7 +8,7 @@ import statistics
 import unittest
 import xml.etree.ElementTree as ET
 
-from testing import MODEL, ProgramTest, read_csv, small, train_once
+from testing import ProgramTest, read_csv, small, train_once
 
 OUTPUTS = ["curves.png", "curves.svg", "runs.csv", "summary.csv"]
 
@@ -277,12 +277,6 @@ class CompareTest(ProgramTest):
         self.assertEqual(sorted(p.name for p in (self.folder / "out").glob("*.svg")),
                          ["curves-2.svg", "curves-3.svg", "curves-4.svg", "curves.svg"])
         self.assertEqual(len(self.compare(*folders, "--different-tasks")["pairs"]), 15)
-
-    def test_a_model_is_another_task(self):
-        self.make_group("a", [1])
-        self.make_run("model", 3, [(1, 1), (1, 1)], more='model = "model.xml"\n')
-        self.write("model/model.xml", MODEL)
-        self.assertEqual([g["task"] for g in self.compare("a", "model")["groups"]], [1, 2])
 
     def test_times_of_other_machines_are_noted(self):
         def log(run, *lines):

@@ -87,7 +87,7 @@ class RunFolder(ProgramTest):
 
     def test_every_file_is_named(self):
         files = first_column(text_of(self.PAGE).split("## ", maxsplit=1)[0])
-        self.assertEqual(set(files) - {"model.xml"}, {path.name for path in self.run_path.iterdir()})
+        self.assertEqual(set(files), {path.name for path in self.run_path.iterdir()})
 
     def test_terms_add_up_to_the_return(self):
         for row in read_csv(self.run_path / "episodes.csv"):

@@ -81,14 +81,12 @@ void PrintEvalTable(const EvalReport& report) {
   fmt::print("{}\n", Printable(report.policy));
   fmt::print("  plant          {}, physics {}\n", PlantText(report.env.plant(0)),
              report.env.engine->name);
-  if (report.model) fmt::print("  {:<15}{}\n", "model", report.model->Text());
   const std::string changes = ChangesText(report.env);
   if (!changes.empty()) fmt::print("  {:<15}{}\n", "with", changes);
   if (report.known_plant) {
     fmt::print(
-        "  designed for   the plant of each episode{}; {} of {} plants have no such controller\n",
-        report.model ? " without the model's differences" : "", e.episodes - NumDesigned(report),
-        e.episodes);
+        "  designed for   the plant of each episode; {} of {} plants have no such controller\n",
+        e.episodes - NumDesigned(report), e.episodes);
   }
   if (report.only_balances) {
     fmt::print(

@@ -23,7 +23,6 @@
 #include "pendulum/upright_modes.h"
 #include "runs/config_files.h"
 #include "runs/find_policy.h"
-#include "runs/model_info.h"
 #include "runs/run_folder.h"
 #include "runs/tensor_file.h"
 
@@ -128,8 +127,6 @@ void PrintPolicy(const LoadedPolicy& loaded) {
     fmt::print("  observes    {}\n", ObservationText(loaded));
     fmt::print("  plant       {}\n", PlantText(loaded.plant));
   }
-  const std::optional<ModelInfo> model = InfoOfModel(loaded.mjcf, "");
-  if (model) fmt::print("  model       {}\n", model->Text());
   if (learned != nullptr) PrintSelfCheck(learned->self_check());
 }
 
@@ -173,8 +170,6 @@ void PrintRun(const fs::path& path, bool has_policy) {
   fmt::print("{}\n", Printable(path.string()));
   fmt::print("  agent       {}, seed {}, upswing {}\n", config.agent, config.train.seed,
              Printable(checkpoint.Metadata("upswing_version")));
-  const std::optional<ModelInfo> model = InfoOfModel(config.mjcf, config.model);
-  if (model) fmt::print("  model       {}\n", model->Text());
   fmt::print("  checkpoint  step {} of {}, {} episodes, {} of training\n", FormatCount(state.steps),
              FormatCount(config.train.steps), FormatCount(state.episodes),
              FormatDuration(state.seconds));

@@ -42,7 +42,6 @@ void PrintMapTable(const MapResult& map) {
   fmt::print("{}\n", Printable(map.policy));
   fmt::print("  plant      {}, physics {}\n", PlantText(config.point.plant),
              config.env.engine->name);
-  if (map.model) fmt::print("  model      {}\n", map.model->Text());
   fmt::print("  map        {} × {}: {} × {} cells, {} each\n", RangeText(config.x),
              RangeText(config.y), config.x.values.size(), config.y.values.size(),
              Counted(config.episodes, "episode"));

@@ -10,7 +10,7 @@ import struct
 import unittest
 import xml.dom.minidom
 
-from testing import MODEL, ProgramTest, small, train_once
+from testing import ProgramTest, train_once
 
 GRID = ("--x", "gravity=0.05:3:3", "--y", "mass2=-50%:+50%:3")
 
@@ -226,14 +226,6 @@ class MapTest(ProgramTest):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertRegex(done.stderr, r"^upswing: tables only, no figures: .*gnuplot-nox.*\n$")
         self.assertEqual(json.loads(done.stdout)["files"], ["map/map.csv"])
-
-    def test_another_model_needs_mujoco(self):
-        self.write("model.xml", MODEL)
-        self.succeed(*small(model="model.xml", out="run", steps=2000))
-        grid = ("--x", "mass2=0.9:1.1:2", "--y", "gravity=9:10:2", "--episodes", 1)
-        self.refuse(["map", "run", *grid, "--out", "map", "--physics", "closed-form"],
-                    "closed-form", "another MJCF model")
-        self.assertIn("physics mujoco", self.succeed("map", "run", *grid, "--out", "map"))
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ import io
 import json
 import unittest
 
-from testing import MODEL, ProgramTest, read_tensors, small
+from testing import ProgramTest, read_tensors, small
 
 MACHINE = """[plant]
 mass1 = 0.8
@@ -121,7 +121,6 @@ class PlantTest(ProgramTest):
     def test_mistakes(self):
         self.write("bad.toml", "[plant]\nmas1 = 1\n")
         self.write("other.toml", "[sensor]\n")
-        self.write("m.xml", MODEL)
         for command in (["simulate"], ["eval", "lqr"], ["plot", "lqr"], ["map", "lqr"], ["view"], small()):
             self.refuse([*command, "--plant", "bad.toml"], "bad.toml:2: [plant]", "did you mean mass1?")
             self.refuse([*command, "--plant", "none"], "--plant: expected a plant file", "realaigym",
@@ -130,8 +129,6 @@ class PlantTest(ProgramTest):
         self.refuse(["eval", "lqr", "--made-for", "bad.toml"], "bad.toml:2: [plant]")
         self.refuse(["eval", "lqr", "--made-for", "m.toml", "--made-for", "realaigym"],
                     "--made-for: expected at most one plant file")
-        self.refuse(["simulate", "--plant", "m.toml", "--model", "m.xml"], "--plant", "--model")
-        self.refuse(["simulate", "--model", "m.xml", "--set", "armature=0.02"], "armature: expected 0.01")
 
 
 if __name__ == "__main__":

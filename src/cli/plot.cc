@@ -13,7 +13,6 @@
 #include "os/file.h"
 #include "report/figure.h"
 #include "runs/find_policy.h"
-#include "runs/model_info.h"
 #include "runs/run_folder.h"
 
 namespace upswing {
@@ -98,7 +97,6 @@ int RunPlot(const PlotArguments& a) {
   const double usual = a.trial.is_of_eval() ? kEvaluationSeconds : 10;
   config.seconds = a.seconds < 0 ? usual : a.seconds;
   config.estimates = true;
-  const std::optional<ModelInfo> model = InfoOfModel(config.env.mjcf, a.trial.model);
   const fs::path folder = FigureFolder(a.out, loaded, "plot");
   CheckCanDraw();
   const Rollout rollout = RunRollout(config);
@@ -109,13 +107,12 @@ int RunPlot(const PlotArguments& a) {
   if (auto terms = TermsFigure(a.policy.name)) figures.emplace_back("terms", std::move(*terms));
   std::vector<std::string> files;
   for (auto& [name, figure] : figures) {
-    figure.title = WithModel(loaded.name, model);
+    figure.title = loaded.name;
     if (name != "terms") figure.caption = Caption(a, config, rollout, loaded);
     std::ranges::move(DrawIfPossible(figure, folder / name), std::back_inserter(files));
   }
   fmt::print("{}\n", Printable(loaded.name));
   fmt::print("  plant      {}, physics {}\n", EpisodeText(rollout), a.trial.physics);
-  if (model) fmt::print("  model      {}\n", model->Text());
   const double since = UprightSince(rollout.rows);
   fmt::print("  upright    {}\n",
              since < 0 ? "not at the end" : fmt::format("from {:.2f} s to the end", since));

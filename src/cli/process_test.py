@@ -121,7 +121,7 @@ class InputTest(ProgramTest):
     def test_paths_that_cannot_be(self):
         for arguments in (["train", "--resume", "loop"], ["eval", "loop"], ["info", "loop"],
                           ["compare", "loop"], ["train", "--config", "loop"], ["study", "loop"],
-                          ["simulate", "--torque", "loop"], ["simulate", "--model", "loop"],
+                          ["simulate", "--torque", "loop"],
                           ["simulate", "--csv", "loop"], ["simulate", "--csv", "none/x.csv"],
                           ["simulate", "--csv", "file/x.csv"], ["simulate", "--csv", "."],
                           ["export", "loop", "--page", "p"],

@@ -59,7 +59,7 @@ class ResumeTest(ProgramTest):
         self.assert_same_run("run", "never-stopped")
 
     def test_a_run_of_version_0_5(self):
-        """Settings of version 0.5 have a `task`."""
+        """Settings of version 0.5 have a `task`, and a `model` that is usually empty."""
         self.succeed(*small(steps=2000))
         config = self.folder / "run/config.toml"
         settings = config.read_text()
@@ -75,6 +75,14 @@ class ResumeTest(ProgramTest):
         for agent, instead in (("sac-pendulum-v1", 'upswing.train(env="Pendulum-v1")'),
                                ("ppo-discrete", "use the agent ppo with --actions levels")):
             self.refuse(["train", "--agent", agent], "--agent: expected an agent", instead)
+        config.write_text(settings.replace("[plant]\n", '[plant]\nmodel = ""\n'))
+        self.succeed("info", "run")
+        config.write_text(settings.replace("[plant]\n", '[plant]\nmodel = "model.xml"\n'))
+        for command in (["info", "run"], ["train", "--resume", "run"],
+                        ["train", "--config", config, "--out", "x"], ["compare", "run"]):
+            self.refuse(command, "expected no setting model, which was removed", "howto/gymnasium.md")
+        self.write("old.toml", study.replace('task = "pendulum-v1"', 'model = "m.xml"'))
+        self.refuse(["study", "old.toml"], "old.toml:4: expected no setting model")
 
     def test_a_run_that_is_being_trained_is_not_resumed(self):
         process = self.start(*small(steps=ENDLESS, stop_when_solved=False))

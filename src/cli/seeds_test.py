@@ -10,7 +10,7 @@ import time
 import unittest
 from pathlib import Path
 
-from testing import MODEL, RUN_FILES, ProgramTest, run, small, snapshot
+from testing import RUN_FILES, ProgramTest, run, small, snapshot
 
 TINY = {"steps": 400, "hidden": 8, "head": 8, "eval_episodes": 2, "eval_every": 200,
         "log_every": 200, "learning_starts": 50, "threads": None, "out": "many"}
@@ -71,13 +71,6 @@ class SeedsTest(ProgramTest):
             solved[seed] = int(step.replace(",", ""))
             self.assertRegex(output, rf"(?m)^  seed{seed} .* solved at {step} ")
         self.assertRegex(output, rf"(?m)^  steps to solve +(median )?{sorted(solved.values())[1]:,} ?")
-
-    def test_own_model_next_to_the_settings(self):
-        self.write("own.xml", MODEL)
-        self.succeed(*small(**TINY | {"model": "own.xml"}), "--seeds", 2)
-        (self.folder / "own.xml").unlink()
-        self.succeed("train", "--config", "many/settings.toml", "--seed", 2, "--out", "alone/seed2")
-        self.assert_same_runs("many", "alone", (2,))
 
     # ---- Resuming.
 

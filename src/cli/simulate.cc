@@ -12,11 +12,9 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "cli/commands.h"
-#include "cli/say.h"
 #include "judge/rollout.h"
 #include "os/streams.h"
 #include "runs/find_policy.h"
-#include "runs/model_info.h"
 
 namespace upswing {
 namespace {
@@ -88,15 +86,9 @@ int RunSimulate(const SimulateArguments& a) {
   }
   const Rollout rollout = RunRollout(config);
 
-  const std::optional<ModelInfo> model = InfoOfModel(config.env.mjcf, a.trial.model);
-
   WriteOutput(a.csv, RolloutCsv(rollout));
-  if (IsStandardStream(a.csv)) {
-    if (model) SayError(Concat("model ", model->Text()));
-    return 0;
-  }
+  if (IsStandardStream(a.csv)) return 0;
   fmt::print("{}: {} rows\n", Printable(a.csv), rollout.rows.size());
-  if (model) fmt::print("  model      {}\n", model->Text());
   fmt::print("  plant      {}\n", EpisodeText(rollout));
   fmt::print("  torque     {}\n", TorqueText(rollout));
   if (loaded && a.trial.is_of_eval()) {

@@ -9,7 +9,7 @@ import signal
 import tomllib
 import unittest
 
-from testing import MODEL, ROOT, ProgramTest, small, snapshot
+from testing import ROOT, ProgramTest, small, snapshot
 
 HEAD = """title = "Little"
 seeds = 2
@@ -118,16 +118,6 @@ class StudyTest(ProgramTest):
         for name in VARIANTS:
             for seed in (1, 2):
                 self.assert_same_run(f"killed/{name}/seed{seed}", f"never-stopped/{name}/seed{seed}")
-
-    def test_a_model_counts_from_the_study(self):
-        (self.folder / "sub").mkdir()
-        self.write("sub/own.xml", MODEL.replace('mass="1"', 'mass="1.25"', 1))
-        self.write("sub/s.toml", HEAD + '[variants.own]\nmodel = "own.xml"\n[variants.ours]\n')
-        self.succeed("study", "sub/s.toml", "--seeds", "1-1", "--out", "x")
-        config = (self.folder / "x/own/seed1/config.toml").read_text(encoding="utf-8")
-        self.assertIn("\nmass1 = 1.25 ", config)
-        again = self.succeed("study", "sub/s.toml", "--seeds", "1-1", "--out", "x")
-        self.assertIn("2 already done", again)
 
     def test_other_settings_are_refused_with_the_difference(self):
         self.write("little.toml", STUDY)

@@ -56,8 +56,7 @@ void Reduce(const SeedRun& run, Keep keep) {
   for (const auto& entry : fs::directory_iterator(run.path)) {
     const std::string name = entry.path().filename().string();
     const bool kept = name == RunFolder::kConfig || name == RunFolder::kPolicy ||
-                      name == RunFolder::kEvaluations || name == RunFolder::kLog ||
-                      name == RunFolder::kModel;
+                      name == RunFolder::kEvaluations || name == RunFolder::kLog;
     if (!kept) fs::remove(entry.path());
   }
 }

@@ -37,24 +37,6 @@ SMALL = {"agent": "d3qn-small", "hidden": 32, "head": 16, "steps": 4000, "eval_e
          "threads": 1, "out": "run", "envs": 8, "updates_per_step": 0.25}
 
 
-# A double pendulum as MJCF that a user might have written.
-MODEL = """<mujoco>
-  <option timestep="0.005" integrator="RK4"/>
-  <worldbody>
-    <body>
-      <joint name="a" type="hinge" axis="0 1 0" damping="0" armature="0.01"/>
-      <geom type="capsule" size="0.04" fromto="0 0 0 0 0 -0.5" mass="1" contype="0"/>
-      <body pos="0 0 -0.5">
-        <joint name="b" type="hinge" axis="0 1 0" damping="0" armature="0.01"/>
-        <geom type="capsule" size="0.04" fromto="0 0 0 0 0 -0.5" mass="1" contype="0"/>
-      </body>
-    </body>
-  </worldbody>
-  <actuator><motor joint="a" ctrllimited="true" ctrlrange="-5 5"/></actuator>
-</mujoco>
-"""
-
-
 def limits():
     """Limits memory and time, so that expensive work fails."""
     resource.setrlimit(resource.RLIMIT_CPU, (20, 20))

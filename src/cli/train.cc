@@ -63,7 +63,7 @@ int RunSeeds(const TrainArguments& arguments) {
 int PrintConfig(const TrainArguments& arguments) {
   const Config config = arguments.resume.empty() ? arguments.BuildSettings()
                                                  : ReadRunConfig(arguments.resume, arguments.flags);
-  WriteOutput("-", CompleteToml(config));
+  WriteOutput("-", ConfigToml(config, false));
   return 0;
 }
 
@@ -119,6 +119,7 @@ void AddTrain(CommandLine& line) {
             "(default runs/AGENT)");
   line.Removed("--task",
                "the task is the double pendulum, and upswing.train(env=...) in Python has others");
+  line.Removed("--model", kInsteadOfModel);
   line.Text("--config", arguments.config, "FILE",
             "TOML file of settings; -: standard input; flags override the file");
   AddPlant(line, arguments.plant);

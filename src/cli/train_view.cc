@@ -5,7 +5,6 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
-#include <optional>
 
 #include "agents/config_checks.h"
 #include "base/format.h"
@@ -16,7 +15,6 @@
 #include "cli/signals.h"
 #include "mujoco/engines.h"
 #include "os/file.h"
-#include "runs/model_info.h"
 #include "runs/run_folder.h"
 
 namespace upswing {
@@ -42,8 +40,6 @@ class TrainView : public TrainObserver {
         FormatCount(training_.policy()->num_parameters()),
         Counted(config.train.envs, "environment"), Counted(training_.threads(), "thread"));
     if (config.physics != kMuJoCo.name) Say("  physics {}\n", config.physics);
-    const std::optional<ModelInfo> model = InfoOfModel(config.mjcf, config.model);
-    if (model) Say("  model {}\n", model->Text());
     const TrainingSize size = SizeOf(config);
     constexpr double kGigabyte = 1e9;
     if (size.memory > kGigabyte) {

@@ -146,7 +146,6 @@ EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& tria
   report.policy = loaded.name;
   report.known_plant = trial.known_plant;
   report.env = TrialEnvironments(trial, &loaded);
-  report.model = InfoOfModel(report.env.mjcf, trial.model);
   report.env.num_envs = static_cast<int>(episodes);
   report.knows_values = loaded.policy->info().gamma.value_or(0) > 0;
   report.only_balances = OnlyBalances(loaded.policy->kind());
@@ -180,7 +179,6 @@ std::string EvalJson(const EvalReport& report) {
   j["physics"] = report.env.engine->name;
   j["task"] = kDoublePendulum;
   for (const auto& [name, value] : PlantValues(report.env.plant(0))) j["plant"][name] = value;
-  j["model"] = report.model ? report.model->Json() : kBuiltIn;
   j["unknown_plant"] = report.env.assumed_plant.has_value();
   if (report.known_plant) j["known_plant"] = NumDesigned(report);
   const TrialConditions conditions{report.env.disturbance(0), report.env.randomization};

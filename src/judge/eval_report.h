@@ -1,6 +1,5 @@
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -8,7 +7,6 @@
 #include "judge/trial.h"
 #include "pendulum/pendulum_env.h"
 #include "rl/evaluate.h"
-#include "runs/model_info.h"
 
 /// Evaluations of a policy over many episodes, and their reports.
 namespace upswing {
@@ -24,9 +22,8 @@ struct JudgedEpisode {
 
 /// A finished evaluation.
 struct EvalReport {
-  std::string policy;              // path
-  std::optional<ModelInfo> model;  // none: the built-in one
-  PendulumEnvConfig env;           // common settings of all episodes
+  std::string policy;     // path
+  PendulumEnvConfig env;  // common settings of all episodes
   std::vector<JudgedEpisode> episodes;
   Evaluation figures;
   bool known_plant = false;    // a controller was designed for the plant of each episode

@@ -73,7 +73,7 @@ Figure MapFigure(const MapResult& map) {
   // If nothing has to swing up, the times differ too little for colours to show.
   if (longest < 0.1) swing_up.high = 1;
   Figure figure;
-  figure.title = WithModel(map.policy, map.model);
+  figure.title = map.policy;
   figure.caption = CaptionOf(map);
   figure.width = 1100;
   figure.height = 530;
@@ -116,7 +116,6 @@ ordered_json JsonOf(const MapResult& map) {
   j["seed"] = map.config.env.seed;
   j["physics"] = map.config.env.engine->name;
   for (const auto& [name, value] : PlantValues(map.config.point.plant)) j["plant"][name] = value;
-  j["model"] = map.model ? map.model->Json() : kBuiltIn;
   j["unknown_plant"] = map.config.env.assumed_plant.has_value();
   j["changes"] = map.changes;
   j["x"] = axis(map.config.x);

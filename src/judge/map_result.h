@@ -1,13 +1,11 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "base/text.h"
 #include "judge/map_grid.h"
-#include "runs/model_info.h"
 
 namespace upswing {
 
@@ -15,7 +13,6 @@ namespace upswing {
 struct MapResult {
   MapConfig config;
   std::string policy, title;       // path; short title for a figure of several maps
-  std::optional<ModelInfo> model;  // none: the built-in one
   std::string changes;             // differences from the training, without the axes; empty: none
   std::string dot;                 // label of the training's point; empty: it is not on the map
   std::vector<MapCell> cells;      // (ny × nx)

@@ -6,7 +6,6 @@
 #include "base/error.h"
 #include "base/format.h"
 #include "base/text.h"
-#include "mujoco/engines.h"
 #include "os/file.h"
 
 namespace upswing {
@@ -84,7 +83,6 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
   MapConfig config;
   TrialArguments trial = a.trial;
   trial.set.clear();  // `set` changes config.point, not the environments
-  if (trial.physics.empty()) trial.physics = (loaded.mjcf.empty() ? kClosedForm : kMuJoCo).name;
   config.env = TrialEnvironments(trial, &loaded);
   config.point.plant = config.env.plants.front();
   config.point.disturbance = config.env.disturbance(0);
@@ -132,7 +130,6 @@ MapResult PlanMap(const MapArguments& a, const LoadedPolicy& loaded) {
   map.dot = DotOf(map.config, design, !map.changes.empty());
   map.policy = loaded.name;
   map.title = ShortTitle(loaded);
-  map.model = InfoOfModel(loaded.mjcf, "");
   return map;
 }
 

@@ -15,8 +15,7 @@ struct MapArguments {
   TrialArguments trial;  // its `set` may also name noise, delay and the start
   int64_t episodes = 0;  // per cell; 0: the usual number
 
-  /// No physics: the closed form, or MuJoCo for a policy that has its own model.
-  MapArguments() { trial.physics.clear(); }
+  MapArguments() { trial.physics = kClosedForm.name; }
 
   /// Declares the numeric settings in `options`: name, range, unit, help.
   void Describe(Options& options);

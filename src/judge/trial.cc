@@ -7,7 +7,6 @@
 #include "base/text.h"
 #include "mujoco/engines.h"
 #include "os/file.h"
-#include "runs/config_files.h"
 #include "runs/plant_file.h"
 #include "runs/run_folder.h"
 
@@ -50,13 +49,10 @@ TrialConditions ConditionsOf(const std::vector<FlagValue>& flags) {
 PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded) {
   if (loaded != nullptr) ExpectPendulum(*loaded);
   PendulumEnvConfig env;
-  env.engine = &FindEngine(a.physics, "--physics");
+  env.engine = &EngineCalled(a.physics);
   Plant plant = loaded != nullptr ? loaded->plant : Plant();
   std::vector<FlagValue> flags;
   if (!a.plant.empty()) {
-    if (!a.model.empty()) {
-      throw BadInput("--plant: expected no --model with it, which has its own plant");
-    }
     PlantFile file = ReadPlantFile(a.plant);
     plant = file.plant;
     flags = std::move(file.conditions);
@@ -70,12 +66,12 @@ PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy*
     throw BadInput("--unknown-plant: expected a policy with it, got none");
   }
   if (loaded != nullptr) {
-    env.mjcf = loaded->mjcf;
     env.memory = loaded->memory();
     if (loaded->identifies()) env.identified_from = loaded->plant;
     if (a.unknown_plant) env.assumed_plant = loaded->plant;
   }
-  env.plants = {ChangedPlant(plant, a.model, a.set, env.mjcf)};
+  ApplyChanges(OptionsOf(plant), a.set);
+  env.plants = {plant};
   env.seed = static_cast<uint64_t>(a.seed);
   env.stream = "evaluation";
   return env;

@@ -16,7 +16,7 @@ namespace upswing {
 
 /// Differences of a trial from the training.
 struct TrialArguments {
-  std::string model, physics = "mujoco";
+  std::string physics = "mujoco";
   std::string plant;  // name of a plant file or a shipped plant; empty: the policy's
   std::vector<std::string> set;
   std::vector<FlagValue> flags;  // settings of Disturbance and Randomization

@@ -16,7 +16,6 @@
 #include "mujoco/engines.h"
 #include "mujoco/model.h"
 #include "os/file.h"
-#include "pendulum/mjcf.h"
 #include "pendulum/pendulum_env.h"
 #include "pendulum/testing.h"
 
@@ -51,7 +50,7 @@ std::array<double, 4> StateOf(const ClosedFormBatch& batch, size_t i) {
 
 /// The state after one step of MuJoCo.
 std::array<double, 4> StepOfMuJoCo(const Plant& plant, const PendulumState& s, double tau) {
-  const ModelPtr model = CompileModel(Mjcf(plant), "test");
+  const ModelPtr model = CompileModel(plant);
   const DataPtr data(mj_makeData(model.get()));
   std::copy_n(std::array{s.q1, s.q2}.data(), 2, data->qpos);
   std::copy_n(std::array{s.w1, s.w2}.data(), 2, data->qvel);

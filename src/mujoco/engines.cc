@@ -9,7 +9,6 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "mujoco/model.h"
-#include "pendulum/mjcf.h"
 
 namespace upswing {
 namespace {
@@ -32,7 +31,6 @@ Plant Superset(const std::vector<Plant>& plants) {
 /// as a blow-up, too.
 class MuJoCoPhysics : public Physics {
  public:
-  /// Throws BadInput if the model does not compile or is not a double pendulum.
   explicit MuJoCoPhysics(const PhysicsConfig& config);
 
   PendulumState state(int env) const override;
@@ -62,7 +60,6 @@ class MuJoCoPhysics : public Physics {
   PhysicsConfig config_;
   int slice_size_;
   std::vector<Slice> slices_;
-  int substeps_ = 0;                    // physics steps per control period
   int state_size_ = 0;                  // numbers in a state row
   std::vector<double> previous_angle_;  // (N) of the motor's joint before the step, rad
 };
@@ -71,17 +68,12 @@ MuJoCoPhysics::MuJoCoPhysics(const PhysicsConfig& config)
     : config_(config),
       slice_size_(std::max(kSmallestSlice, (config.num_envs + kMostSlices - 1) / kMostSlices)) {
   // Compile the model with the common plant, or with the first of several.
-  const ModelPtr model = config_.mjcf.empty()
-                             ? CompileModel(Mjcf(Superset(config_.plants)), "model")
-                             : LoadModel(config_.mjcf, "model").model;
-  WritePlant(config_.plant(0), FieldsOf(*model, config_.mjcf.empty()));
-  // The built-in model has no springs, sensors and islands. Disabled, MuJoCo skips the search.
-  if (config_.mjcf.empty()) {
-    model->opt.disableflags |= mjDSBL_SPRING | mjDSBL_SENSOR | mjDSBL_ISLAND;
-  }
+  const ModelPtr model = CompileModel(Superset(config_.plants));
+  WritePlant(config_.plant(0), FieldsOf(*model));
+  // The model has no springs, sensors and islands. Disabled, MuJoCo skips the search.
+  model->opt.disableflags |= mjDSBL_SPRING | mjDSBL_SENSOR | mjDSBL_ISLAND;
   const DataPtr data(mj_makeData(model.get()));
   mj_setConst(model.get(), data.get());
-  substeps_ = static_cast<int>(std::round(kControlPeriod / model->opt.timestep));
 
   for (int first = 0; first < config_.num_envs; first += slice_size_) {
     slices_.push_back(MakeSlice(*model, first, std::min(slice_size_, config_.num_envs - first)));
@@ -99,7 +91,7 @@ MuJoCoPhysics::Slice MuJoCoPhysics::MakeSlice(const mjModel& model, int first, i
   if (batch == nullptr) throw Failure(Concat("MuJoCo: ", message.data()));
   if (config_.plants.size() > 1) {
     for (int i = 0; i < count; ++i) {
-      WritePlant(config_.plant(first + i), FieldsOf(batch.get(), i, config_.mjcf.empty()));
+      WritePlant(config_.plant(first + i), FieldsOf(batch.get(), i));
     }
     mjb_setConst(batch.get(), nullptr, 0);
   }
@@ -133,7 +125,7 @@ void MuJoCoPhysics::SetPlant(int env, const Plant& plant) {
   config_.plants[static_cast<size_t>(env)] = plant;
   const Slice& slice = SliceOf(env);
   const int row = env - slice.first;
-  WritePlant(plant, FieldsOf(slice.batch.get(), row, config_.mjcf.empty()));
+  WritePlant(plant, FieldsOf(slice.batch.get(), row));
   mjb_setConst(slice.batch.get(), &row, 1);
 }
 
@@ -188,7 +180,7 @@ void MuJoCoPhysics::StepSlice(const Slice& slice, std::span<const double> torque
     previous_angle_[static_cast<size_t>(env)] = MotorAngle(config_.plant(env), state(env));
     Component(slice.ctrl, env)[0] = torque[static_cast<size_t>(env)];
   }
-  mjb_step(slice.batch.get(), nullptr, 0, substeps_, mjSTAGE_NONE);
+  mjb_step(slice.batch.get(), nullptr, 0, kPhysicsSteps, mjSTAGE_NONE);
   for (int env = slice.first; env < end; ++env) {
     const auto i = static_cast<size_t>(env);
     result.terminated[i] = BlewUp(env) ? 1 : 0;
@@ -208,10 +200,5 @@ void MuJoCoPhysics::State(const Archive& archive) {
 const Engine kMuJoCo{kMuJoCoName, [](const PhysicsConfig& config) -> std::unique_ptr<Physics> {
                        return std::make_unique<MuJoCoPhysics>(config);
                      }};
-
-Engines AllEngines() {
-  static constexpr const Engine* kEngines[] = {&kMuJoCo, &kClosedForm};
-  return kEngines;
-}
 
 }  // namespace upswing

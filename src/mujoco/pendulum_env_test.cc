@@ -12,7 +12,6 @@
 #include "base/testing.h"
 #include "base/text.h"
 #include "mujoco/testing.h"
-#include "pendulum/mjcf.h"
 
 namespace upswing {
 namespace {
@@ -392,20 +391,6 @@ TEST_P(PendulumEnvs, MirroredStatesAndTorquesGiveTheMirroredMotion) {
       ASSERT_NEAR(result.next_obs[j], signs[j] * result.next_obs[kObservationSize + j], 1e-6);
     }
   }
-}
-
-TEST(PendulumEnv, TheClosedFormTakesNoOtherModel) {
-  PendulumEnvConfig config;
-  config.engine = &kClosedForm;
-  config.mjcf = Mjcf(Plant());
-  EXPECT_THROW(PendulumEnv{config}, Error);
-}
-
-TEST(PendulumEnv, RefusesATimestepThatDoesNotDivideTheControlPeriod) {
-  PendulumEnvConfig config;
-  config.mjcf = Mjcf(Plant());
-  config.mjcf.replace(config.mjcf.find("0.005"), 5, "0.003");
-  EXPECT_THROW(PendulumEnv{config}, Error);
 }
 
 }  // namespace

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "base/error.h"
-#include "base/text.h"
 #include "pendulum/closed_form.h"
 
 namespace upswing {
@@ -55,26 +54,12 @@ class ClosedFormPhysics : public Physics {
 
 }  // namespace
 
-const Engine kClosedForm{
-    "closed-form", [](const PhysicsConfig& config) -> std::unique_ptr<Physics> {
-      if (!config.mjcf.empty()) {
-        throw BadInput(
-            "physics = closed-form: expected the built-in model, got another MJCF model, which "
-            "needs physics = mujoco");
-      }
-      return std::make_unique<ClosedFormPhysics>(config);
-    }};
+const Engine kClosedForm{"closed-form",
+                         [](const PhysicsConfig& config) -> std::unique_ptr<Physics> {
+                           return std::make_unique<ClosedFormPhysics>(config);
+                         }};
 
 std::vector<std::string> EngineNames() { return {kMuJoCoName, kClosedForm.name}; }
-
-const Engine& FindEngine(Engines engines, std::string_view name, const std::string& where) {
-  std::vector<std::string> names;
-  for (const Engine* engine : engines) {
-    if (name == engine->name) return *engine;
-    names.emplace_back(engine->name);
-  }
-  throw BadInput(Concat(where, ": expected one of ", Join(names, ", "), ", got \"", name, "\""));
-}
 
 void Physics::Push(int /*env*/, const std::array<double, 2>& /*torque*/) {
   throw Failure("physics: expected mujoco, the only engine with pushes, got another");

@@ -4,7 +4,6 @@
 #include <memory>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "base/archive.h"
@@ -20,27 +19,17 @@ struct PhysicsConfig;
 /// An implementation of the physics; each is a constant.
 struct Engine {
   const char* name;
-  /// Throws BadInput if the model does not compile, is not a double pendulum, or is not supported
-  /// by this engine.
   std::unique_ptr<Physics> (*make)(const PhysicsConfig& config);
 };
 
 /// The name of the MuJoCo engine, which the folder mujoco/ provides.
 inline constexpr const char* kMuJoCoName = "mujoco";
 
-/// The closed form. It has only the built-in model, is many times faster than MuJoCo, and agrees
-/// with it to 12 digits per step.
+/// The closed form. It is many times faster than MuJoCo, and agrees with it to 12 digits per step.
 extern const Engine kClosedForm;
 
-/// The engines that a program includes.
-using Engines = std::span<const Engine* const>;
-
-/// The names of all engines, even of engines that a program does not include, the default first:
-/// "mujoco", "closed-form".
+/// The names of both engines, the default first: "mujoco", "closed-form".
 std::vector<std::string> EngineNames();
-
-/// The engine with this name. Throws BadInput with a message that begins with `where`.
-const Engine& FindEngine(Engines engines, std::string_view name, const std::string& where);
 
 /// Settings of the physics.
 struct PhysicsConfig {
@@ -48,7 +37,6 @@ struct PhysicsConfig {
   std::vector<Plant> plants = std::vector<Plant>(1);  // one for all environments, or one for each
   int num_envs = 1;
   RewardConfig reward;
-  std::string mjcf;            // replaces the built-in model if not empty; see LoadModel
   ThreadPool* pool = nullptr;  // runs the work in parallel; results have the same bits
 
   const Plant& plant(int env) const {

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/text.h"
+
 namespace upswing {
 
 namespace {
@@ -55,6 +57,7 @@ void Plant::Describe(Options& o) {
     option.implied = k >= kMainParameters;
     if (value == &Plant::actuated_joint) option.step = 1;
   }
+  o.Explain("model", Concat("expected no setting model, which was removed; ", kInsteadOfModel));
   o.Alias("mass", {"mass1", "mass2"});
   o.Alias("length", {"length1", "length2"});
   o.Alias("damping", {"damping1", "damping2"});

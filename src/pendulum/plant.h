@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -21,6 +22,11 @@ static_assert(kPhysicsSteps * kPhysicsTimestep == kControlPeriod);
 inline constexpr double kArmature = 0.01;       // of both joints, kg·m²
 inline constexpr double kCapsuleRadius = 0.04;  // of both links, m
 inline constexpr double kFrictionSlope = 100;   // of the dry friction's arctangent, s/rad
+
+/// Replacement of the setting `model` of version 0.5.0 (an MJCF file), for messages.
+inline constexpr std::string_view kInsteadOfModel =
+    "set the plant's numbers, such as --mass1 or --plant FILE, or train on a Gymnasium environment "
+    "of your MJCF file in Python (docs/howto/gymnasium.md)";
 
 /// The parameters that can be set at run time. By default the links are solid capsules of a fixed
 /// radius, whose inertia and centre of mass follow from mass and length.

@@ -9,7 +9,6 @@
 #include "base/format.h"
 #include "base/text.h"
 #include "runs/compare_runs.h"
-#include "runs/model_info.h"
 
 namespace upswing {
 namespace {
@@ -18,11 +17,10 @@ constexpr size_t kLongText = 48;  // longer differences are not shown
 
 /// The label of a run's group.
 std::string LabelOf(const RunRecord& run) {
-  return Concat(run.variant.empty() ? run.config.agent : run.variant,
-                run.config.mjcf.empty() ? "" : ", other model");
+  return run.variant.empty() ? run.config.agent : run.variant;
 }
 
-/// Whether a setting belongs to the task that a policy is evaluated on: model, plant, disturbance,
+/// Whether a setting belongs to the task that a policy is evaluated on: plant, disturbance,
 /// randomisation, and how many episodes have to succeed. Settings of the training, and of when and
 /// in which engine it evaluates, do not belong to it.
 bool IsTask(const Option& option) {
@@ -207,24 +205,12 @@ Comparison GroupRuns(const CompareRequest& request) {
   for (RunGroup& group : groups) {
     std::ranges::sort(group.runs, {}, [](const RunRecord& run) { return run.config.train.seed; });
   }
-  // Of each group: its settings, with the content of its model in place of the path.
-  std::vector<Config> configs;
-  for (const RunGroup& group : groups) {
-    configs.push_back(group.runs.front().config);
-    configs.back().model = ModelContent(configs.back().mjcf);
-  }
   std::vector<Options> settings;
-  for (Config& config : configs) settings.push_back(OptionsOf(config));
+  for (const RunGroup& group : groups) settings.push_back(OptionsOf(group.runs.front().config));
   TellGroupsApart(groups, settings);
   TellTasksApart(comparison, settings);
   comparison.notes = found.notes;
   NotePlans(groups, comparison.notes);
-  for (const RunGroup& group : groups) {
-    const std::string& mjcf = group.runs.front().config.mjcf;
-    if (mjcf.empty()) continue;
-    comparison.notes.push_back(Concat(group.label, ": uses an MJCF model, not the built-in one ",
-                                      "(content ", ModelContent(mjcf), ")"));
-  }
   NoteTimes(found.runs, comparison.notes);
   NoteTasks(comparison, request.different_tasks);
   for (const std::string& line : found.left_out) comparison.notes.push_back(line + ": left out");

@@ -1,13 +1,10 @@
 #include "runs/config_files.h"
 
 #include <algorithm>
-#include <utility>
 
 #include "base/checksum.h"
 #include "base/error.h"
 #include "base/text.h"
-#include "mujoco/mjcf_check.h"
-#include "mujoco/model.h"
 #include "nn/network_policy.h"
 #include "os/file.h"
 #include "os/streams.h"
@@ -19,22 +16,6 @@ namespace upswing {
 namespace {
 
 namespace fs = std::filesystem;
-
-ModelFile ReadModel(const std::string& path) {
-  ModelFile model{path, ReadOwnFile(path, kMostMjcfBytes), {}};
-  model.plant = LoadModel(model.mjcf, path).plant;
-  return model;
-}
-
-/// Runs ParseConfig on a file in the folder of a run or a study. The model is in the same folder.
-Config ParseInFolder(const fs::path& file, const std::string& text,
-                     const std::vector<FlagValue>& flags) {
-  return ParseConfig(text, file.string(), flags, [&](const std::string& path, bool /*in_file*/) {
-    if (path == RunFolder::kModel) return ReadModel((file.parent_path() / path).string());
-    throw BadInput(Concat(file.string(), ": model: expected ", RunFolder::kModel,
-                          " in the same folder, got \"", Printable(path), "\""));
-  });
-}
 
 /// The path in a setting PATH or PATH#CHECKSUM.
 std::string PathOfStart(const std::string& setting) {
@@ -65,10 +46,7 @@ std::shared_ptr<const Policy> StartPolicy(Config& config) {
 Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
   const std::string text = file.empty() ? "" : ReadInput(file.string());
   const std::string where = file.empty() ? "" : InputName(file.string());
-  Config config =
-      ParseConfig(text, where, WithPlantFile(flags), [&](const std::string& path, bool in_file) {
-        return ReadModel(in_file ? (file.parent_path() / path).string() : path);
-      });
+  Config config = ParseConfig(text, where, WithPlantFile(flags));
   (void)StartPolicy(config);  // adds the checksum
   return config;
 }
@@ -77,7 +55,7 @@ Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
   const fs::path file = run / RunFolder::kConfig;
   const std::string text = ReadOwnFile(file);
   std::vector<std::string> missing = MissingSettings(text, file.string(), false);
-  if (missing.empty()) return ParseInFolder(file, text, flags);
+  if (missing.empty()) return ParseConfig(text, file.string(), flags);
   constexpr size_t kMostNames = 6;  // more names make the line unreadable
   const size_t more = missing.size() - std::min(missing.size(), kMostNames);
   missing.resize(missing.size() - more);
@@ -86,45 +64,22 @@ Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
                         "; another version wrote the file"));
 }
 
-Config ReadSettings(const fs::path& file) { return ParseInFolder(file, ReadOwnFile(file), {}); }
-
-void NameModelCopy(Config& config) {
-  if (!config.mjcf.empty()) config.model = RunFolder::kModel;
+Config ReadSettings(const fs::path& file) {
+  return ParseConfig(ReadOwnFile(file), file.string(), {});
 }
 
 void MakeReadyForMany(Config& config) {
   if (config.train.threads == 0) config.train.threads = 1;
-  NameModelCopy(config);
-}
-
-std::string CompleteToml(Config config) {
-  if (!config.model.empty()) config.model = fs::absolute(config.model).string();
-  return ConfigToml(config, false);
 }
 
 std::string SettingsMark(const Config& config) {
-  Config own = config;
-  own.model.clear();  // the model's content counts, not its path
   Checksum sum;
-  const Options options = OptionsOf(own);
+  const Options options = OptionsOf(config);
   for (const Option& option : options.all()) {
     if (option.decides != Option::Decides::kTraining) continue;
     sum.Update(BytesOf(Concat(option.section, ".", option.name, "=", option.text(), "\n")));
   }
-  sum.Update(BytesOf(own.mjcf));
   return sum.Hex();
-}
-
-Plant ChangedPlant(const Plant& base, const std::string& model, const std::vector<std::string>& set,
-                   std::string& mjcf) {
-  Plant plant = base;
-  if (!model.empty()) {
-    ModelFile file = ReadModel(model);
-    plant = file.plant;
-    mjcf = std::move(file.mjcf);
-  }
-  ApplyChanges(OptionsOf(plant), set);
-  return plant;
 }
 
 std::optional<std::string> TrainCommand(const PolicyInfo& info, const std::string& where) {

@@ -9,7 +9,7 @@
 #include "agents/config.h"
 #include "base/policy_info.h"
 
-/// Training settings and models in files.
+/// Training settings in files.
 namespace upswing {
 
 /// Runs ParseConfig on a configuration file: an empty path means no file, `-` means standard input.
@@ -26,29 +26,15 @@ std::shared_ptr<const Policy> StartPolicy(Config& config);
 /// value it used.
 Config ReadRunConfig(const std::filesystem::path& run, const std::vector<FlagValue>& flags = {});
 
-/// Reads the settings of a variant from a regular file in a study's folder. A model is the copy in
-/// the same folder. Throws BadInput.
+/// Reads the settings of a variant from a regular file in a study's folder. Throws BadInput.
 Config ReadSettings(const std::filesystem::path& file);
 
-/// Changes the model's path to the name of its copy in the run's folder, which stays valid when the
-/// folder moves.
-void NameModelCopy(Config& config);
-
-/// Adapts the settings for one of many runs: one thread unless the user set a number, and the
-/// model's copy next to the run.
+/// Adapts the settings for one of many runs: one thread unless the user set a number.
 void MakeReadyForMany(Config& config);
-
-/// ConfigToml with comments, for a file in any place: the model's path is absolute.
-std::string CompleteToml(Config config);
 
 /// Checksum that identifies the settings of a training. It ignores seed, steps and whether the
 /// training stops when solved.
 std::string SettingsMark(const Config& config);
-
-/// The plant for a trial: `base`, or the plant of the model file if there is one, with the changes
-/// in `set` ("mass2=1.2"). Writes the model's text to `mjcf`. Throws BadInput.
-Plant ChangedPlant(const Plant& base, const std::string& model, const std::vector<std::string>& set,
-                   std::string& mjcf);
 
 /// The shell command that trains a policy like this: its agent, its seed, and a flag per setting
 /// that differs from the named agent's.

@@ -8,7 +8,6 @@
 #include "base/error.h"
 #include "base/format.h"
 #include "base/text.h"
-#include "mujoco/model.h"
 #include "os/command.h"
 #include "runs/plant_file.h"
 #include "runs/run_folder.h"
@@ -27,16 +26,13 @@ std::string SectionOf(const FlagValue& flag) {
 
 /// Loads the policy for --swing-up. Throws BadInput that names the flag.
 LoadedPolicy SwingUpNamed(const std::string& name) {
-  LoadedPolicy loaded;
   try {
-    loaded = LoadPolicy(name);
+    LoadedPolicy loaded = LoadPolicy(name);
     ExpectPendulum(loaded);
+    return loaded;
   } catch (const Error& error) {
     throw Error(error.exit_code(), Concat("--swing-up: ", error.what()));
   }
-  if (loaded.mjcf.empty()) return loaded;
-  throw BadInput(Concat("--swing-up: expected a policy of the built-in model, got ", name,
-                        ", which was trained on another model"));
 }
 
 /// Applies --made-for: a plant file, if there is one, then the changes. Returns the plant
@@ -149,7 +145,6 @@ LoadedPolicy GetPolicy(const PolicyArguments& a) {
             design_for(config.plant),
             kDoublePendulum,
             config.plant,
-            "",
             design_for};
   }
   return LoadPolicy(a.name);
@@ -183,14 +178,6 @@ LoadedPolicy LoadPolicy(const fs::path& path) {
                           DidYouMean(path.string(), names)));
   }
   return ReadPolicy(LoadTensors(file, kMostPolicyBytes));
-}
-
-LoadedPolicy ReadPolicy(const Tensors& file) {
-  LoadedPolicy loaded = PolicyIn(file);
-  if (!loaded.mjcf.empty()) {
-    LoadModel(loaded.mjcf, Concat(file.where(), ": metadata \"model\""));
-  }
-  return loaded;
 }
 
 std::string ShortTitle(const LoadedPolicy& loaded) {

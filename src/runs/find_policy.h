@@ -39,12 +39,9 @@ LoadedPolicy GetPolicy(const PolicyArguments& a);
 std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
                                       const PolicyArguments& controllers);
 
-/// Loads a policy file, the best policy of a run folder, or a shipped policy. Throws as PolicyIn
-/// does. Also throws BadInput if its model is invalid.
+/// Loads a policy file, the best policy of a run folder, or a shipped policy. Throws as
+/// ReadPolicy does.
 LoadedPolicy LoadPolicy(const std::filesystem::path& path);
-
-/// Makes the policy of a file that has been read. Throws as LoadPolicy does.
-LoadedPolicy ReadPolicy(const Tensors& file);
 
 /// Short title of a policy for pictures: the folder of a run, or a file without its extension. A
 /// long title keeps only its end.

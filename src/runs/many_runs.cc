@@ -39,15 +39,12 @@ std::string LastLine(const fs::path& path) {
 /// Throws BadInput if `what`, made with the settings `before`, cannot be resumed with the settings
 /// `now`.
 void CheckSame(Config before, const Config& now, bool more_steps, const std::string& what) {
-  if (!before.mjcf.empty()) before.model = now.model;
   if (more_steps) before.train.steps = std::max(before.train.steps, now.train.steps);
   const auto counts = [](const Option& option) {
     return option.decides == Option::Decides::kTraining || option.decides == Option::Decides::kEnd;
   };
   try {
     ExpectSameSettings(before, now, what, counts);
-    if (before.mjcf != now.mjcf)
-      throw BadInput(Concat(what, ": expected the same MJCF model as before, got another"));
   } catch (const Error& other) {
     throw BadInput(Concat(other.what(), "; choose another --out"));
   }

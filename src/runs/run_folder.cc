@@ -56,15 +56,13 @@ fs::path FreePlace(const fs::path& path) {
 
 }  // namespace
 
-void RunFolder::Create(const fs::path& given,
-                       const std::vector<std::pair<std::string, std::string>>& files,
-                       Tensors& checkpoint) {
+void RunFolder::Create(const fs::path& given, const std::string& config, Tensors& checkpoint) {
   const fs::path path = WithoutSlash(given);
   const fs::path place = FreePlace(path);
   try {
     if (place.has_parent_path()) MakeFolder(place.parent_path());
     Making folder(place, Making::Kind::kFolder);
-    for (const auto& [name, text] : files) WriteFileAtomically(folder.path() / name, text);
+    WriteFileAtomically(folder.path() / kConfig, config);
     for (const char* size : kSizes) checkpoint.AddScalar(size, int64_t{0});
     SaveTensors(checkpoint, CheckpointPath(folder.path()));
     folder.Publish();

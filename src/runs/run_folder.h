@@ -36,7 +36,6 @@ Row EvaluationCells(const TrainState& s, const Evaluation& e);
 ///   checkpoint.safetensors  the whole state of the training
 ///   policy.safetensors      the best policy at evaluation
 ///   log.txt                 events with date and time
-///   model.xml               the MJCF of a model that is not built in
 /// The checkpoint contains the sizes of the tables. Opening a run cuts the tables to these sizes,
 /// so that rows written after the checkpoint do not appear twice.
 class RunFolder {
@@ -49,16 +48,14 @@ class RunFolder {
   static constexpr const char* kCheckpoint = "checkpoint.safetensors";
   static constexpr const char* kPolicy = "policy.safetensors";
   static constexpr const char* kLog = "log.txt";
-  static constexpr const char* kModel = "model.xml";  // only for a model that is not built in
 
-  /// Makes the folder with these files (name, text) and the first checkpoint. Adds the tables'
-  /// sizes to the checkpoint, so that the folder can be opened with it.
+  /// Makes the folder with the text of config.toml and the first checkpoint. Adds the tables' sizes
+  /// to the checkpoint, so that the folder can be opened with it.
   ///
   /// Makes missing parent folders, as mkdir -p does. The folder appears under its name complete or
   /// not at all (see Making). Throws BadInput if something is already there. Otherwise throws as
   /// PathError does.
-  static void Create(const std::filesystem::path& path,
-                     const std::vector<std::pair<std::string, std::string>>& files,
+  static void Create(const std::filesystem::path& path, const std::string& config,
                      Tensors& checkpoint);
 
   /// Opens a run after its checkpoint has been loaded. The caller holds the run's FolderLock.

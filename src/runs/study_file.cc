@@ -1,7 +1,6 @@
 #include <toml++/toml.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <map>
 
 #include "agents/toml_settings.h"
@@ -14,10 +13,7 @@
 namespace upswing {
 namespace {
 
-namespace fs = std::filesystem;
-
-/// Reads and checks the settings of one table of the study. Makes a model's path relative to the
-/// study's folder.
+/// Reads and checks the settings of one table of the study.
 std::vector<FlagValue> ReadSettings(const toml::node& node, const std::string& name,
                                     const std::string& where) {
   const auto* table = node.as_table();
@@ -25,14 +21,11 @@ std::vector<FlagValue> ReadSettings(const toml::node& node, const std::string& n
   if (table == nullptr) throw BadInput(Concat(place, ": ", name, ": expected a table of settings"));
   Config scratch;  // checks the values by taking them
   std::vector<FlagValue> settings = ApplyTable(EverySetting(scratch), *table, where, true);
-  for (FlagValue& setting : settings) {
+  for (const FlagValue& setting : settings) {
     if (setting.name == "seed") {
       throw BadInput(Concat(setting.where,
                             ": expected no seed in the settings; a line seeds = … at the ",
                             "beginning of the file sets the seeds"));
-    }
-    if (setting.name == "model" && !setting.text.empty()) {
-      setting.text = (fs::path(where).parent_path() / setting.text).string();
     }
   }
   return settings;
@@ -75,8 +68,7 @@ std::vector<Variant> ReadVariants(const toml::table& study, const std::string& w
     Variant variant{name, BuildVariant(name, settings, PlaceOf(node, where), where)};
     MakeReadyForMany(variant.config);
     const uint32_t line = node.source().begin.line;
-    const auto [same, is_new] = known.try_emplace(
-        Concat(ConfigToml(variant.config, true), variant.config.mjcf), line, name);
+    const auto [same, is_new] = known.try_emplace(ConfigToml(variant.config, true), line, name);
     if (!is_new) {
       throw BadInput(Concat(PlaceOf(node, where), ": variant \"", name,
                             "\": expected settings of its own, got those of \"",

@@ -106,7 +106,6 @@ void WritePlan(const StudyPlan& plan) {
   for (const Variant& variant : plan.variants) {
     const fs::path folder = plan.folder / variant.name;
     MakeFolder(folder);
-    if (!variant.config.mjcf.empty()) WriteIfOther(folder / RunFolder::kModel, variant.config.mjcf);
     const auto wanted = [](const Option& option) {
       return option.decides != Option::Decides::kSeed;
     };

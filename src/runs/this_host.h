@@ -8,10 +8,10 @@
 
 namespace upswing {
 
-/// This computer with all engines of the program and `threads` threads. `make_foreign` makes the
+/// This computer with both engines and `threads` threads. `make_foreign` makes the
 /// environments of a foreign task.
 inline Host ThisHost(int threads, ForeignMaker make_foreign = {}) {
-  return {AllEngines(), AvailableMemory(), threads, std::move(make_foreign)};
+  return {&kMuJoCo, AvailableMemory(), threads, std::move(make_foreign)};
 }
 
 }  // namespace upswing

@@ -46,18 +46,13 @@ TrainingRun::TrainingRun(fs::path path, const Config& config, ForeignMaker make_
 
 std::unique_ptr<TrainingRun> TrainingRun::Make(const fs::path& out, Config config,
                                                ForeignMaker make_foreign) {
-  NameModelCopy(config);
   const std::shared_ptr<const Policy> start = StartPolicy(config);
   const fs::path usual = Concat("runs/", config.agent, "-seed", config.train.seed);
   const fs::path path = out.empty() ? FreePath(usual) : out;
   std::unique_ptr<TrainingRun> run(new TrainingRun(path, config, std::move(make_foreign)));
   if (start) run->training_.StartFrom(*start, Concat("--from ", config.start_policy));
-  const Config& made = run->training_.config();
-  std::vector<std::pair<std::string, std::string>> files{
-      {RunFolder::kConfig, ConfigToml(made, false)}};
-  if (!made.mjcf.empty()) files.emplace_back(RunFolder::kModel, made.mjcf);
   Tensors checkpoint = run->training_.Checkpoint();
-  RunFolder::Create(path, files, checkpoint);
+  RunFolder::Create(path, ConfigToml(run->training_.config(), false), checkpoint);
   run->lock_.emplace(path);
   run->folder_.emplace(path, checkpoint);
   return run;
@@ -71,9 +66,8 @@ std::unique_ptr<TrainingRun> TrainingRun::Resume(const fs::path& path,
         Concat("--resume ", path.string(), ": expected a run folder with a config.toml"));
   }
   FolderLock lock(path);  // taken before the run is read
-  Config config = ReadRunConfig(path, flags);
-  NameModelCopy(config);
-  std::unique_ptr<TrainingRun> run(new TrainingRun(path, config, std::move(make_foreign)));
+  std::unique_ptr<TrainingRun> run(
+      new TrainingRun(path, ReadRunConfig(path, flags), std::move(make_foreign)));
   run->lock_.emplace(std::move(lock));
   Training& training = run->training_;
   const Tensors checkpoint = LoadTensors(RunFolder::CheckpointPath(path));

@@ -25,20 +25,20 @@ test('long text is cut, between characters', () => {
 
 test.each([
   './upswing train --agent d3qn --seed 1',
-  "./upswing train --agent 'two words' --model 'x; touch y; $(id)'",
+  "./upswing train --agent 'two words' --start-policy 'x; touch y; $(id)'",
   "./upswing train --out 'it'\\''s'",
 ])('%s may be pasted', (text) => {
   expect(isCommand(text)).toBe(true);
 });
 
 test.each([
-  './upswing train --model x; touch y',
-  './upswing train --model $(id)',
-  './upswing train --model `id`',
-  './upswing train --model a\ntouch y',
-  "./upswing train --model 'a\ntouch y'",
-  "./upswing train --model 'open",
-  './upswing train --model a&b',
+  './upswing train --start-policy x; touch y',
+  './upswing train --start-policy $(id)',
+  './upswing train --start-policy `id`',
+  './upswing train --start-policy a\ntouch y',
+  "./upswing train --start-policy 'a\ntouch y'",
+  "./upswing train --start-policy 'open",
+  './upswing train --start-policy a&b',
   './upswing train > file',
   'rm -rf x',
   `./upswing train ${'x'.repeat(3000)}`,

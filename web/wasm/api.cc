@@ -156,11 +156,8 @@ UPSWING_EXPORT(bytes_size) size_t BytesSize() { return bytes.size(); }
 UPSWING_EXPORT(policy_open) Controller* PolicyOpen(const std::byte* file, size_t size) {
   return Guarded([&]() -> Controller* {
     const Tensors tensors = ReadSafetensors({file, file + size}, "the file");
-    auto controller = std::make_unique<Controller>(PolicyIn(tensors));
+    auto controller = std::make_unique<Controller>(ReadPolicy(tensors));
     ExpectPendulum(controller->loaded);
-    if (!controller->loaded.mjcf.empty()) {
-      throw BadInput("expected a policy of the built-in model, got one of another MJCF model");
-    }
     if (controller->loaded.plant.actuated_joint != 1) {
       throw BadInput(
           "expected a policy for a motor at joint 1, as in the page, got one for joint 2");

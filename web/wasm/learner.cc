@@ -22,8 +22,7 @@ Config InClosedForm(std::vector<FlagValue> flags) {
 }
 
 Host ThisPage() {
-  static constexpr const Engine* kEngines[] = {&kClosedForm};
-  return {kEngines, static_cast<int64_t>(kMemoryLimit - kPage * __builtin_wasm_memory_size(0))};
+  return {nullptr, static_cast<int64_t>(kMemoryLimit - kPage * __builtin_wasm_memory_size(0))};
 }
 
 std::vector<std::byte> FileOf(const Policy& policy) {
@@ -33,11 +32,7 @@ std::vector<std::byte> FileOf(const Policy& policy) {
 
 }  // namespace
 
-Config ConfigOf(const std::vector<FlagValue>& flags) {
-  return ParseConfig("", "", flags, [](const std::string& path, bool /*in_file*/) -> ModelFile {
-    throw BadInput(Concat("model: expected none in the page, got ", path));
-  });
-}
+Config ConfigOf(const std::vector<FlagValue>& flags) { return ParseConfig("", "", flags); }
 
 Learner::Learner(const std::vector<FlagValue>& flags) : training_(InClosedForm(flags), ThisPage()) {
   training_.AddObserver(*this);
