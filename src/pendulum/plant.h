@@ -25,8 +25,8 @@ inline constexpr double kFrictionSlope = 100;   // of the dry friction's arctang
 
 /// Replacement of the setting `model` of version 0.5.0 (an MJCF file), for messages.
 inline constexpr std::string_view kInsteadOfModel =
-    "set the plant's numbers, such as --mass1 or --plant FILE, or train on a Gymnasium environment "
-    "of your MJCF file in Python (docs/howto/gymnasium.md)";
+    "set the plant's numbers, such as mass1 and length1 (--plant FILE), or train on a Gymnasium "
+    "environment of your MJCF file in Python (docs/howto/gymnasium.md)";
 
 /// The parameters that can be set at run time. By default the links are solid capsules of a fixed
 /// radius, whose inertia and centre of mass follow from mass and length.

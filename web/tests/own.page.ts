@@ -207,8 +207,8 @@ test('strings of the list of agents are shown as text of bounded length', async 
   const evil = `<img src=x onerror="globalThis.ran=1">\u202e\n${'W'.repeat(100)}`;
   const entry = { id: 'd3qn', file: 'd3qn.safetensors', agent: evil };
   const agents = [
-    { ...entry, command: './upswing train --model x; touch y; $(id)', curve: { step: 'x' } },
-    { ...entry, id: 'quoted', command: "./upswing train --model 'x; touch y; $(id)'" },
+    { ...entry, command: './upswing train --start-policy x; touch y; $(id)', curve: { step: 'x' } },
+    { ...entry, id: 'quoted', command: "./upswing train --start-policy 'x; touch y; $(id)'" },
     null,
     { id: 7 },
     { ...entry, id: 'own' },
@@ -222,7 +222,7 @@ test('strings of the list of agents are shown as text of bounded length', async 
   expect(title).not.toMatch(/[\n\u202e]/);
   await page.locator('#agent').selectOption('quoted');
   await expect(page.locator('#agent-command')).toHaveText(
-    "./upswing train --model 'x; touch y; $(id)'",
+    "./upswing train --start-policy 'x; touch y; $(id)'",
   );
   expect(await page.locator('img:not(h1 > img)').count()).toBe(0);
 });
