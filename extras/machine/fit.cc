@@ -62,11 +62,11 @@ struct Value {
   Range range = {};
 };
 
-/// A window with its free start state.
+/// A window, and the start state of its cubic (rad, rad/s).
 struct Shot {
   LogWindow window;
-  Vector4d x, cubic;  // start state now, and the cubic's (rad, rad/s)
-  int session;        // index
+  Vector4d cubic;
+  int session;  // index
 };
 
 /// A window's part of the normal equations of the constants, without its start state.
@@ -114,8 +114,8 @@ class Problem {
     SetPrior(first);
     for (const LogWindow& w :
          CutWindows(logs, config.windows, first.plant.length1, first.plant.length2)) {
-      const Vector4d x(w.start.q1, w.start.q2, w.start.w1, w.start.w2);
-      shots_.push_back({w, x, x, session_of_[w.log]});
+      starts_.emplace_back(w.start.q1, w.start.q2, w.start.w1, w.start.w2);
+      shots_.push_back({w, starts_.back(), session_of_[w.log]});
     }
   }
 
@@ -128,9 +128,7 @@ class Problem {
     SetScales(shares);
     const std::vector<MatrixXd> slopes = Slopes();
     const std::vector<Block> blocks = BlocksOf(shares);
-    double before = PriorCost(theta_);
-    for (int w = 0; w < windows(); ++w)
-      before += Cost(shares[w]) + StartCost(shots_[w], shots_[w].x);
+    const double before = CostOf(shares, theta_, starts_);
     for (; damping_ < 1e6; damping_ *= 8) {
       std::vector<Reduced> sums(sessions_.size(), {ConstantsMatrix::Zero(), Constants::Zero()});
       for (int w = 0; w < windows(); ++w) {
@@ -159,13 +157,13 @@ class Problem {
       std::vector<Vector4d> starts;
       for (int w = 0; w < windows(); ++w) {
         const Constants change = slopes[shots_[w].session] * (theta - theta_);
-        starts.push_back(shots_[w].x -
+        starts.push_back(starts_[w] -
                          blocks[w].Inverse(damping_) * (blocks[w].gx + blocks[w].Hxc * change));
       }
-      const double after = CostAt(theta, starts);
+      const double after = CostOf(SharesAt(theta, starts, false), theta, starts);
       if (!(after < before)) continue;
       theta_ = theta;
-      for (int w = 0; w < windows(); ++w) shots_[w].x = starts[w];
+      starts_ = starts;
       damping_ = std::max(damping_ / 5, 1e-7);
       return before - after > tolerance * std::abs(before);
     }
@@ -322,43 +320,25 @@ class Problem {
     return slopes;
   }
 
-  /// Calls `f(window, twin, drive)` for all windows at θ, in parallel.
-  template <typename F>
-  void ForEachWindow(const VectorXd& theta, const F& f) const {
+  /// The residuals of all windows at θ from these start states, computed in parallel.
+  std::vector<Share> SharesAt(const VectorXd& theta, const std::vector<Vector4d>& starts,
+                              bool linearizes) const {
     std::vector<Twin> twins;
     for (int s = 0; s < static_cast<int>(sessions_.size()); ++s) twins.push_back(TwinAt(theta, s));
     std::vector<Drive> drives;
     for (size_t i = 0; i < logs_.size(); ++i) {
       drives.push_back(Drive::Commanded(logs_[i], twins[session_of_[i]]));
     }
-    ParallelFor(pool_, windows(),
-                [&](int w) { f(w, twins[shots_[w].session], drives[shots_[w].window.log]); });
-  }
-
-  std::vector<Share> Linearize() const {
     std::vector<Share> shares(shots_.size());
-    ForEachWindow(theta_, [&](int w, const Twin& twin, const Drive& drive) {
-      shares[w] = ShareAt(shots_[w], shots_[w].x, twin, drive, true);
+    ParallelFor(pool_, windows(), [&](int w) {
+      const Shot& shot = shots_[w];
+      const int log = shot.window.log;
+      shares[w] = ShareOf(logs_[log], shot.window, reported_[log], starts[w], twins[shot.session],
+                          drives[log], linearizes);
     });
     return shares;
   }
-
-  double CostAt(const VectorXd& theta, const std::vector<Vector4d>& starts) const {
-    std::vector<double> costs(shots_.size());
-    ForEachWindow(theta, [&](int w, const Twin& twin, const Drive& drive) {
-      costs[w] =
-          Cost(ShareAt(shots_[w], starts[w], twin, drive, false)) + StartCost(shots_[w], starts[w]);
-    });
-    double cost = PriorCost(theta);
-    for (const double c : costs) cost += c;
-    return cost;
-  }
-
-  Share ShareAt(const Shot& shot, const Vector4d& x, const Twin& twin, const Drive& drive,
-                bool linearizes) const {
-    const int log = shot.window.log;
-    return ShareOf(logs_[log], shot.window, reported_[log], x, twin, drive, linearizes);
-  }
+  std::vector<Share> Linearize() const { return SharesAt(theta_, starts_, true); }
 
   /// The blocks of the windows. The robust cost ln(1 + r²/s²) weighs squares by 1 / (s² + r²).
   std::vector<Block> BlocksOf(const std::vector<Share>& shares) const {
@@ -375,7 +355,7 @@ class Problem {
       b.Hxx.diagonal() += prior;
       b.Hxc = H.topRightCorner<4, kConstants>();
       b.Hcc = H.bottomRightCorner<kConstants, kConstants>();
-      b.gx = g.head<4>() + prior.cwiseProduct(shots_[w].x - shots_[w].cubic);
+      b.gx = g.head<4>() + prior.cwiseProduct(starts_[w] - shots_[w].cubic);
       b.gc = g.tail<kConstants>();
     }
     return blocks;
@@ -386,11 +366,16 @@ class Problem {
     return std::log1p(s.angle.mean / (scale_ * scale_)) +
            std::log1p(s.torque.mean / (torque_scale_ * torque_scale_));
   }
-  static double StartCost(const Shot& shot, const Vector4d& x) {
-    return kStartWeight * (x - shot.cubic).cwiseQuotient(kStartDeviation).squaredNorm();
-  }
-  double PriorCost(const VectorXd& theta) const {
-    return (theta - guess_).dot(prior_ * (theta - guess_));
+  /// Cost of all windows' residuals, of their start states and of θ.
+  double CostOf(const std::vector<Share>& shares, const VectorXd& theta,
+                const std::vector<Vector4d>& starts) const {
+    double cost = (theta - guess_).dot(prior_ * (theta - guess_));
+    for (int w = 0; w < windows(); ++w) {
+      const double start =
+          (starts[w] - shots_[w].cubic).cwiseQuotient(kStartDeviation).squaredNorm();
+      cost += Cost(shares[w]) + kStartWeight * start;
+    }
+    return cost;
   }
 
   /// Sets the scales of the robust cost to the windows' median errors.
@@ -490,9 +475,10 @@ class Problem {
   std::vector<int> session_of_;                // of each log
   std::vector<std::array<bool, 2>> reported_;  // of each log: whether the joints report torques
   std::vector<Value> values_;
-  VectorXd theta_, guess_;  // (n) now, and at first
-  MatrixXd prior_;          // (n × n) inverse covariance about the guess; 0: none
-  std::vector<Shot> shots_;
+  VectorXd theta_, guess_;        // (n) now, and at first
+  MatrixXd prior_;                // (n × n) inverse covariance about the guess; 0: none
+  std::vector<Shot> shots_;       // (windows)
+  std::vector<Vector4d> starts_;  // (windows) start states now
   double damping_ = 1e-3;
   double scale_ = kLargestScale, torque_scale_ = 1;  // rad, N·m
 };
