@@ -6,17 +6,16 @@
 #include <cmath>
 #include <ctime>
 #include <numbers>
-#include <ranges>
 #include <utility>
 #include <vector>
 
 #include "base/error.h"
 #include "base/format.h"
 #include "base/text.h"
+#include "extras/machine/check.h"
 #include "extras/machine/excitation.h"
 #include "extras/machine/first_twin.h"
 #include "extras/machine/identify.h"
-#include "extras/machine/learning_candidates.h"
 #include "extras/machine/learning_run.h"
 #include "extras/machine/policy_controller.h"
 #include "os/file.h"
@@ -36,6 +35,41 @@ constexpr double kLargestError = 0.1;    // of a fit, rad
 constexpr double kLargestZero = 0.2;     // of the encoders, rad
 constexpr double kLongestSwinging = 60;  // until the links rest, s
 constexpr int kDraws = 5;                // machines of the posterior that judge a controller
+
+/// A controller to choose, and the share of dry friction that motors compensate under it.
+struct Candidate {
+  PolicyArguments arguments;
+  double compensation;
+};
+
+/// The candidates for a twin, the best first. The last two need milliseconds for a decision. They
+/// plan with dry friction, because noise makes its compensation shake a light link. Damping of the
+/// joint without a motor stands for its friction in the linear model of the regulator.
+std::vector<Candidate> CandidatesFor(const Plant& plant) {
+  constexpr double kUsualCompensation = 0.95;
+  const auto with = [](const char* name, const std::vector<FlagValue>& flags) {
+    return Candidate{{name, flags, {}}, kUsualCompensation};
+  };
+  const std::vector<FlagValue> stiff{{"lqr_q1", "100"}, {"lqr_q2", "100"}, {"lqr_torque", "0.3"}};
+  std::vector<FlagValue> ahead = stiff;
+  ahead.insert(ahead.end(), {{"mpc_seconds", "0.3"}, {"mpc_angle_range", "9"}});
+  const Candidate rubbing{
+      {"mpc",
+       {{"mpc_seconds", "1"}},
+       {Concat("coulomb1=", plant.coulomb1), Concat("coulomb2=", plant.coulomb2)}},
+      0};
+  Candidate damped = rubbing;
+  constexpr double kDamping = 2;  // for dry friction, s/rad
+  damped.arguments.made_for.push_back(
+      plant.actuated_joint == 1 ? Concat("damping2=", plant.damping2 + kDamping * plant.coulomb2)
+                                : Concat("damping1=", plant.damping1 + kDamping * plant.coulomb1));
+  return {with("tvlqr", {}),
+          with("tvlqr", stiff),
+          with("tvlqr", {{"tvlqr_seconds", "6"}, {"tvlqr_reserve", "0.1"}}),
+          with("mpc", ahead),
+          rubbing,
+          damped};
+}
 
 double ProcessorSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
@@ -90,13 +124,8 @@ class Learner {
   /// Ends the session unless the first excitation moved a link.
   void ExpectMotion() const {
     constexpr double kLeast = 0.05;  // rad
-    double range = 0;
-    for (const int j : {0, 1}) {
-      const auto angle = [j](const Joints& q) { return q[j]; };
-      const auto [low, high] =
-          std::ranges::minmax(logs_.back().angle | std::views::transform(angle));
-      range = std::max(range, high - low);
-    }
+    const Pieces last(&logs_.back(), 1);
+    const double range = std::max(AngleRange(last, 0), AngleRange(last, 1));
     if (range > kLeast) return;
     throw Ended{fmt::format("the links moved by {:.3f} rad only: raise --max-torque ({:g} N·m)",
                             range, c_.limits.torque)};
