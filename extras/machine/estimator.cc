@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <string_view>
 
 namespace upswing::machine {
 namespace {
@@ -22,15 +21,6 @@ constexpr double kLeastNoise = 1e-6;       // of the measured angles, rad
 constexpr double kKept = 0.1;              // time for which sent torques are kept, s
 constexpr double kLongestGap = 0.1;        // s; after it the filter begins again
 constexpr int kMostKept = 512;             // torques sent in kKept and the longest delay, at 1 kHz
-
-/// A twin's covariance of two values; 0 if it has none.
-double CovarianceOf(const Twin& twin, std::string_view a, std::string_view b) {
-  const auto& names = twin.uncertain;
-  const auto i = std::ranges::find(names, a) - names.begin();
-  const auto j = std::ranges::find(names, b) - names.begin();
-  const auto n = std::ssize(names);
-  return i < n && j < n ? twin.covariance[static_cast<size_t>(i * n + j)] : 0;
-}
 
 double Square(double x) { return x * x; }
 

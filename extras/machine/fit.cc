@@ -257,21 +257,16 @@ class Problem {
   /// The covariance of θ in a new session: a multiple of the twin's covariance, wide for values
   /// without one.
   MatrixXd NewSessionOf(const Twin& twin) const {
-    const int n = static_cast<int>(twin.uncertain.size());
-    std::vector<int> row_of;  // in the twin's covariance; -1: none
-    for (const Value& v : values_) {
-      const auto row =
-          static_cast<int>(std::ranges::find(twin.uncertain, v.name) - twin.uncertain.begin());
-      row_of.push_back(row < n && twin.covariance[row * n + row] > 0 ? row : -1);
-    }
+    const auto at = [&](int i, int j) {
+      return kNewSession * CovarianceOf(twin, values_[i].name, values_[j].name);
+    };
     MatrixXd covariance = MatrixXd::Zero(size(), size());
     for (int i = 0; i < size(); ++i) {
       for (int j = 0; j < size(); ++j) {
-        if (row_of[i] < 0 || row_of[j] < 0) continue;
-        covariance(i, j) = kNewSession * twin.covariance[row_of[i] * n + row_of[j]];
+        if (at(i, i) > 0 && at(j, j) > 0) covariance(i, j) = at(i, j);
       }
       const double wide = DeviationsOf(values_[i].name).guess;
-      if (row_of[i] < 0) covariance(i, i) = std::pow(wide > 0 ? wide : guess_(i) / 2, 2);
+      if (!(at(i, i) > 0)) covariance(i, i) = std::pow(wide > 0 ? wide : guess_(i) / 2, 2);
       covariance(i, i) *= 1 + 1e-6;
     }
     return covariance;
@@ -361,19 +356,17 @@ class Problem {
     return blocks;
   }
 
-  /// Cost of a window's residuals: ln(1 + r²/s²) of the mean square of both kinds.
-  double Cost(const Share& s) const {
-    return std::log1p(s.angle.mean / (scale_ * scale_)) +
-           std::log1p(s.torque.mean / (torque_scale_ * torque_scale_));
-  }
-  /// Cost of all windows' residuals, of their start states and of θ.
+  /// Cost of all windows' residuals, ln(1 + r²/s²) of the mean square of both kinds, of their
+  /// start states and of θ.
   double CostOf(const std::vector<Share>& shares, const VectorXd& theta,
                 const std::vector<Vector4d>& starts) const {
     double cost = (theta - guess_).dot(prior_ * (theta - guess_));
     for (int w = 0; w < windows(); ++w) {
+      const auto& [angle, torque] = shares[w];
       const double start =
           (starts[w] - shots_[w].cubic).cwiseQuotient(kStartDeviation).squaredNorm();
-      cost += Cost(shares[w]) + kStartWeight * start;
+      cost += std::log1p(angle.mean / (scale_ * scale_)) +
+              std::log1p(torque.mean / (torque_scale_ * torque_scale_)) + kStartWeight * start;
     }
     return cost;
   }

@@ -214,11 +214,10 @@ int RunValidate(const MachineArguments& a) {
 void PrintTwin(const Identification& found) {
   const Twin& twin = found.fit.twin;
   const Options options = OptionsOf(twin);
-  const size_t n = twin.uncertain.size();
   fmt::print("\nvalue                 ± standard deviation\n");
-  for (size_t i = 0; i < n; ++i) {
-    const Option& option = *options.Get(twin.uncertain[i]);
-    const double variance = twin.covariance[i * n + i];
+  for (const std::string& name : twin.uncertain) {
+    const Option& option = *options.Get(name);
+    const double variance = CovarianceOf(twin, name, name);
     if (variance > 0) {
       fmt::print("  {:<16} {:>10.5f} ± {:.5f} {}\n", option.name, option.number(),
                  std::sqrt(variance), option.unit);

@@ -88,25 +88,6 @@ void ReadSessions(const toml::node& sessions, const std::string& where, Twin& tw
   }
 }
 
-/// Removes the values of a session, which are known, from the covariance.
-void Forget(Twin& twin, const Session& session) {
-  const auto forgets = [&](const std::string& name) {
-    return std::ranges::count(session.values, name, &std::pair<std::string, double>::first) > 0;
-  };
-  std::vector<std::string> names;
-  std::vector<double> covariance;
-  const size_t n = twin.uncertain.size();
-  for (size_t i = 0; i < n; ++i) {
-    if (forgets(twin.uncertain[i])) continue;
-    names.push_back(twin.uncertain[i]);
-    for (size_t j = 0; j < n; ++j) {
-      if (!forgets(twin.uncertain[j])) covariance.push_back(twin.covariance[i * n + j]);
-    }
-  }
-  twin.uncertain = names;
-  twin.covariance = covariance;
-}
-
 /// The sensors of the control loop, and the time that a torque takes, as the age of what they show.
 Disturbance DisturbanceOf(const Twin& twin) {
   Disturbance d;
@@ -241,6 +222,14 @@ std::string TwinText(const Twin& twin) {
   return text;
 }
 
+double CovarianceOf(const Twin& twin, std::string_view a, std::string_view b) {
+  const auto& names = twin.uncertain;
+  const auto i = std::ranges::find(names, a) - names.begin();
+  const auto j = std::ranges::find(names, b) - names.begin();
+  const auto n = std::ssize(names);
+  return i < n && j < n ? twin.covariance[static_cast<size_t>(i * n + j)] : 0;
+}
+
 Twin InSession(const Twin& twin, const MachineLog& log) {
   Twin own = twin;
   const std::string name = SessionOf(log.name);
@@ -249,8 +238,12 @@ Twin InSession(const Twin& twin, const MachineLog& log) {
     const Options options = OptionsOf(own);
     for (const auto& [value, number] : session.values) {
       *std::get<double*>(options.Get(value)->target) = number;
+      std::erase(own.uncertain, value);  // it is known
     }
-    Forget(own, session);
+    own.covariance.clear();
+    for (const std::string& a : own.uncertain) {
+      for (const std::string& b : own.uncertain) own.covariance.push_back(CovarianceOf(twin, a, b));
+    }
     break;
   }
   return own;

@@ -83,6 +83,9 @@ struct Twin {
   void Describe(Options& options);
 };
 
+/// The covariance of two values, by name; 0 if the twin has none.
+double CovarianceOf(const Twin& twin, std::string_view a, std::string_view b);
+
 /// The machine in a log's session, whose values are known; the twin itself if the log is of another
 /// session.
 Twin InSession(const Twin& twin, const MachineLog& log);
