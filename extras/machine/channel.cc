@@ -169,7 +169,6 @@ Channel Channel::Listen(const LinkAddress& address) {
     sockaddr_storage own{};
     socklen_t size = sizeof own;
     getsockname(channel.fd_.get(), reinterpret_cast<sockaddr*>(&own), &size);
-    channel.connected_ = false;
     channel.name_ = UdpName(own, size);
     return channel;
   }
@@ -189,15 +188,11 @@ Channel Channel::Listen(const LinkAddress& address) {
 }
 
 bool Channel::Send(std::span<const std::byte> bytes) {
-  ssize_t sent = -1;
-  if (!datagrams_) {
-    sent = write(fd_.get(), bytes.data(), bytes.size());
-  } else if (connected_) {
-    sent = send(fd_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
-  } else if (peer_size_ > 0) {
-    sent = sendto(fd_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL,
-                  reinterpret_cast<const sockaddr*>(&peer_), peer_size_);
-  }
+  // A socket without a peer sends to what it is connected to, else nowhere.
+  const auto* peer = peer_size_ > 0 ? reinterpret_cast<const sockaddr*>(&peer_) : nullptr;
+  const ssize_t sent =
+      datagrams_ ? sendto(fd_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL, peer, peer_size_)
+                 : write(fd_.get(), bytes.data(), bytes.size());
   return sent == static_cast<ssize_t>(bytes.size());
 }
 

@@ -56,7 +56,6 @@ class Channel {
 
   Descriptor fd_;
   bool datagrams_;
-  bool connected_ = true;
   std::string name_;
   Descriptor other_end_{-1};  // of a pseudo-terminal, which stays open between two users
   sockaddr_storage sender_{}, peer_{};

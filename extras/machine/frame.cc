@@ -71,15 +71,11 @@ void FrameReader::Add(std::span<const std::byte> bytes) {
     skipped_ += static_cast<int64_t>(bytes.size());
     return;
   }
-  if (bytes.size() > buffer_.size()) {
-    skipped_ += static_cast<int64_t>(bytes.size() - buffer_.size());
-    bytes = bytes.last(buffer_.size());
-  }
-  if (size_ + bytes.size() > buffer_.size()) {
-    const size_t excess = size_ + bytes.size() - buffer_.size();
-    skipped_ += static_cast<int64_t>(excess);
-    Skip(excess);
-  }
+  const size_t excess = std::max(size_ + bytes.size(), buffer_.size()) - buffer_.size();
+  skipped_ += static_cast<int64_t>(excess);
+  const size_t of_buffer = std::min(excess, size_);
+  Skip(of_buffer);
+  bytes = bytes.subspan(excess - of_buffer);
   std::ranges::copy(bytes, buffer_.begin() + static_cast<std::ptrdiff_t>(size_));
   size_ += bytes.size();
 }

@@ -151,33 +151,39 @@ void ForEachColumn(auto& columns, const auto& f) {
   }
 }
 
-/// Sets one key of a TOML file; false if there is no such key.
-bool SetColumn(LogColumns& columns, std::string_view key, const toml::node& node,
+/// Sets one key of a TOML file. Throws BadInput for an unknown one.
+void SetColumn(LogColumns& columns, const std::string& key, const toml::node& node,
                const std::string& place) {
-  bool is_known = true;
   if (key == "piece") {
     columns.piece = TextIn(node, place);
-  } else if (key == "hanging") {
-    throw BadInput(Concat(
-        place, "expected it with an angle, such as angle1 = {column = \"a\", hanging = 180}"));
-  } else if (key == "absolute") {
+    return;
+  }
+  if (key == "absolute") {
     if (!node.is_boolean()) {
       throw BadInput(Concat(place, "expected true or false, got ", Shown(node)));
     }
     columns.absolute = node.as_boolean()->get();
-  } else {
-    is_known = false;
-    ForEachColumn(columns, [&](const std::string& name, LogColumn& column, const char* quantity) {
-      if (name != key) return;
-      column = ColumnIn(node, quantity, place);
-      is_known = true;
-    });
+    return;
   }
-  return is_known;
+  if (key == "hanging") {
+    throw BadInput(Concat(
+        place, "expected it with an angle, such as angle1 = {column = \"a\", hanging = 180}"));
+  }
+  bool is_known = false;
+  std::vector<std::string> keys;
+  ForEachColumn(columns, [&](const std::string& name, LogColumn& column, const char* quantity) {
+    keys.push_back(name);
+    if (name != key) return;
+    column = ColumnIn(node, quantity, place);
+    is_known = true;
+  });
+  if (is_known) return;
+  keys.insert(keys.end(), {"piece", "absolute"});
+  throw BadInput(Concat(place, "expected one of ", Join(keys, ", "), DidYouMean(key, keys)));
 }
 
-/// Throws BadInput if a column of the file stands for two keys.
-void CheckOwnColumns(const LogColumns& columns, const std::string& where) {
+/// Throws BadInput if the clock or an angle has no column, or if a column stands for two keys.
+void CheckColumns(const LogColumns& columns, const std::string& where) {
   std::map<std::string, std::string> keys;
   const auto add = [&](const std::string& name, const std::string& key) {
     if (name.empty()) return;
@@ -186,18 +192,14 @@ void CheckOwnColumns(const LogColumns& columns, const std::string& where) {
     throw BadInput(Concat(where, ": expected a column for each key, got \"", Printable(name),
                           "\" for ", found->second, " and ", key));
   };
-  ForEachColumn(columns, [&](const std::string& key, const LogColumn& column, const char*) {
-    add(column.name, key);
-  });
+  ForEachColumn(columns,
+                [&](const std::string& key, const LogColumn& column, std::string_view quantity) {
+                  if (column.name.empty() && (quantity == "time" || quantity == "angle")) {
+                    throw BadInput(Concat(where, ": expected the key ", key, ", got none"));
+                  }
+                  add(column.name, key);
+                });
   add(columns.piece, "piece");
-}
-
-std::vector<std::string> KnownKeys() {
-  std::vector<std::string> keys;
-  const LogColumns columns;
-  ForEachColumn(columns, [&](const auto& key, const auto&...) { keys.push_back(key); });
-  keys.insert(keys.end(), {"piece", "absolute"});
-  return keys;
 }
 
 /// The columns of a log of RealAIGym, from the file's line of names.
@@ -223,10 +225,9 @@ LogColumns RealAiGymColumns(const std::vector<std::string>& names, const std::st
   return columns;
 }
 
-/// Numbers of a column in SI units. Throws BadInput for a huge one.
-std::vector<double> Scaled(CsvColumn table, const LogColumn& column, const std::string& where,
-                           bool is_time = false) {
-  std::vector<double> values = std::move(table.values);
+/// Turns numbers of a column into SI units. Throws BadInput for a huge one.
+void Scale(std::vector<double>& values, const LogColumn& column, bool is_time,
+           const std::string& where) {
   for (size_t row = 0; row < values.size(); ++row) {
     double& x = values[row];
     x = (x - column.hanging) * column.scale;
@@ -235,7 +236,6 @@ std::vector<double> Scaled(CsvColumn table, const LogColumn& column, const std::
                           ": expected a number of magnitude 0 to ", kMostMagnitude, ", got ", x,
                           is_time ? "; name the unit of the clock (ms, us, ns)" : ""));
   }
-  return values;
 }
 
 /// All rows of a file as one log, and the values of its column of pieces.
@@ -254,20 +254,19 @@ WholeLog ReadRows(std::string_view csv, const LogColumns& columns, const std::st
   ForEachColumn(columns, [&](const auto&, const LogColumn& column, const char*) {
     if (!column.name.empty()) names.push_back(column.name);
   });
-  std::map<std::string, CsvColumn> table;
-  for (CsvColumn& column : ReadCsv(csv, names, where)) {
-    std::string name = column.name;
-    table.emplace(std::move(name), std::move(column));
-  }
+  std::vector<CsvColumn> table = ReadCsv(csv, names, where);  // in the order of the names
+  auto next = table.begin();
   WholeLog whole;
-  whole.log.time = Scaled(table[columns.time.name], columns.time, where, true);
-  if (!columns.piece.empty()) whole.piece = table[columns.piece].values;
+  if (!columns.piece.empty()) whole.piece = std::move(next++->values);
+  whole.log.time = std::move(next++->values);
+  Scale(whole.log.time, columns.time, /*is_time=*/true, where);
   for (const JointQuantity& q : kJointQuantities) {
     std::vector<Joints>& values = whole.log.*q.values;
     for (int joint = 0; joint < 2; ++joint) {
       const LogColumn& column = (columns.*q.columns)[joint];
       if (column.name.empty()) continue;
-      const std::vector<double> numbers = Scaled(table[column.name], column, where);
+      std::vector<double>& numbers = next++->values;
+      Scale(numbers, column, /*is_time=*/false, where);
       values.resize(numbers.size());
       for (size_t row = 0; row < numbers.size(); ++row) values[row][joint] = numbers[row];
     }
@@ -355,19 +354,10 @@ bool HasCommands(std::span<const MachineLog> logs) {
 LogColumns ParseLogColumns(std::string_view text, const std::string& where) {
   LogColumns columns;
   for (const auto& [key, node] : ParseToml(text, where)) {
-    const std::string place = Concat(PlaceOf(node, where), ": ", key.str(), ": ");
-    if (SetColumn(columns, key.str(), node, place)) continue;
-    throw BadInput(Concat(place, "expected one of ", Join(KnownKeys(), ", "),
-                          DidYouMean(key.str(), KnownKeys())));
+    const std::string name(key.str());
+    SetColumn(columns, name, node, Concat(PlaceOf(node, where), ": ", name, ": "));
   }
-  const auto expect = [&](const LogColumn& column, const char* key) {
-    if (column.name.empty())
-      throw BadInput(Concat(where, ": expected the key ", key, ", got none"));
-  };
-  expect(columns.time, "time");
-  expect(columns.angle[0], "angle1");
-  expect(columns.angle[1], "angle2");
-  CheckOwnColumns(columns, where);
+  CheckColumns(columns, where);
   return columns;
 }
 
