@@ -1,7 +1,6 @@
 #include "extras/machine/control_loop.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace upswing::machine {
 namespace {

@@ -3,7 +3,6 @@
 #include <array>
 #include <cstdint>
 #include <functional>
-#include <string>
 #include <utility>
 
 #include "extras/machine/estimator.h"

@@ -5,10 +5,8 @@
 #include <cmath>
 #include <filesystem>
 #include <functional>
-#include <iterator>
 #include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "base/error.h"

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <filesystem>
 #include <numbers>
-#include <optional>
 #include <utility>
 
 #include "agents/toml_settings.h"

@@ -8,7 +8,6 @@
 #include <map>
 
 #include "base/csv.h"
-#include "base/format.h"
 #include "base/text.h"
 #include "report/figure.h"
 

@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <functional>
-#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -44,11 +42,6 @@ struct HardwareArguments {
   bool as_json = false;
 };
 
-/// A number of a table; a dash if it is unknown.
-std::string Cell(double x, int decimals, double factor = 1) {
-  return std::isfinite(x) ? fmt::format("{:.{}f}", factor * x, decimals) : "–";
-}
-
 void PrintReport(const BoardReport& report, double seconds) {
   const BoardOutcome& o = report.nominal;
   const auto& rows = report.robustness.rows;
@@ -86,29 +79,25 @@ void PrintUptimes(const UptimeReport& report, const std::string& place) {
              swing_ups / static_cast<double>(report.runs.size()));
 }
 
-void PrintHardwareRow(const std::string& name, const std::string& success, double seconds,
-                      const std::array<double, 5>& numbers) {
-  fmt::print("  {:<36} {:>7} {:>6} {:>7} {:>7} {:>7} {:>7} {:>6}\n", Shortened(name, 36), success,
-             Cell(seconds, 2), Cell(numbers[0], 2), Cell(numbers[1], 2), Cell(numbers[2], 3),
-             Cell(numbers[3], 1), Cell(numbers[4], 3));
-}
-
 void PrintHardware(const HardwareReport& report) {
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  const auto print = [](const std::string& name, const std::array<std::string, 7>& cells) {
+    fmt::print("  {:<36} {:>7} {:>6} {:>7} {:>7} {:>7} {:>7} {:>6}\n", Shortened(name, 36),
+               cells[0], cells[1], cells[2], cells[3], cells[4], cells[5], cells[6]);
+  };
+  const auto number = [](double x, int decimals) { return fmt::format("{:.{}f}", x, decimals); };
   const char* pushed = report.pushed ? " with pushes" : "";
   fmt::print("Runs of RealAIGym's {}{}, hardware, version 2\n", NameOf(report.robot), pushed);
-  fmt::print("  {:<36} {:>7} {:>6} {:>7} {:>7} {:>7} {:>7} {:>6}\n", "", "success", "time",
-             "energy", "cost", "smooth", "speed", "score");
-  fmt::print("  {:<36} {:>7} {:>6} {:>7} {:>7} {:>7} {:>7} {:>6}\n", "", "", "s", "J", "N²m²s",
-             "N·m", "rad²/s", "S");
+  print("", {"success", "time", "energy", "cost", "smooth", "speed", "score"});
+  print("", {"", "s", "J", "N²m²s", "N·m", "rad²/s", "S"});
   for (const HardwareRun& run : report.runs) {
     const BoardOutcome& o = run.outcome;
-    PrintHardwareRow(Printable(run.name), o.above_line ? "yes" : "no",
-                     o.above_line ? o.swing_up_seconds : kNone,
-                     {o.energy, o.torque_cost, o.smoothness, o.velocity_cost, run.score});
+    print(Printable(run.name),
+          {o.above_line ? "yes" : "no", o.above_line ? number(o.swing_up_seconds, 2) : "–",
+           number(o.energy, 2), number(o.torque_cost, 2), number(o.smoothness, 3),
+           number(o.velocity_cost, 1), number(run.score, 3)});
   }
-  PrintHardwareRow("mean", fmt::format("{}/{}", report.successes(), report.runs.size()), kNone,
-                   {kNone, kNone, kNone, kNone, report.mean()});
+  print("mean", {fmt::format("{}/{}", report.successes(), report.runs.size()), "–", "–", "–", "–",
+                 "–", number(report.mean(), 3)});
   for (const HardwareRun& run : report.runs) {
     if (run.outcome.above_line) continue;
     fmt::print("  {}: {} after {:.2f} s\n", Printable(run.name),

@@ -1,9 +1,6 @@
 #pragma once
 
 #include <functional>
-#include <optional>
-#include <span>
-#include <vector>
 
 #include "base/progress.h"
 #include "base/thread_pool.h"
