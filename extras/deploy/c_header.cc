@@ -9,17 +9,13 @@
 namespace upswing::deploy {
 namespace {
 
-std::string_view FileNamed(std::string_view name) {
-  const auto files = EmbeddedCFiles();
-  return std::ranges::find(files, name, &CFile::name)->text;
-}
-
 /// The text of a file with its includes inserted. Leaves out tables.h, which stands for the
 /// header's beginning.
 std::string Expanded(std::string_view name) {
   constexpr std::string_view kInclude = "#include \"";
   std::string text;
-  for (std::string_view line : Split(FileNamed(name), '\n')) {
+  const auto file = std::ranges::find(EmbeddedCFiles(), name, &CFile::name);
+  for (std::string_view line : Split(file->text, '\n')) {
     if (!line.starts_with(kInclude)) {
       text += Concat(line, '\n');
       continue;

@@ -103,7 +103,7 @@ int RunExport(const ExportArguments& a) {
   if (a.checkpoints > 0 && a.page.empty()) {
     throw BadInput("--checkpoints: expected --page with it, got none");
   }
-  if (a.c.empty() && !(a.controller.flags.empty() && a.controller.made_for.empty())) {
+  if (a.c.empty() && a.controller.has_settings()) {
     throw BadInput(
         "settings of a controller: expected --c with them, the only export of controllers");
   }

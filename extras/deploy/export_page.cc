@@ -166,22 +166,20 @@ PageAgent ReadAgent(const fs::path& path, const std::string& given_id, int64_t c
                           ": expected a policy for a motor at joint 1, as in the page, got one for "
                           "joint 2"));
   }
-  if (loaded.plant.rotor_inertia != 0 || loaded.plant.has_dry_friction()) {
-    throw BadInput(Concat(where,
-                          ": expected a policy for a plant without rotors and dry friction, as in "
-                          "the page, got one with them"));
-  }
-  if (loaded.plant.has_own_links() || loaded.plant.armature != kArmature) {
-    throw BadInput(Concat(where, ": expected a policy for links that are solid capsules and an ",
-                          "armature of ", kArmature, " kg·m², as in the page, got others"));
+  if (loaded.plant.rotor_inertia != 0 || loaded.plant.has_dry_friction() ||
+      loaded.plant.has_own_links() || loaded.plant.armature != kArmature) {
+    throw BadInput(
+        Concat(where, ": expected a policy for a plant as in the page, without rotors ",
+               "and dry friction, with links that are solid capsules and an armature of ",
+               kArmature, " kg·m², got another plant"));
   }
   const fs::path run = RunOf(loaded.path);
-  std::string id = Cleaned(run.filename().string(), '-');
+  std::string id = given_id.empty() ? Cleaned(run.filename().string(), '-') : given_id;
   if (id.empty()) id = Cleaned(loaded.policy->info().agent, '-');
-  if (!given_id.empty()) id = given_id;
-  if (id.empty())
+  if (id.empty()) {
     throw BadInput(
         Concat(where, ": expected metadata \"agent\" or --id for the ID in the page, got neither"));
+  }
 
   PageAgent agent{id, path, ReadOwnBytes(loaded.path, kMostPolicyBytes), EntryOf(loaded, id), {}};
   const std::optional<std::string> command = TrainCommand(loaded.policy->info(), where);

@@ -12,14 +12,6 @@
 namespace upswing::deploy {
 namespace {
 
-/// Throws BadInput unless these torques are within the range of float.
-void CheckTorques(std::span<const double> torques, const std::string& where) {
-  for (const double torque : torques) {
-    if (std::abs(torque) <= std::numeric_limits<float>::max()) continue;
-    throw BadInput(Concat(where, ": expected torques within the range of float, got ", torque));
-  }
-}
-
 /// The inputs of the double pendulum's observation (Observe of pendulum/task.h).
 std::vector<NamedInput> PendulumInputs(int memory) {
   const auto over = [](double scale, const char* unit) {
@@ -98,9 +90,11 @@ ExportedPolicy ViewForExport(const LoadedPolicy& loaded) {
         Concat(where, ": expected a learned policy, got ", loaded.policy->description()));
   }
   const NetworkPolicyParts& parts = exported.policy->parts();
-  CheckTorques(parts.torques, where);
-  CheckTorques(parts.action_limit, where);
   exported.limit = LargestSize(exported.is_discrete() ? parts.torques : parts.action_limit);
+  for (const double size : {exported.limit, LargestSize(parts.action_limit)}) {
+    if (size <= std::numeric_limits<float>::max()) continue;
+    throw BadInput(Concat(where, ": expected torques within the range of float, got ", size));
+  }
   exported.layers = exported.policy->Layers();
   exported.critic = exported.policy->CriticLayers();
   for (LayerView& layer : exported.critic) layer.name = "critic." + layer.name;

@@ -57,17 +57,26 @@ void Mark(Panel& panel, const LogCheck& check, Pieces pieces, std::initializer_l
   }
 }
 
-/// A panel with a quantity of both joints.
-Panel PanelOf(const std::string& title, const std::string& label, Pieces pieces,
-              std::vector<Joints> MachineLog::*values, const char* prefix = "joint ") {
+/// A quantity of both joints, and the beginning of the names of its lines.
+struct Quantity {
+  const char* prefix;
+  std::vector<Joints> MachineLog::*values;
+};
+
+/// A panel with those of the quantities that the log has.
+Panel PanelOf(const char* title, const char* label, Pieces pieces,
+              std::initializer_list<Quantity> quantities) {
   Panel panel;
   panel.title = title;
   panel.x_label = "time (s)";
   panel.y_label = label;
-  for (const int joint : {0, 1}) {
-    panel.lines.push_back(
-        LineOf(Concat(prefix, joint + 1), pieces,
-               [&](const MachineLog& log, int k) { return (log.*values)[k][joint]; }));
+  for (const Quantity& q : quantities) {
+    if ((pieces.front().*q.values).empty()) continue;
+    for (const int joint : {0, 1}) {
+      panel.lines.push_back(
+          LineOf(Concat(q.prefix, joint + 1), pieces,
+                 [&](const MachineLog& log, int k) { return (log.*q.values)[k][joint]; }));
+    }
   }
   return panel;
 }
@@ -86,36 +95,24 @@ std::string CaptionOf(const LogCheck& check) {
 }  // namespace
 
 void DrawCheck(const LogCheck& check, Pieces pieces, const std::filesystem::path& file) {
-  const MachineLog& first = pieces.front();
   Figure figure;
   figure.title = check.name;
   figure.caption = CaptionOf(check);
   figure.width = 1100;
-  const auto mark = [&](Panel& panel, std::initializer_list<Aspect> aspects,
-                        std::vector<Joints> MachineLog::*values) {
-    Mark(panel, check, pieces, aspects,
+  const auto add = [&](Panel panel, std::initializer_list<Aspect> marked,
+                       std::vector<Joints> MachineLog::*values) {
+    if (panel.lines.empty()) return;
+    Mark(panel, check, pieces, marked,
          [values](const MachineLog& log, int k, int joint) { return (log.*values)[k][joint]; });
+    figure.panels.push_back(std::move(panel));
   };
-  Panel angles = PanelOf("angles", "rad", pieces, &MachineLog::angle);
-  mark(angles, {Aspect::kAngle, Aspect::kMotion}, &MachineLog::angle);
-  figure.panels.push_back(std::move(angles));
-  if (!first.velocity.empty()) {
-    Panel velocities = PanelOf("velocities", "rad/s", pieces, &MachineLog::velocity);
-    mark(velocities, {Aspect::kVelocity}, &MachineLog::velocity);
-    figure.panels.push_back(std::move(velocities));
-  }
-  if (!first.commanded.empty() || !first.measured.empty()) {
-    const bool both = !first.commanded.empty() && !first.measured.empty();
-    Panel torques =
-        PanelOf("torques", "N·m", pieces,
-                first.commanded.empty() ? &MachineLog::measured : &MachineLog::commanded,
-                first.commanded.empty() ? "measured " : "commanded ");
-    if (both) {
-      Panel measured = PanelOf("", "", pieces, &MachineLog::measured, "measured ");
-      for (Line& line : measured.lines) torques.lines.push_back(std::move(line));
-    }
-    figure.panels.push_back(std::move(torques));
-  }
+  add(PanelOf("angles", "rad", pieces, {{"joint ", &MachineLog::angle}}),
+      {Aspect::kAngle, Aspect::kMotion}, &MachineLog::angle);
+  add(PanelOf("velocities", "rad/s", pieces, {{"joint ", &MachineLog::velocity}}),
+      {Aspect::kVelocity}, &MachineLog::velocity);
+  add(PanelOf("torques", "N·m", pieces,
+              {{"commanded ", &MachineLog::commanded}, {"measured ", &MachineLog::measured}}),
+      {}, &MachineLog::commanded);
   const auto cycle = [](const MachineLog& log, int k) {
     return 1e3 * (log.time[k] - log.time[k - 1]);
   };
