@@ -18,16 +18,6 @@ double LoopController::Act(int64_t cycle, const PendulumState& s) {
   return torque_;
 }
 
-double LoopSummary::LatenessOf(double share) const {
-  const double wanted = share * static_cast<double>(cycles);
-  double count = 0;
-  for (size_t i = 0; i + 1 < late.size(); ++i) {
-    count += static_cast<double>(late[i]);
-    if (count >= wanted) return std::min(kBin * static_cast<double>(i + 1), latest);
-  }
-  return latest;
-}
-
 ControlLoop::ControlLoop(const LoopConfig& config, MachineLink& link, Estimator& estimator,
                          Supervisor& supervisor, LoopController& controller, LogWriter& log)
     : config_(config),
@@ -39,14 +29,6 @@ ControlLoop::ControlLoop(const LoopConfig& config, MachineLink& link, Estimator&
       period_(1 / static_cast<double>(config.hz)) {
   // The first deadline lies in the future.
   cycle_ = static_cast<int64_t>(link.Now() * static_cast<double>(config.hz)) + 1;
-}
-
-void ControlLoop::CountLateness(double late) {
-  ++summary_.cycles;
-  if (late <= LoopSummary::kOnTime) ++summary_.on_time;
-  summary_.latest = std::max(summary_.latest, late);
-  const auto bin = static_cast<size_t>(std::max(0.0, late / LoopSummary::kBin));
-  ++summary_.late[std::min(bin, summary_.late.size() - 1)];
 }
 
 CycleFacts ControlLoop::FactsOf(double now, const std::optional<LinkReading>& reading) {
@@ -82,9 +64,11 @@ Joints ControlLoop::ControllerTorque() {
 bool ControlLoop::Cycle() {
   const double deadline = static_cast<double>(cycle_) * period_;
   link_.WaitUntil(deadline);
-  const double now = link_.Now();
-  CountLateness(now - deadline);
-  const auto missed = static_cast<int64_t>(std::max(0.0, (now - deadline) / period_));
+  const double now = link_.Now(), late = now - deadline;
+  ++summary_.cycles;
+  summary_.on_time += late <= LoopSummary::kOnTime ? 1 : 0;
+  summary_.latest = std::max(summary_.latest, late);
+  const auto missed = static_cast<int64_t>(std::max(0.0, late / period_));
   summary_.missed += missed;
   cycle_ += missed;
 
@@ -119,7 +103,7 @@ bool ControlLoop::Cycle() {
   if (reading) {
     const LoopRow row{reading->time, reading->angle,  {facts.state.w1, facts.state.w2},
                       torque_,       reading->torque, static_cast<int>(after),
-                      now - deadline};
+                      late};
     log_.Add(row, link_.simulated());
   }
   ++cycle_;

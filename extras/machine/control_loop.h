@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <utility>
@@ -47,21 +46,16 @@ struct LoopConfig {
 /// Times and results of a loop.
 struct LoopSummary {
   static constexpr double kOnTime = 0.0002;  // s
-  static constexpr double kBin = 1e-5;       // s
 
   int64_t cycles = 0;
-  int64_t moving = 0;                // cycles in which the controller drove or the loop braked
-  int64_t on_time = 0;               // cycles that began within kOnTime of their deadlines
-  int64_t missed = 0;                // cycles that were left out because others took too long
-  int64_t unanswered = 0;            // cycles without a new reading, once there were readings
-  double latest = 0;                 // largest lateness, s
-  std::array<int64_t, 1000> late{};  // cycles by lateness in steps of kBin; the last: and more
-  double longest_act = 0;            // longest time that the controller took, s
-  double driven = 0;                 // time in which the controller drove, s
-  double upright = 0;                // time for which both links were inverted at its end, s
-
-  /// Lateness (s) that a share of the cycles does not exceed.
-  double LatenessOf(double share) const;
+  int64_t moving = 0;      // cycles in which the controller drove or the loop braked
+  int64_t on_time = 0;     // cycles that began within kOnTime of their deadlines
+  int64_t missed = 0;      // cycles that were left out because others took too long
+  int64_t unanswered = 0;  // cycles without a new reading, once there were readings
+  double latest = 0;       // largest lateness, s
+  double longest_act = 0;  // longest time that the controller took, s
+  double driven = 0;       // time in which the controller drove, s
+  double upright = 0;      // time for which both links were inverted at its end, s
 };
 
 /// Cycle by cycle: waits for the deadline, sends the torques of the cycle before, gets the reading
@@ -84,7 +78,6 @@ class ControlLoop {
   const LoopSummary& summary() const { return summary_; }
 
  private:
-  void CountLateness(double late);
   CycleFacts FactsOf(double now, const std::optional<LinkReading>& reading);
   Joints ControllerTorque();
 

@@ -67,16 +67,10 @@ bool LinkProtocol::IsNew(const Frame& frame) {
   if (frame.kind != Frame::Kind::kReading) return false;
   const bool first = counts_.received == 0;
   const uint32_t before = filter_.last();
-  switch (filter_.Judge(frame.sequence)) {
-    case SequenceFilter::Verdict::kDuplicate:
-      ++counts_.duplicates;
-      return false;
-    case SequenceFilter::Verdict::kOld:
-      ++counts_.old;
-      return false;
-    case SequenceFilter::Verdict::kNew:
-      break;
-  }
+  const auto verdict = filter_.Judge(frame.sequence);
+  counts_.duplicates += verdict == SequenceFilter::Verdict::kDuplicate ? 1 : 0;
+  counts_.old += verdict == SequenceFilter::Verdict::kOld ? 1 : 0;
+  if (verdict != SequenceFilter::Verdict::kNew) return false;
   ++counts_.received;
   if (!first) counts_.lost += frame.sequence - before - 1;
   return true;

@@ -77,11 +77,6 @@ std::string ErrorText(const Estimate& e) {
   return fmt::format("{:.3f} ({:.3f}–{:.3f})", e.value, e.interval->low, e.interval->high);
 }
 
-/// The torques that drive predictions in place of reported ones.
-const char* CommandedIn(std::span<const MachineLog> logs) {
-  return HasCommands(logs) ? "commanded" : "no";
-}
-
 void PrintErrors(std::span<const ErrorRow> rows, std::span<const Predictor> predictors,
                  const char* commanded) {
   size_t width = 8;
@@ -170,6 +165,24 @@ nlohmann::ordered_json ErrorsJson(std::span<const ErrorRow> rows,
   return list;
 }
 
+/// Draws a comparison if asked. Prints it and the written files, or `json` with it.
+void ShowErrors(const MachineArguments& a, std::span<const MachineLog> logs,
+                std::span<const Predictor> predictors, std::span<const ErrorRow> rows,
+                nlohmann::ordered_json json, ThreadPool& pool) {
+  // The torques that drive predictions in place of reported ones.
+  const char* commanded = HasCommands(logs) ? "commanded" : "no";
+  if (!a.figure.empty()) DrawErrors(logs, predictors, a.figure, &pool);
+  if (a.as_json) {
+    json["errors"] = ErrorsJson(rows, predictors, commanded);
+    fmt::print("{}\n", PrintableJson(json));
+    return;
+  }
+  PrintErrors(rows, predictors, commanded);
+  for (const std::string& written : {a.out, a.figure, a.csv}) {
+    if (!written.empty()) fmt::print("written {}\n", Printable(written));
+  }
+}
+
 constexpr std::array kHorizons{0.2, 0.5, 1.0};
 
 int RunValidate(const MachineArguments& a) {
@@ -195,17 +208,8 @@ int RunValidate(const MachineArguments& a) {
                       " s away from upright: left out"));
     }
   }
-  if (!a.figure.empty()) DrawErrors(logs, predictors, a.figure, &pool);
   if (!a.csv.empty()) WriteNamedFile(a.csv, MotionCsv(logs, predictors));
-  if (a.as_json) {
-    fmt::print("{}\n",
-               PrintableJson({{"errors", ErrorsJson(rows, predictors, CommandedIn(logs))}}));
-    return 0;
-  }
-  PrintErrors(rows, predictors, CommandedIn(logs));
-  for (const std::string& written : {a.figure, a.csv}) {
-    if (!written.empty()) fmt::print("written {}\n", Printable(written));
-  }
+  ShowErrors(a, logs, predictors, rows, {}, pool);
   return 0;
 }
 
@@ -325,17 +329,8 @@ int RunIdentify(const MachineArguments& a) {
   if (is_faulty) {
     SayError(Concat(Printable(a.out), ": not to be trusted, because its logs have faults"));
   }
-  if (!a.figure.empty()) DrawErrors(logs, predictors, a.figure, &pool);
-  if (a.as_json) {
-    nlohmann::ordered_json json = IdentificationJson(found, a.out);
-    json["errors"] = ErrorsJson(rows, predictors, CommandedIn(logs));
-    fmt::print("{}\n", PrintableJson(json));
-    return is_faulty ? 1 : 0;
-  }
-  PrintIdentification(found, logs.size());
-  PrintErrors(rows, predictors, CommandedIn(logs));
-  fmt::print("written {}\n", Printable(a.out));
-  if (!a.figure.empty()) fmt::print("written {}\n", Printable(a.figure));
+  if (!a.as_json) PrintIdentification(found, logs.size());
+  ShowErrors(a, logs, predictors, rows, IdentificationJson(found, a.out), pool);
   return is_faulty ? 1 : 0;
 }
 
