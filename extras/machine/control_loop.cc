@@ -1,6 +1,7 @@
 #include "extras/machine/control_loop.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace upswing::machine {
 namespace {
@@ -9,22 +10,26 @@ constexpr double kAnswerShare = 0.5;  // share of a cycle that waits for the ans
 
 }  // namespace
 
-double LoopController::Act(int64_t cycle, const PendulumState& s) {
-  // After missed cycles only the last of the missed actions is made up.
+MachineController PerCycle(MachineController controller, int64_t hz) {
+  constexpr int64_t kControllerHz = 50;
   static_assert(kControlPeriod * kControllerHz == 1);
-  const int64_t step = cycle * kControllerHz / hz_;
-  if (step != step_) torque_ = controller_(step, s);
-  step_ = step;
-  return torque_;
+  return [controller = std::move(controller), hz, last = int64_t{-1}, torque = 0.0](
+             int64_t cycle, const PendulumState& state) mutable {
+    // After missed cycles only the last of the missed actions is made up.
+    const int64_t step = cycle * kControllerHz / hz;
+    if (step != last) torque = controller(step, state);
+    last = step;
+    return torque;
+  };
 }
 
 ControlLoop::ControlLoop(const LoopConfig& config, MachineLink& link, Estimator& estimator,
-                         Supervisor& supervisor, LoopController& controller, LogWriter& log)
+                         Supervisor& supervisor, MachineController controller, LogWriter& log)
     : config_(config),
       link_(link),
       estimator_(estimator),
       supervisor_(supervisor),
-      controller_(controller),
+      controller_(PerCycle(std::move(controller), config.hz)),
       log_(log),
       period_(1 / static_cast<double>(config.hz)) {
   // The first deadline lies in the future.
@@ -57,7 +62,7 @@ CycleFacts ControlLoop::FactsOf(double now, const std::optional<LinkReading>& re
 Joints ControlLoop::ControllerTorque() {
   Joints torque = estimator_.CompensationTorque(config_.compensation);
   torque[static_cast<size_t>(config_.actuated_joint - 1)] +=
-      controller_.Act(cycle_ - running_cycle_, estimator_.ahead());
+      controller_(cycle_ - running_cycle_, estimator_.ahead());
   return torque;
 }
 

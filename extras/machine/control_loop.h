@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <utility>
 
 #include "extras/machine/estimator.h"
 #include "extras/machine/link.h"
@@ -17,23 +16,9 @@ namespace upswing::machine {
 /// Steps count from 0, and can be left out.
 using MachineController = std::function<double(int64_t step, const PendulumState& state)>;
 
-/// A controller at the rate of the loop. It holds each torque for a step.
-class LoopController {
- public:
-  /// `hz`: cycles of the loop per second, a multiple of kControllerHz.
-  LoopController(MachineController controller, int64_t hz)
-      : controller_(std::move(controller)), hz_(hz) {}
-  /// The motor's torque (N·m) in a cycle; number 0 is the first one.
-  double Act(int64_t cycle, const PendulumState& state);
-
-  static constexpr int64_t kControllerHz = 50;
-
- private:
-  MachineController controller_;
-  int64_t hz_;
-  int64_t step_ = -1;  // the controller's last step
-  double torque_ = 0;  // N·m
-};
+/// The controller at the rate of a loop: its steps are cycles, `hz` per second, a multiple of 50.
+/// It holds each torque for a step of the given one.
+MachineController PerCycle(MachineController controller, int64_t hz);
 
 struct LoopConfig {
   int64_t hz = 500;                 // cycles per second
@@ -63,9 +48,9 @@ struct LoopSummary {
 /// leave at the deadlines, and computing time does not blur them.
 class ControlLoop {
  public:
-  /// Everything must outlive the loop.
+  /// The references must outlive the loop.
   ControlLoop(const LoopConfig& config, MachineLink& link, Estimator& estimator,
-              Supervisor& supervisor, LoopController& controller, LogWriter& log);
+              Supervisor& supervisor, MachineController controller, LogWriter& log);
 
   /// Runs a cycle. Returns whether another one follows. Allocates no memory, unless the controller
   /// does.
@@ -85,7 +70,7 @@ class ControlLoop {
   MachineLink& link_;
   Estimator& estimator_;
   Supervisor& supervisor_;
-  LoopController& controller_;
+  MachineController controller_;  // its steps are cycles
   LogWriter& log_;
   LoopSummary summary_;
   double period_;              // s

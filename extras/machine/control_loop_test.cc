@@ -262,25 +262,24 @@ TEST(Supervisor, TakesTheReadingsOfARealMachineForMotions) {
   EXPECT_GT(rows, 50'000);
 }
 
-TEST(LoopController, KeepsThePeriodOfAPolicy) {
+TEST(PerCycle, KeepsThePeriodOfAPolicy) {
   const auto angle = [](int64_t /*step*/, const PendulumState& state) { return state.q1; };
   for (const int64_t hz : {100, 250, 400, 500, 1000}) {
-    LoopController controller(angle, hz);
+    const MachineController controller = PerCycle(angle, hz);
     const int64_t held = hz / 50;  // cycles in 20 ms
     double last = 0;
     for (int64_t cycle = 0; cycle < 10 * held; ++cycle) {
-      const double torque =
-          controller.Act(cycle, {3.1 + 1e-4 * static_cast<double>(cycle), 0, 0, 0});
+      const double torque = controller(cycle, {3.1 + 1e-4 * static_cast<double>(cycle), 0, 0, 0});
       EXPECT_EQ(torque != last, cycle % held == 0) << hz << " Hz, cycle " << cycle;
       last = torque;
     }
   }
   // After missed cycles it acts once, and then at its own times again.
-  LoopController late(angle, 500);
-  const double first = late.Act(0, {3.1, 0, 0, 0}), second = late.Act(47, {3.2, 0, 0, 0});
+  const MachineController late = PerCycle(angle, 500);
+  const double first = late(0, {3.1, 0, 0, 0}), second = late(47, {3.2, 0, 0, 0});
   EXPECT_NE(first, second);
-  EXPECT_EQ(late.Act(49, {3.1, 0, 0, 0}), second);
-  EXPECT_EQ(late.Act(50, {3.1, 0, 0, 0}), first);
+  EXPECT_EQ(late(49, {3.1, 0, 0, 0}), second);
+  EXPECT_EQ(late(50, {3.1, 0, 0, 0}), first);
 }
 
 TEST(LogRing, KeepsTheOrderAcrossThreads) {

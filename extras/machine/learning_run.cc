@@ -14,7 +14,6 @@ RunOutcome RunCycles(const LearnConfig& c, const RunRules& rules, const MachineS
                      Estimator estimator, MachineController own, MachineLink& link,
                      const std::function<bool()>& stop) {
   const int64_t hz = std::llround(c.hz);
-  LoopController controller(std::move(own), hz);
   Joints motor{c.passive_torque, c.passive_torque};
   motor[c.actuated_joint - 1] = c.limits.torque;
   Supervisor supervisor({.limits = rules.limits,
@@ -38,7 +37,7 @@ RunOutcome RunCycles(const LearnConfig& c, const RunRules& rules, const MachineS
     return stop() || (rules.is_try && (lost || summary->upright >= c.hold));
   };
   LogWriter log(rules.log);
-  ControlLoop loop(config, link, estimator, supervisor, controller, log);
+  ControlLoop loop(config, link, estimator, supervisor, std::move(own), log);
   summary = &loop.summary();
   const auto run = [&] {
     if (!link.simulated()) EnterRealTime();

@@ -27,7 +27,6 @@ struct LoopBench {
   bool differences = false;  // whether the estimator goes without the twin
   std::unique_ptr<Estimator> estimator;
   std::unique_ptr<Supervisor> supervisor;
-  std::unique_ptr<LoopController> controller;
   std::unique_ptr<LogWriter> log;
   std::unique_ptr<ControlLoop> loop;
 
@@ -41,9 +40,9 @@ struct LoopBench {
                                                       .angle_range = twin.sensors.angle_range,
                                                       .quantum = twin.sensors.quantum,
                                                       .period = period});
-    controller = std::make_unique<LoopController>(std::move(machine_controller), config.hz);
     log = std::make_unique<LogWriter>(log_path);
-    loop = std::make_unique<ControlLoop>(config, *link, *estimator, *supervisor, *controller, *log);
+    loop = std::make_unique<ControlLoop>(config, *link, *estimator, *supervisor, machine_controller,
+                                         *log);
   }
 };
 

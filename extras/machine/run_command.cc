@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "base/error.h"
 #include "base/text.h"
@@ -78,7 +79,7 @@ int Drive(const RunArguments& a, const MachinePolicy& policy, const std::optiona
   const double period = 1 / a.hz;
   // A first call of another controller touches memory that is not there yet.
   ControllerOf(policy)(0, {});
-  LoopController controller(ControllerOf(policy), hz);
+  MachineController controller = ControllerOf(policy);
   Estimator estimator = twin && !a.differences
                             ? Estimator(*twin, period)
                             : Estimator(twin ? twin->sensors : a.sensors, period);
@@ -108,7 +109,7 @@ int Drive(const RunArguments& a, const MachinePolicy& policy, const std::optiona
   }
   std::fflush(stdout);
   GuardMotors([] { g_link->SwitchOffAtOnce(); });
-  ControlLoop loop(config, link, estimator, supervisor, controller, log);
+  ControlLoop loop(config, link, estimator, supervisor, std::move(controller), log);
   loop.Run();
   log.Finish();
   PrintSummary(loop.summary(), link.counts(), supervisor, link.simulated());

@@ -28,13 +28,13 @@ std::string OtherPlant(const MachinePolicy& policy) {
 
 ControllerMaker ControllersOf(const MachinePolicy& policy) {
   return [policy, motor = MotorOf(RobotOf(*policy))]() -> CycleController {
-    const auto loop = std::make_shared<LoopController>(ControllerOf(policy), kBoardHz);
-    return [loop, motor, begin = -1.0](const CycleInput& in) mutable -> Joints {
+    return [loop = PerCycle(ControllerOf(policy), kBoardHz), motor,
+            begin = -1.0](const CycleInput& in) mutable -> Joints {
       if (begin < 0) begin = in.time;
       constexpr double kRounding = 1e-3;  // share of a step
       const auto step = static_cast<int64_t>((in.time - begin) / kBoardTimestep + kRounding);
       Joints torque{};
-      torque[motor] = loop->Act(step, {in.angle[0], in.angle[1], in.velocity[0], in.velocity[1]});
+      torque[motor] = loop(step, {in.angle[0], in.angle[1], in.velocity[0], in.velocity[1]});
       return torque;
     };
   };
