@@ -42,13 +42,9 @@ fs::path PageFolder() {
   const bool is_given = given != nullptr && *given != '\0';
   fs::path page = is_given ? fs::path(given) : SharePath() / "page";
   if (IsFile(page / "index.html")) return page;
-  throw Failure(
-      is_given ? Concat("demo: UPSWING_PAGE: expected a folder with the built page (index.html), "
-                        "got ",
-                        page.string(), "; ./upswing demo builds it")
-               : Concat("demo: expected the built page in ", page.string(),
-                        ", found none; UPSWING_PAGE names another folder, and ./upswing demo in "
-                        "the sources builds the page"));
+  throw Failure(Concat("demo: expected the built page (index.html) in ", page.string(),
+                       ", found none; UPSWING_PAGE names another folder, and ./upswing demo in "
+                       "the sources builds the page"));
 }
 
 /// Copies the content of `from` into the existing folder `to`. New folders are writable, also where

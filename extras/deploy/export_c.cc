@@ -44,12 +44,6 @@ std::vector<LayerView> LayersOf(const ExportedPolicy& policy) {
   return layers;
 }
 
-/// The C name of a layer.
-std::string CName(std::string name) {
-  for (char& c : name) c = c == '.' ? '_' : c;
-  return name;
-}
-
 /// `text` as a C prefix: small letters and digits, beginning with a letter, with _ in place of
 /// other characters between them.
 std::string AsPrefix(std::string_view text) {
@@ -108,7 +102,7 @@ void AddPlant(const Plant& plant, CParts& parts) {
 void AddLayers(const std::vector<LayerView>& layers, const std::string& prefix, CParts& parts) {
   std::string rows;
   for (const LayerView& layer : layers) {
-    const std::string name = CName(layer.name), array = Concat(prefix, '_', name);
+    const std::string name = Replaced(layer.name, ".", "_"), array = Concat(prefix, '_', name);
     const auto add = [&](const char* what, const std::string& comment, std::vector<float> values) {
       parts.constants.push_back({name + what, comment, std::move(values)});
     };

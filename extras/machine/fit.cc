@@ -182,10 +182,8 @@ class Problem {
         if (v.session == s) session.values.emplace_back(v.name, NumberIn(own, v.name));
       }
     }
-    std::vector<double> errors;
-    for (const Share& s : shares) errors.push_back(std::sqrt(s.angle.mean));
     result.windows = windows();
-    result.error = Median(errors);
+    result.error = MedianError(shares, &Share::angle);
     return result;
   }
 
@@ -257,7 +255,7 @@ class Problem {
   /// without one.
   MatrixXd NewSessionOf(const Twin& twin) const {
     const auto at = [&](int i, int j) {
-      return kNewSession * CovarianceOf(twin, values_[i].name, values_[j].name);
+      return kNewSession * machine::CovarianceOf(twin, values_[i].name, values_[j].name);
     };
     MatrixXd covariance = MatrixXd::Zero(size(), size());
     for (int i = 0; i < size(); ++i) {
@@ -372,13 +370,13 @@ class Problem {
 
   /// Sets the scales of the robust cost to the windows' median errors.
   void SetScales(const std::vector<Share>& shares) {
-    std::vector<double> errors, torque_errors;
-    for (const Share& s : shares) {
-      errors.push_back(std::sqrt(s.angle.mean));
-      torque_errors.push_back(std::sqrt(s.torque.mean));
-    }
-    scale_ = std::clamp(Median(errors), kSmallestScale, kLargestScale);
-    torque_scale_ = std::max(Median(torque_errors), kSmallestTorqueScale);
+    scale_ = std::clamp(MedianError(shares, &Share::angle), kSmallestScale, kLargestScale);
+    torque_scale_ = std::max(MedianError(shares, &Share::torque), kSmallestTorqueScale);
+  }
+  static double MedianError(const std::vector<Share>& shares, Squares Share::*kind) {
+    std::vector<double> errors;
+    for (const Share& s : shares) errors.push_back(std::sqrt((s.*kind).mean));
+    return Median(errors);
   }
 
   /// Covariance (n × n) of θ. An identification takes the sandwich estimate, right also where the

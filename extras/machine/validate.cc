@@ -38,8 +38,6 @@ Estimate OverRuns(const Strata& sessions, const std::function<double(std::span<c
   return {statistic(sessions), BootstrapInterval(sessions, statistic, kBootstraps)};
 }
 
-WindowRules RulesOf(double seconds) { return {.seconds = seconds}; }
-
 std::vector<double> ErrorsIn(const MachineLog& log, const Twin& twin,
                              std::span<const LogWindow> windows, bool reported) {
   const Drive drive = reported ? Drive::Measured(log, twin) : Drive::Commanded(log, twin);
@@ -78,7 +76,8 @@ bool HasDrive(const MachineLog& log, bool reported) {
 std::vector<LogWindow> WindowsOf(const MachineLog& log, const Twin& twin, double seconds,
                                  bool reported = false) {
   if (!HasDrive(log, reported)) return {};
-  return CutWindows(std::span(&log, 1), RulesOf(seconds), twin.plant.length1, twin.plant.length2);
+  return CutWindows(std::span(&log, 1), {.seconds = seconds}, twin.plant.length1,
+                    twin.plant.length2);
 }
 
 /// The errors of each predictor in windows of `length` seconds, the same windows for all.

@@ -10,10 +10,6 @@
 namespace upswing::realaigym {
 namespace {
 
-PendulumState StateOf(const CycleInput& in) {
-  return {in.angle[0], in.angle[1], in.velocity[0], in.velocity[1]};
-}
-
 /// Torque (N·m) of an episode's pushes about the motor's joint at a time (s).
 double PushTorque(const BoardEpisode& episode, double time) {
   double torque = 0;
@@ -87,7 +83,8 @@ void RunAll(int count, ThreadPool* pool, const Progress& progress,
 CycleController WithResets(const ControllerMaker& make, const ResetRules& rules, uint64_t seed) {
   return [make, resets = Resets(rules, seed),
           own = CycleController()](const CycleInput& in) mutable -> Joints {
-    if (const auto torque = resets.Torque(in.time, StateOf(in))) {
+    const auto& [time, q, w] = in;
+    if (const auto torque = resets.Torque(time, {q[0], q[1], w[0], w[1]})) {
       own = nullptr;
       return *torque;
     }

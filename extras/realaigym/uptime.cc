@@ -9,11 +9,6 @@ namespace {
 constexpr double kPidPeriod = 0.001;  // s; the benchmark's PID believes this, at steps of 2 ms
 constexpr int kCalmSteps = 10;        // without a violation, before a reset may end
 
-Joints Clamped(const Joints& torque) {
-  return {std::clamp(torque[0], -kBoardTorqueLimit, kBoardTorqueLimit),
-          std::clamp(torque[1], -kBoardTorqueLimit, kBoardTorqueLimit)};
-}
-
 }  // namespace
 
 Resets::Resets(const ResetRules& rules, uint64_t seed)
@@ -62,10 +57,10 @@ Joints Resets::Pid(const PendulumState& measured) {
     torque[j] =
         std::clamp(rules_.kp * error[j], -most, most) + rules_.ki * error_sum_[j] * kPidPeriod;
     if (errors_ > 2) torque[j] += rules_.kd * (error[j] - error_[j]) / kPidPeriod;
+    torque[j] = std::clamp(torque[j], -kBoardTorqueLimit, kBoardTorqueLimit) + gravity[j];
   }
   error_ = error;
-  torque = Clamped(torque);
-  return {torque[0] + gravity[0], torque[1] + gravity[1]};
+  return torque;
 }
 
 bool AboveLine(const Joints& q) {
