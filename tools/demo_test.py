@@ -220,7 +220,7 @@ class DemoTest(ProgramTest):
 
     def test_a_page_that_was_never_built(self):
         self.environment["UPSWING_PAGE"] = str(self.folder / "none")
-        self.assert_one_line(self.demo(), 1, "UPSWING_PAGE", "./upswing demo in the sources builds the page")
+        self.assert_one_line(self.demo(), 1, "UPSWING_PAGE", "builds the page")
 
     def test_a_missing_python_is_named(self):
         self.environment["UPSWING_PYTHON"] = "/none"

@@ -41,11 +41,10 @@ struct CParts {
   std::vector<CArray> samples;    // for the self-test
 };
 
-/// Samples for a C header's self-test: states one control period apart, with the policy's results.
-/// S state variables, O outputs of the network.
+/// N samples for a C header's self-test: states one control period apart, with the policy's
+/// results. S state variables, O outputs of the network.
 struct CSamples {
-  int count = 0;
-  std::vector<float> states, outputs, torques;       // (count × S), (count × O), (count)
+  std::vector<float> states, outputs, torques;       // (N × S), (N × O), (N)
   float output_tolerance = 0, torque_tolerance = 0;  // for other rounding
 };
 

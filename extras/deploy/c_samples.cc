@@ -68,7 +68,6 @@ bool IsClear(std::vector<double> outputs) {
 CSamples DrawSamples(const ExportedPolicy& policy, const std::vector<LayerView>& layers) {
   constexpr double kPi = std::numbers::pi, kVelocity = 4;  // rad/s
   CSamples samples;
-  samples.count = kSamples;
   Rng rng(0, "samples of a C header");
   const auto memory = policy.loaded->policy->Start(1);
   std::vector<float> before;  // (D)

@@ -182,7 +182,7 @@ CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
                            : squashed           ? "'s' /* the mean, squashed */"
                                                 : "'c' /* the mean, clipped */"},
                   {"STATE_SIZE", Concat(policy.state_size())},
-                  {"SAMPLES", Concat(samples.count)},
+                  {"SAMPLES", Concat(samples.torques.size())},
                   {"OUTPUT_TOLERANCE", CLiteral(samples.output_tolerance)},
                   {"TORQUE_TOLERANCE", CLiteral(samples.torque_tolerance)}};
   if (memory > 0) {

@@ -81,23 +81,19 @@ void PrintErrors(std::span<const ErrorRow> rows, std::span<const Predictor> pred
                  const char* commanded) {
   size_t width = 8;
   for (const ErrorRow& row : rows) width = std::max(width, Columns(Printable(row.session)));
-  const auto pad = [](const std::string& text, size_t columns) {
-    return text + std::string(columns - std::min(columns, Columns(text)), ' ');
-  };
-  constexpr size_t kCell = 22;
   std::string heads;
-  for (const Predictor& p : predictors) heads += pad(Printable(p.name), kCell);
+  for (const Predictor& p : predictors) heads += fmt::format("{:<22}", Printable(p.name));
   for (const bool reported : {false, true}) {
     if (std::ranges::none_of(rows, [&](const auto& r) { return r.reported == reported; })) continue;
     fmt::print("\nmedian error of the angles, rad (95% over runs), driven by {} torques\n",
                reported ? "reported" : commanded);
-    fmt::print("  {}    s runs windows  {}\n", pad("", width), heads);
+    fmt::print("  {:<{}}    s runs windows  {}\n", "", width, heads);
     for (const ErrorRow& row : rows) {
       if (row.reported != reported) continue;
       std::string cells;
-      for (const Estimate& error : row.errors) cells += pad(ErrorText(error), kCell);
-      fmt::print("  {} {:>4} {:>4} {:>7}  {}\n",
-                 pad(row.session.empty() ? "all runs" : Printable(row.session), width),
+      for (const Estimate& error : row.errors) cells += fmt::format("{:<22}", ErrorText(error));
+      fmt::print("  {:<{}} {:>4} {:>4} {:>7}  {}\n",
+                 row.session.empty() ? "all runs" : Printable(row.session), width,
                  FormatNumber(row.seconds), row.runs, row.windows, cells);
     }
   }

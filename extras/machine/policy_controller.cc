@@ -42,23 +42,6 @@ class PolicyController {
   ObservationBuilder builder_;
 };
 
-/// The plant for which a controller of a twin's machine is designed, for this robot ("": the
-/// twin's own).
-Plant DesignPlant(const Twin& twin, const std::string& robot) {
-  Plant plant = twin.plant;
-  const auto usual = static_cast<Robot>(static_cast<int>(plant.actuated_joint));
-  plant.actuated_joint = static_cast<int>(ParseRobot(robot).value_or(usual));
-  plant.coulomb1 = plant.coulomb2 = 0;
-  return plant;
-}
-
-/// Throws BadInput if a policy is for the other robot.
-void ExpectRobot(const std::string& name, Robot own, Robot asked) {
-  if (own == asked) return;
-  throw BadInput(Concat("--robot: expected ", NameOf(own), ", the robot of ", Printable(name),
-                        " (motor at joint ", static_cast<int>(own), "), got ", NameOf(asked)));
-}
-
 }  // namespace
 
 const char* NameOf(Robot robot) { return robot == Robot::kPendubot ? "pendubot" : "acrobot"; }
@@ -73,11 +56,19 @@ std::optional<Robot> ParseRobot(const std::string& name) {
 
 MachinePolicy GetMachinePolicy(PolicyArguments a, const std::string& robot,
                                const std::optional<Twin>& twin) {
-  if (twin) a.plant = DesignPlant(*twin, robot);
+  const std::optional<Robot> asked = ParseRobot(robot);
+  if (twin) {
+    a.plant = twin->plant;
+    if (asked) a.plant->actuated_joint = static_cast<int>(*asked);
+    a.plant->coulomb1 = a.plant->coulomb2 = 0;
+  }
   auto policy = std::make_shared<const LoadedPolicy>(GetPolicy(a));
   ExpectPendulum(*policy);
-  ExpectRobot(policy->name, RobotOf(*policy), ParseRobot(robot).value_or(RobotOf(*policy)));
-  return policy;
+  const Robot own = RobotOf(*policy);
+  if (own == asked.value_or(own)) return policy;
+  throw BadInput(Concat("--robot: expected ", NameOf(own), ", the robot of ",
+                        Printable(policy->name), " (motor at joint ", static_cast<int>(own),
+                        "), got ", NameOf(*asked)));
 }
 
 MachineController ControllerOf(MachinePolicy policy) {

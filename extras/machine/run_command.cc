@@ -40,16 +40,6 @@ void CheckBaud(const LinkAddress& link, int64_t hz) {
   }
 }
 
-std::unique_ptr<MachineLink> OpenLink(const RunArguments& a, const LinkAddress& address,
-                                      const std::optional<Twin>& twin, const PendulumState& start) {
-  if (address.kind != LinkAddress::Kind::kTwin) {
-    return std::make_unique<ChannelLink>(Channel::Connect(address));
-  }
-  Rng rng(static_cast<uint64_t>(a.seed), "loop: machine");
-  return std::make_unique<TwinLink>(a.draw ? DrawTwin(*twin, rng) : *twin, start,
-                                    static_cast<uint64_t>(a.seed));
-}
-
 void PrintSummary(const LoopSummary& s, const LinkCounts& counts, const Supervisor& supervisor,
                   bool simulated) {
   fmt::print("  ran      {:.2f} s, {}\n", s.driven,
@@ -98,7 +88,13 @@ int Drive(const RunArguments& a, const MachinePolicy& policy, const std::optiona
       .hz = hz, .seconds = a.seconds, .actuated_joint = joint, .compensation = a.compensation};
   config.stop = [] { return StopSignal() != 0; };
 
-  g_link = OpenLink(a, address, twin, start);
+  if (address.kind == LinkAddress::Kind::kTwin) {
+    const auto seed = static_cast<uint64_t>(a.seed);
+    Rng rng(seed, "loop: machine");
+    g_link = std::make_unique<TwinLink>(a.draw ? DrawTwin(*twin, rng) : *twin, start, seed);
+  } else {
+    g_link = std::make_unique<ChannelLink>(Channel::Connect(address));
+  }
   MachineLink& link = *g_link;
   LogWriter log(a.log);
   fmt::print("{} on {}, {} Hz, {}\n", Printable(policy->name), Printable(a.link), a.hz,

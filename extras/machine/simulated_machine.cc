@@ -60,7 +60,6 @@ SimulatedMachine::Moment SimulatedMachine::Ago(double age) const {
   if (then <= moments_.front().time) return moments_.front();
   size_t i = moments_.size() - 1;
   while (i > 0 && moments_[i - 1].time > then) --i;
-  if (i == 0) return moments_.front();
   const Moment &a = moments_[i - 1], &b = moments_[i];
   const double h = b.time - a.time, share = (then - a.time) / h;
   Moment moment{then, StateBetween(a.state, b.state, h, share), {}};

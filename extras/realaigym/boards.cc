@@ -91,14 +91,14 @@ MachineLog UptimeLog(const MachinePolicy& policy, uint64_t seed) {
                          kUptimeSeconds);
 }
 
-UptimeReport ScoreUptime(const MachinePolicy& policy, uint64_t seed, int count, ThreadPool& pool,
-                         const Progress& progress) {
-  UptimeReport report{policy, std::vector<UptimeRun>(static_cast<size_t>(count))};
+std::vector<UptimeRun> ScoreUptime(const MachinePolicy& policy, uint64_t seed, int count,
+                                   ThreadPool& pool, const Progress& progress) {
+  std::vector<UptimeRun> runs(static_cast<size_t>(count));
   RunAll(count, &pool, progress, [&](int i) {
     const auto k = static_cast<size_t>(i);
-    report.runs[k] = UptimeOf(UptimeLog(policy, seed + k));
+    runs[k] = UptimeOf(UptimeLog(policy, seed + k));
   });
-  return report;
+  return runs;
 }
 
 std::string UptimeJson(const UptimeReport& report) {

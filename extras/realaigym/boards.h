@@ -39,8 +39,8 @@ struct UptimeReport {
   Interval interval() const;  // 95%, of the mean score (normal approximation)
 };
 /// Simulates `count` runs, whose resets have seeds from `seed` on. `progress` counts them.
-UptimeReport ScoreUptime(const MachinePolicy& policy, uint64_t seed, int count, ThreadPool& pool,
-                         const Progress& progress);
+std::vector<UptimeRun> ScoreUptime(const MachinePolicy& policy, uint64_t seed, int count,
+                                   ThreadPool& pool, const Progress& progress);
 /// The first of these runs.
 MachineLog UptimeLog(const MachinePolicy& policy, uint64_t seed);
 std::string UptimeJson(const UptimeReport& report);

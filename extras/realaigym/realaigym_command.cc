@@ -181,7 +181,7 @@ void ScoreUptimes(const ScoreArguments& a, const std::optional<Twin>& twin,
           *twin, OnMachine(ControllersOf(policy), *twin, RobotOf(*policy), kHardwareResets),
           {.count = static_cast<int>(a.runs), .seed = seed}, &pool, std::ref(progress));
     } else {
-      report = ScoreUptime(policy, seed, static_cast<int>(a.runs), pool, std::ref(progress));
+      report.runs = ScoreUptime(policy, seed, static_cast<int>(a.runs), pool, std::ref(progress));
     }
   }
   if (a.as_json) {
