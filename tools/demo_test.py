@@ -203,7 +203,7 @@ class DemoTest(ProgramTest):
                                   (["--dist", "full/file"], "full/file"),
                                   (["--dist", "no/where"], "no"),
                                   (["--dist="], "--dist"),
-                                  (["--dist", "x", "--port", "1024"], "one of"),
+                                  (["--dist", "x", "--port", "1024"], "--port: expected no --dist"),
                                   (["--file", "x.html", "--dist", "x"], "one of"),
                                   (["--file", "no/where.html"], "--file", "no/where.html"),
                                   (["nothing"], "nothing"),

@@ -76,11 +76,8 @@ fs::path DistFolder(std::string dist) {
   return dist;
 }
 
-/// Mistakes in --port, --dist and --file are reported before any file is read.
+/// Mistakes in --dist and --file are reported before any file is read.
 void CheckPlace(const DemoArguments& a) {
-  if ((a.port != 0) + !a.dist.empty() + !a.file.empty() > 1) {
-    throw BadInput("demo: expected one of --port, --dist and --file, got two or more");
-  }
   if (!a.file.empty()) CheckWritable("--file", a.file);
   if (a.dist.empty()) return;
   const fs::path dist = DistFolder(a.dist);
@@ -208,6 +205,8 @@ void AddDemo(CommandLine& line) {
   line.Text(
       "--file", a.file, "FILE.html",
       "HTML file to write the page into, which a browser opens without a server or a network");
+  line.Excludes("--port", {"--dist", "--file"});
+  line.Excludes("--dist", {"--file"});
   line.Check([&a] { CheckPlace(a); });
   line.Footer(
       "At the printed address the first of the policies plays. The server listens on this machine\n"

@@ -492,9 +492,9 @@ class HeaderTest(ProgramTest):
         self.refuse(["export"], "--page, --onnx and --c", "none")
         self.refuse(["export", "--c", "x.h"], "--c", "none")
         self.refuse(["export", policy, policy, "--onnx", "x.onnx"], "--onnx", "got 2")
-        self.refuse(["export", policy, "--onnx", "a", "--c", "b"], "--onnx and --c")
+        self.refuse(["export", policy, "--onnx", "a", "--c", "b"], "--onnx: expected no --c")
         self.refuse(["export", policy, "--onnx", "a", "--prefix", "b"], "--prefix", "--c")
-        self.refuse(["export", policy, "--c", "a", "--id", "b"], "--id", "--page")
+        self.refuse(["export", policy, "--c", "a", "--id", "b"], "--id: expected no --c")
         for flags in ([policy, "--page", "p"], [policy, "--onnx", "a"]):
             self.refuse(["export", *flags, "--made-for", "mass2=2"], "controller", "--c")
         self.refuse(["export", policy, "--c", "nowhere/x.h"], "nowhere")

@@ -26,21 +26,8 @@ struct ExportArguments {
   int64_t checkpoints = 0;
 };
 
-/// Throws BadInput unless exactly one output is given.
-void CheckOne(const ExportArguments& a) {
-  std::vector<std::string> given;
-  for (const auto& [flag, value] :
-       {std::pair("--page", &a.page), {"--onnx", &a.onnx}, {"--c", &a.c}}) {
-    if (!value->empty()) given.emplace_back(flag);
-  }
-  if (given.size() == 1) return;
-  throw BadInput(Concat("export: expected one of --page, --onnx and --c, got ",
-                        given.empty() ? "none" : Join(given, " and ")));
-}
-
 /// The single policy that `flag` exports; a controller only if `flag` takes controllers.
 LoadedPolicy SinglePolicy(const ExportArguments& a, const char* flag, bool takes) {
-  if (!a.id.empty()) throw BadInput(Concat("--id: expected --page with it, got ", flag));
   if (a.policies.size() != 1) {
     throw BadInput(Concat(flag, ": expected a policy or a run folder, got ",
                           a.policies.empty() ? "none" : std::to_string(a.policies.size())));
@@ -98,7 +85,9 @@ int ExportPage(const ExportArguments& a) {
 }
 
 int RunExport(const ExportArguments& a) {
-  CheckOne(a);
+  if (a.page.empty() && a.onnx.empty() && a.c.empty()) {
+    throw BadInput("export: expected --page, --onnx or --c, got none");
+  }
   if (!a.prefix.empty() && a.c.empty()) throw BadInput("--prefix: expected --c with it, got none");
   if (a.checkpoints > 0 && a.page.empty()) {
     throw BadInput("--checkpoints: expected --page with it, got none");
@@ -134,6 +123,9 @@ void AddExport(CommandLine& line) {
             "folder of the page's agents to write into; replaces agents with the same ID");
   line.Text("--id", a.id, "ID",
             "ID of a single policy in the page (default name of the run, or agent)", "an ID");
+  line.Excludes("--page", {"--onnx", "--c"});
+  line.Excludes("--onnx", {"--c"});
+  line.Excludes("--id", {"--onnx", "--c"});
   Options own;
   own.Add(&a.checkpoints, "checkpoints", {2, 100}, "",
           "number of policies per agent in the page, from untrained to trained; trains the agent "

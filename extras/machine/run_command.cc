@@ -134,9 +134,6 @@ int RunRun(const RunArguments& a) {
     throw BadInput("--draw: expected a twin with [covariance] as --link, got none");
   if (!twin && a.compensation > 0)
     throw BadInput("--compensation: expected --twin with it, got none");
-  if (a.differences && a.compensation > 0)
-    throw BadInput(
-        "--compensation: expected no --differences with it, which estimates no friction");
   return Drive(a, GetMachinePolicy(a.policy, a.robot, twin), twin, address);
 }
 
@@ -177,6 +174,7 @@ void AddRun(CommandLine& line) {
             "estimate velocities by differences of the angles, without the twin's prediction");
   line.Flag("--draw", a.draw,
             "with a twin as --link: play a machine drawn from the twin's covariance");
+  line.Excludes("--compensation", {"--differences"}, ", which estimates no friction");
   line.Footer(
       "The loop waits for readings (idle), then for the start state (armed), then the\n"
       "controller drives (running). Afterwards, at Ctrl-C and beyond a limit it brakes until\n"

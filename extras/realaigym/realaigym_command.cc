@@ -264,11 +264,11 @@ void AddScore(CommandLine& line) {
             "CSV file to write, the first motion in the format of RealAIGym; -: standard output, "
             "without a table");
   line.Removed("--figure", "--json has the curves of the rows of robustness");
+  line.Excludes("--twin", {"--csv"});
   line.Check([&line, &a] {
     if (line.Has("--no-pushes") && (a.twin.empty() || !a.version2())) {
       throw BadInput("--no-pushes: expected --twin FILE and --score-version 2 with it");
     }
-    if (!a.twin.empty() && !a.csv.empty()) throw BadInput("--twin: expected no --csv with it");
   });
   line.Footer(
       "Version 3: runs of 60 s on RealAIGym's plant C.1 without friction, at 500 Hz, from\n"
