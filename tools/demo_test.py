@@ -204,7 +204,7 @@ class DemoTest(ProgramTest):
                                   (["--dist", "no/where"], "no"),
                                   (["--dist="], "--dist"),
                                   (["--dist", "x", "--port", "1024"], "--port: expected no --dist"),
-                                  (["--file", "x.html", "--dist", "x"], "one of"),
+                                  (["--file", "x.html", "--dist", "x"], "--dist: expected no --file"),
                                   (["--file", "no/where.html"], "--file", "no/where.html"),
                                   (["nothing"], "nothing"),
                                   (["full"], "full"),

@@ -9,8 +9,7 @@
 namespace upswing::deploy {
 namespace {
 
-/// The text of a file with its includes inserted. Leaves out tables.h, which stands for the
-/// header's beginning.
+/// The text of a file with its includes inserted.
 std::string Expanded(std::string_view name) {
   constexpr std::string_view kInclude = "#include \"";
   std::string text;
@@ -22,7 +21,7 @@ std::string Expanded(std::string_view name) {
     }
     line.remove_prefix(kInclude.size());
     line.remove_suffix(1);
-    if (line != "tables.h") text += Expanded(line);
+    text += Expanded(line);
   }
   return text.substr(0, text.find_last_not_of('\n') + 1) + '\n';
 }

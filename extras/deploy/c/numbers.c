@@ -1,5 +1,4 @@
 /* Begins every export: the status, and what an IEEE number is. */
-#include "tables.h"
 
 typedef enum {
   POLICY_OK = 0,
