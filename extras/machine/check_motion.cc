@@ -109,12 +109,10 @@ bool CheckRest(const MachineLog& piece, const Reporter& report) {
   if (rest.last < rest.first) return false;
   const auto [q1, q2] = piece.angle[rest.first];
   const double links[] = {q1, q1 + q2};
-  const auto near = [&](double from, double limit) {
-    return [=](double link) { return Distance(link, from) < limit; };
-  };
-  if (std::ranges::all_of(links, near(0, kHeld))) return false;
+  const auto hangs = [](double link) { return Distance(link, 0) < kHeld; };
+  if (std::ranges::all_of(links, hangs)) return false;
   const bool upright = std::ranges::all_of(links, [&](double link) {
-    return near(0, kHeld)(link) || near(std::numbers::pi, kUpright)(link);
+    return hangs(link) || Distance(link, std::numbers::pi) < kUpright;
   });
   const bool known = !piece.commanded.empty();
   report(
