@@ -5,7 +5,6 @@
 #include <utility>
 #include <vector>
 
-#include "agents/controllers.h"
 #include "base/error.h"
 #include "base/format.h"
 #include "base/text.h"
@@ -26,25 +25,19 @@ struct ExportArguments {
   int64_t checkpoints = 0;
 };
 
-/// The single policy that `flag` exports; a controller only if `flag` takes controllers.
-LoadedPolicy SinglePolicy(const ExportArguments& a, const char* flag, bool takes) {
+/// The single policy that `flag` exports.
+LoadedPolicy SinglePolicy(const ExportArguments& a, const char* flag) {
   if (a.policies.size() != 1) {
     throw BadInput(Concat(flag, ": expected a policy or a run folder, got ",
                           a.policies.empty() ? "none" : std::to_string(a.policies.size())));
   }
   PolicyArguments policy = a.controller;
   policy.name = a.policies.front();
-  const std::string& name = policy.name;
-  if (!takes && IsController(name) && !fs::exists(name)) {
-    throw BadInput(Concat(
-        name, ": expected a learned policy (policy.safetensors or a run folder), ",
-        "got a controller, which has no network; --c exports lqr, energy, pfl ", "and tvlqr"));
-  }
   return GetPolicy(policy);
 }
 
 int ExportOnnx(const ExportArguments& a) {
-  const LoadedPolicy loaded = SinglePolicy(a, "--onnx", false);
+  const LoadedPolicy loaded = SinglePolicy(a, "--onnx");
   const std::string model = OnnxModelOf(loaded);
   WriteOutput(a.onnx, model);
   if (!IsStandardStream(a.onnx)) {
@@ -55,7 +48,7 @@ int ExportOnnx(const ExportArguments& a) {
 }
 
 int ExportC(const ExportArguments& a) {
-  const LoadedPolicy loaded = SinglePolicy(a, "--c", true);
+  const LoadedPolicy loaded = SinglePolicy(a, "--c");
   const CHeader header = CHeaderOf(loaded, a.prefix.empty() ? CPrefixOf(a.c, loaded) : a.prefix);
   WriteOutput(a.c, header.text);
   if (IsStandardStream(a.c)) return 0;

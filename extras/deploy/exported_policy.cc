@@ -86,8 +86,9 @@ ExportedPolicy ViewForExport(const LoadedPolicy& loaded) {
                                       : PendulumTask(loaded.plant.actuated_joint, loaded.memory());
   exported.policy = dynamic_cast<const NetworkPolicy*>(loaded.policy.get());
   if (exported.policy == nullptr) {
-    throw BadInput(
-        Concat(where, ": expected a learned policy, got ", loaded.policy->description()));
+    throw BadInput(Concat(loaded.name, ": expected a learned policy, got ",
+                          loaded.policy->description(),
+                          "; --c exports lqr, energy, pfl and tvlqr"));
   }
   const NetworkPolicyParts& parts = exported.policy->parts();
   exported.limit = LargestSize(exported.is_discrete() ? parts.torques : parts.action_limit);
