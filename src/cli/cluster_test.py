@@ -70,7 +70,7 @@ class ClusterTest(ProgramTest):
     def claims(self, node):
         """Runs that a worker on a node has claimed and trained for a while."""
         return [path for path in (self.folder / "runs/little").glob("*/seed*.claim")
-                if read_if_there(path).startswith(node + "/")
+                if read_if_there(path).startswith(node + " ")
                 and (path.with_suffix("") / "checkpoint.safetensors").exists()]
 
     def tasks(self, array, node):
@@ -112,12 +112,8 @@ class ClusterTest(ProgramTest):
         self.wait_for_state(preempted, "RUNNING")
         self.assertEqual(self.cluster.job(preempted)["Restarts"], "1")
 
-        # Slurm notices the lost node, and the claims expire.
-        for task in lost:
+        for task in lost:  # Slurm notices the lost node
             self.wait_for_state(task, "PENDING")
-            self.cluster.ask("scontrol", "update", f"JobId={task}", "StartTime=now+1hour")
-        self.cluster.wait(lambda: self.count_in_status("lost") == 2, 300)
-        for task in lost:
             self.cluster.hurry(task)
 
         self.assert_done(6)
@@ -129,7 +125,7 @@ class ClusterTest(ProgramTest):
         self.cluster.ask("scancel", array)
         self.wait_for_state(f"{array}_1", "CANCELLED")
         self.cluster.wait(lambda: self.cluster.ask("squeue", "--noheader") == "")
-        self.assertEqual(self.count_in_status("lost") + self.count_in_status("running"), 0)
+        self.assertEqual(self.count_in_status("running"), 0)
         self.queue(3)
         self.assert_done(4)
 

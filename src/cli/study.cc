@@ -132,9 +132,8 @@ void AddStudy(CommandLine& line) {
       "files of a finished run to keep: all, policy (policy, settings, evaluations and log) or "
       "tables (only its rows in the study's tables) (default all, or FILE's value)",
       "all, policy or tables");
-  line.Flag(
-      "--status", arguments.status,
-      "print how many runs are done, running and lost, and exit; also takes the study's folder");
+  line.Flag("--status", arguments.status,
+            "print the number of runs in each state, and exit; also takes the study's folder");
   line.Flag("--json", arguments.as_json, "print the status as JSON");
   line.Flag("--prepare", arguments.prepare, "prepare the folder for workers, and exit");
   for (const char* flag : {"--slurm", "--tasks", "--print"}) {

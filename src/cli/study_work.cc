@@ -16,7 +16,6 @@
 #include "cli/signals.h"
 #include "cli/train_view.h"
 #include "os/file.h"
-#include "runs/lease.h"
 #include "runs/many_runs.h"
 #include "runs/run_folder.h"
 #include "runs/study_plan.h"
@@ -99,14 +98,11 @@ std::unique_ptr<TrainingRun> MakeOrResume(const SeedRun& run) {
 }
 
 /// Trains a run until its end or a stop signal, and writes the output of `train` to its log.
-/// Throws, and writes nothing more, once the claim is lost. Returns whether the training has ended.
-bool TrainLogged(const SeedRun& run, const Lease& lease) {
+/// Returns whether the training has ended.
+bool TrainLogged(const SeedRun& run) {
   const PrintedTo log(run.log());
   try {
-    return TrainAndShow(*MakeOrResume(run), [&] {
-      if (!lease.held())
-        throw Failure("another worker may have claimed the run while this one was halted");
-    });
+    return TrainAndShow(*MakeOrResume(run));
   } catch (const std::exception& error) {
     SayError(Printable(error.what()));
     throw;
@@ -124,19 +120,18 @@ struct WorkerOutcome {
 /// this host and others can do so at the same time: each claims a run before it works on it.
 ///
 /// Resumes a run that another worker left from its checkpoint. If a run fails, writes the reason
-/// next to it; no worker tries that run again until the study is started again. A run that is done
-/// twice does no harm, because its bits are the same.
+/// next to it; no worker tries that run again until the study is started again.
 class Worker {
  public:
   explicit Worker(const StudyPlan& plan) : plan_(plan) {}
 
   /// Ends when no run is left to claim, or at a stop signal. Throws Failure if several runs in a
-  /// row fail here, or if nothing can be written.
+  /// row fail here, or if nothing can be written. Throws as FileLock does.
   WorkerOutcome Run() {
     std::vector<SeedRun> runs = RunsOf(plan_);
     std::list<SeedRun*> open;
     for (SeedRun& run : runs) open.push_back(&run);
-    // Repeat while a round trains a run, because another worker may have lost a run meanwhile.
+    // Repeat while a round trains a run, because another worker may have left a run meanwhile.
     for (bool tried = true; tried && !open.empty() && !outcome_.stopped;) {
       tried = false;
       outcome_.claimed_by_others = 0;
@@ -156,20 +151,16 @@ class Worker {
   Turn Try(SeedRun& run) {
     outcome_.stopped = StopSignal() != 0;
     if (outcome_.stopped) return Turn::kNothingToDo;
-    std::optional<Lease> lease;
+    run.Refresh();
+    if (run.finished || run.HasFailed()) return Turn::kNothingToDo;
+    const FileLock claim(run.claim());
+    if (!claim.held()) return Turn::kClaimedByOthers;
     try {
-      const bool ended = run.HasFailed() || run.ReadIfFinished();
-      if (ended && !fs::exists(run.claim())) return Turn::kNothingToDo;
-      if (auto taken = Lease::Take(run.claim(), "trains it")) lease.emplace(std::move(*taken));
-      if (ended) return Turn::kNothingToDo;  // its worker died before it gave the claim back
-      if (!lease) return Turn::kClaimedByOthers;
-      // Another worker ended it meanwhile.
-      if (run.HasFailed() || run.ReadIfFinished()) return Turn::kNothingToDo;
-      Train(run, *lease);
-    } catch (const FolderBusy&) {  // a worker that lost the claim is still running there
-      return Turn::kClaimedByOthers;
+      run.Read();
+      // Another worker has ended it meanwhile.
+      if (run.finished || run.HasFailed()) return Turn::kNothingToDo;
+      Train(run);
     } catch (const std::exception& error) {
-      if (lease && !lease->held()) return Turn::kClaimedByOthers;
       CountFailure(run, error);
     }
     return Turn::kTried;
@@ -190,13 +181,11 @@ class Worker {
                          error.what()));
   }
 
-  void Train(SeedRun& run, const Lease& lease) {
-    run.Read();
-    if (!run.AtEnd() && !TrainLogged(run, lease)) {
+  void Train(const SeedRun& run) {
+    if (!run.AtEnd() && !TrainLogged(run)) {
       outcome_.stopped = true;
       return;
     }
-    if (!lease.held()) throw Failure("another worker has claimed the run");
     Finish(run, plan_.keep);
     ++outcome_.done;
     failed_in_a_row_ = 0;
@@ -224,23 +213,21 @@ int WorkOnStudy(const fs::path& folder) {
 }
 
 int PrintStudyStatus(const fs::path& folder, bool as_json) {
-  const char* const states[] = {"done",   "solved",  "running", "lost",
-                                "failed", "stopped", "waiting"};
+  const char* const states[] = {"done", "solved", "running", "failed", "stopped", "waiting"};
   const StudyPlan plan = ReadPlan(folder);
   std::map<const Variant*, std::map<std::string_view, int64_t>> counts;  // of runs, by state
   std::vector<std::string> lines;
   for (SeedRun& run : RunsOf(plan)) {
     auto& count = counts[run.variant];
     run.Refresh();
-    const auto lease = ReadLease(run.claim());
     if (run.finished) {
       ++count["done"];
       count["solved"] += run.state->solved ? 1 : 0;
-    } else if (lease) {
-      ++count[lease->lost ? "lost" : "running"];
-      lines.push_back(fmt::format("  {:<20} {:>11} steps  {} by {}, seen {} ago", run.name,
-                                  FormatCount(run.Steps()), lease->lost ? "lost" : "claimed",
-                                  Printable(lease->holder), FormatDuration(lease->seconds)));
+    } else if (FileLock::IsHeld(run.claim())) {
+      ++count["running"];
+      lines.push_back(fmt::format("  {:<20} {:>11} steps  claimed by {}", run.name,
+                                  FormatCount(run.Steps()),
+                                  Printable(Trim(ReadEnd(run.claim(), 1024)))));
     } else if (!run.problem.empty()) {
       ++count["failed"];
       lines.push_back(fmt::format("  {:<20} failed: {}", run.name, Printable(run.problem)));

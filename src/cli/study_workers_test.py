@@ -8,6 +8,7 @@ import random
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import time
 import unittest
@@ -33,7 +34,6 @@ ENDLESS = STUDY.replace("steps = 400", "steps = 1000000000")
 # UPSWING_TEST_SEEDS makes the test longer: 500 seeds are 1,000 runs.
 SEEDS = int(os.environ.get("UPSWING_TEST_SEEDS", 20))
 WORKERS = 4 if SEEDS <= 20 else 8
-FOREIGN = "elsewhere/0123abcd 17 trains it\n"
 
 
 def without_clocks(done):
@@ -109,28 +109,37 @@ class WorkersTest(ProgramTest):
                 kills += 1
         for worker in workers:
             self.assertIn(worker.wait(PATIENCE), (0, -signal.SIGKILL))
-        self.prepare(text, "study", "--keep", "tables")  # a worker may have died in between
-        self.assertFalse(list(study.rglob("*.claim")) + list(study.rglob("*.failed")))
+        self.assertFalse(list(study.rglob("*.failed")))
         self.succeed("study", "little.toml", "--out", "whole", "--keep", "tables")
         self.assert_same_study("study", "whole", range(1, SEEDS + 1))
 
-    def test_what_another_host_works_on_is_left_until_its_lease_runs_out(self):
+    def test_claims_that_no_process_holds_block_nothing(self):
         study = self.prepare()
-        claims = [study / "one/seed1.claim", study / "two/seed2.claim"]
-        for claim in claims:
-            claim.write_text(FOREIGN, encoding="utf-8")
-        os.utime(claims[1], (time.time() - 1000,) * 2)
+        for name in ("one/seed1.claim", "two/seed2.claim"):  # as 0.5.0 left them
+            self.write(f"study/{name}", "elsewhere/0123abcd 17 trains it\n")
         status = self.succeed("study", "little.toml", "--out", "study", "--status")
-        self.assertRegex(status, r"one +0 +0 +1 +0 +0 +0 +3\n")
-        self.assertRegex(status, r"two +0 +0 +0 +1 +0 +0 +3\n")
-        self.assertRegex(status, r"two/seed2 .* lost by elsewhere/0123abcd 17 trains it")
-        self.work()
-        self.assertFalse((study / "one/seed1").exists())
-        self.assertEqual(claims[0].read_text(encoding="utf-8"), FOREIGN)
-        self.assertEqual(len(list(study.rglob("*.done"))), 7)
-        os.utime(claims[0], (time.time() - 1000,) * 2)
+        self.assertRegex(status, r"one +0 +0 +0 +0 +0 +4\n")
+        self.assertNotIn("claimed", status)
         self.work()
         self.assertEqual(len(list(study.rglob("*.done"))), 8)
+        self.assertFalse(list(study.rglob("*.claim")))
+
+    def test_a_run_of_a_killed_worker_is_resumed_at_once(self):
+        study = self.prepare(ENDLESS)
+        log = study / "one/seed1/log.txt"
+
+        def begun():
+            return log.read_text(encoding="utf-8").count(" at step ") if log.exists() else 0
+        worker = self.start_worker()
+        self.wait_for(lambda: begun() == 1)
+        worker.kill()
+        worker.wait()
+        status = self.succeed("study", "study", "--status")
+        self.assertRegex(status, r"one +0 +0 +0 +0 +1 +3\n")
+        other = self.start_worker()
+        self.wait_for(lambda: begun() == 2)
+        other.terminate()
+        self.assertEqual(other.wait(PATIENCE), 75)
 
     def test_a_stopped_worker_leaves_its_run_to_be_resumed(self):
         study = self.prepare(ENDLESS)
@@ -217,17 +226,17 @@ class WorkersTest(ProgramTest):
         self.assertEqual(failed.read_text(encoding="utf-8"), "ended by signal 9\n")
         self.assertEqual(self.end(process, signal.SIGINT)[0], 130)
 
-    def test_a_halted_worker_does_not_write_next_to_another(self):
+    def test_a_halted_worker_keeps_its_claim(self):
         study = self.prepare(ENDLESS)
         worker = self.start_worker()
-        log = study / "one/seed1/log.txt"
-        self.wait_for(log.exists)
-        claim = study / "one/seed1.claim"
-        # Another worker on this host leaves the claim untouched, however old it is.
-        os.utime(claim, (time.time() - 1000,) * 2)
+        self.wait_for((study / "one/seed1/log.txt").exists)
+        worker.send_signal(signal.SIGSTOP)
         other = self.start_worker()
         self.wait_for((study / "two/seed1/log.txt").exists)
-        self.assertIsNone(worker.poll())
+        status = self.succeed("study", "study", "--status")
+        self.assertRegex(status, r"one +0 +0 +1 +0 +0 +3\n")
+        self.assertRegex(status, rf"one/seed1 .* claimed by {socket.gethostname()} {worker.pid}\n")
+        worker.send_signal(signal.SIGCONT)
         for process in (worker, other):
             process.terminate()
             self.assertEqual(process.wait(PATIENCE), 75)
@@ -235,19 +244,19 @@ class WorkersTest(ProgramTest):
 
     def test_odd_things_in_place_of_files(self):
         study = self.prepare()
-        (study / "one/seed1.claim").mkdir()
         (study / "one/seed2.failed").mkdir()
         self.write("study/one/seed2.failed/precious", "mine")
-        status = self.succeed("study", "study", "--status")
-        self.assertRegex(status, r"one/seed1 .*expected a regular file")
         (one, *_) = json.loads(self.succeed("study", "study", "--status", "--json"))["variants"]
         self.assertEqual((one["variant"], one["failed"]), ("one", 1))
-        self.work(code=1)
-        self.assertEqual(len(list(study.rglob("*.done"))), 6)
+        self.work()
+        self.assertEqual(len(list(study.rglob("*.done"))), 7)
         again = ["study", "little.toml", "--out", "study"]
-        self.assertIn("seed1.claim: expected a regular file", self.run_here(*again).stderr)
-        (study / "one/seed1.claim").rmdir()
         self.assertIn("seed2.failed", self.run_here(*again).stderr)
+        shutil.rmtree(study / "one/seed2.failed")
+        (study / "one/seed2.claim").mkdir()
+        error = "cannot write study/one/seed2.claim: Is a directory"
+        self.refuse(["study", "--work", "study"], error)
+        self.assertIn(error, self.run_here(*again).stderr)
         self.refuse(["study", "study", "--status", "--keep", "all"], "--status: expected no --keep")
 
     # ---- Kept files.

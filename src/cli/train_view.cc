@@ -216,13 +216,10 @@ class TrainView : public TrainObserver {
 
 }  // namespace
 
-bool TrainAndShow(TrainingRun& run, const std::function<void()>& check) {
+bool TrainAndShow(TrainingRun& run) {
   TrainView view(run.training());
   view.Announce(run.path());
-  const bool finished = run.Train(view, [&] {
-    check();
-    return view.Poll();
-  });
+  const bool finished = run.Train(view, [&] { return view.Poll(); });
   view.Summarize(run.path(), finished);
   return finished;
 }

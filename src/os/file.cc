@@ -16,6 +16,7 @@
 
 #include "base/error.h"
 #include "base/text.h"
+#include "os/host.h"
 
 namespace upswing {
 namespace {
@@ -35,9 +36,9 @@ bool WriteAll(int fd, std::span<const std::byte> bytes) {
 
 /// Whether an error of a system call is due to its path.
 bool IsOfPath(int error_number) {
-  constexpr std::array kOfPath{EACCES, EEXIST, EINVAL,  EISDIR,    ELOOP, ENAMETOOLONG,
-                               ENODEV, ENOENT, ENOTDIR, ENXIO,     EPERM, ENOTEMPTY,
-                               EROFS,  EBUSY,  EXDEV,   EOPNOTSUPP};
+  constexpr std::array kOfPath{EACCES, EEXIST, EINVAL,  EISDIR,     ELOOP,  ENAMETOOLONG,
+                               ENODEV, ENOENT, ENOTDIR, ENXIO,      EPERM,  ENOTEMPTY,
+                               EROFS,  EBUSY,  EXDEV,   EOPNOTSUPP, ENOLCK, ENOSYS};
   return std::ranges::find(kOfPath, error_number) != kOfPath.end();
 }
 
@@ -45,6 +46,22 @@ std::string TextOf(std::span<const std::byte> bytes) {
   std::string text(bytes.size(), '\0');
   if (!bytes.empty()) std::memcpy(text.data(), bytes.data(), bytes.size());
   return text;
+}
+
+/// A lock of a whole file for one process. Choose locks of byte ranges, because on NFS they also
+/// count on the server itself, and those of open files, because a second thread is another holder.
+struct flock WholeFile() {
+  struct flock lock {};
+  lock.l_type = F_WRLCK;
+  return lock;
+}
+
+/// Whether the open file `fd` is the one at `path`.
+bool IsAt(const fs::path& path, int fd) {
+  struct stat at_path {};
+  struct stat open {};
+  return lstat(path.c_str(), &at_path) == 0 && fstat(fd, &open) == 0 &&
+         at_path.st_dev == open.st_dev && at_path.st_ino == open.st_ino;
 }
 
 void WriteInPlace(const fs::path& path, std::string_view text) {
@@ -204,7 +221,7 @@ FolderLock::FolderLock(const fs::path& folder)
   if (descriptor_.get() < 0) throw PathError("cannot read", folder, errno);
   if (flock(descriptor_.get(), LOCK_EX | LOCK_NB) == 0) return;
   if (errno != EWOULDBLOCK) throw PathError("cannot lock", folder, errno);
-  throw FolderBusy(Concat(folder.string(), ": another process is at work here"));
+  throw BadInput(Concat(folder.string(), ": another process is at work here"));
 }
 
 AppendFile::AppendFile(fs::path path)
@@ -248,5 +265,31 @@ void AppendFile::Append(std::span<const std::byte> bytes) {
   }
   size_ += static_cast<int64_t>(bytes.size());
 }
+
+FileLock::FileLock(const fs::path& path) {
+  AppendFile file(path);
+  struct flock whole = WholeFile();
+  if (fcntl(file.descriptor(), F_OFD_SETLK, &whole) != 0) {
+    if (errno == EAGAIN || errno == EACCES) return;
+    throw PathError("cannot lock", path, errno);
+  }
+  // Between opening and locking, the holder may have removed the file.
+  if (!IsAt(path, file.descriptor())) return;
+  file.CutTo(0);
+  file.Append(Holder(getpid()));
+  file_.emplace(std::move(file));
+}
+
+FileLock::~FileLock() {
+  if (file_ && IsAt(file_->path(), file_->descriptor())) unlink(file_->path().c_str());
+}
+
+bool FileLock::IsHeld(const fs::path& path) {
+  const Descriptor fd(open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+  struct flock whole = WholeFile();
+  return fd.get() >= 0 && fcntl(fd.get(), F_OFD_GETLK, &whole) == 0 && whole.l_type != F_UNLCK;
+}
+
+std::string FileLock::Holder(int64_t pid) { return Concat(HostName(), " ", pid, "\n"); }
 
 }  // namespace upswing

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <ios>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -73,16 +74,10 @@ void MakeFolder(const std::filesystem::path& folder);
 /// Makes a folder. It may exist if it is empty. Throws as CheckFree and MakeFolder do.
 void MakeNewFolder(const std::filesystem::path& folder);
 
-/// Error: another process works in the folder.
-class FolderBusy : public Error {
- public:
-  explicit FolderBusy(const std::string& message) : Error(2, message) {}
-};
-
 /// Lock that keeps other processes from working in a folder while the object exists.
 class FolderLock {
  public:
-  /// Throws FolderBusy if another process holds the lock. Otherwise throws as PathError does.
+  /// Throws BadInput if another process holds the lock. Otherwise throws as PathError does.
   explicit FolderLock(const std::filesystem::path& folder);
 
  private:
@@ -118,6 +113,31 @@ class AppendFile {
   std::filesystem::path path_;
   Descriptor descriptor_;
   int64_t size_ = 0;
+};
+
+/// Lock on a file, by which one process reserves a piece of work that processes on many hosts
+/// share. The file contains the holder. The lock ends with the object or the process; on NFSv4,
+/// also some time after the host ends. The file of a killed process stays, but is not locked.
+class FileLock {
+ public:
+  /// Makes the file if there is none, and locks it unless another process holds the lock. Throws as
+  /// AppendFile does, and as PathError does if the file system has no locks.
+  explicit FileLock(const std::filesystem::path& path);
+  /// Removes the file, if this object holds the lock.
+  ~FileLock();
+  FileLock(const FileLock&) = delete;
+  FileLock& operator=(const FileLock&) = delete;
+
+  /// Whether this object holds the lock.
+  bool held() const { return file_.has_value(); }
+
+  /// Whether a process holds the lock of a file; false if the system cannot tell.
+  static bool IsHeld(const std::filesystem::path& path);
+  /// Content of a file that process `pid` of this host has locked: host and process.
+  static std::string Holder(int64_t pid);
+
+ private:
+  std::optional<AppendFile> file_;
 };
 
 }  // namespace upswing

@@ -13,7 +13,6 @@
 #include "os/file.h"
 #include "os/host.h"
 #include "runs/config_files.h"
-#include "runs/lease.h"
 #include "runs/run_folder.h"
 
 namespace upswing {
@@ -112,8 +111,8 @@ class LocalWorkers {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
     Look();
-    for (const SeedRun* run : running_) {      // runs of stopped workers
-      if (fs::exists(run->claim())) continue;  // the run continues on another host
+    for (const SeedRun* run : running_) {            // runs of stopped workers
+      if (FileLock::IsHeld(run->claim())) continue;  // the run continues on another host
       auto* stopped = *std::ranges::find(open_, run);
       stopped->Read();
       observer_.End(*stopped);
@@ -146,12 +145,12 @@ class LocalWorkers {
     const auto how = [code](const fs::path& log) {
       return code > 128 ? Concat("ended by signal ", code - 128) : LastLine(log);
     };
-    const std::string holder = Concat(HostAndBoot(), " ", pid, " ");
+    const std::string holder = FileLock::Holder(pid);
     for (const SeedRun* run : open_) {
-      const auto lease = ReadLease(run->claim());
-      if (!lease || !lease->holder.starts_with(holder)) continue;
+      if (ReadEnd(run->claim(), 1024) != holder) continue;
       if (++deaths_[run] < kMostDeaths) return;
-      if (Lease::Take(run->claim(), "reports its end")) run->WriteFailed(how(run->log()));
+      const FileLock claim(run->claim());
+      if (claim.held()) run->WriteFailed(how(run->log()));
       return;
     }
     if (++deaths_[nullptr] < kMostDeaths) return;  // the worker died between two runs
@@ -174,7 +173,7 @@ class LocalWorkers {
         continue;
       }
       const bool until_now = stopping_ && std::ranges::find(before, &run) != before.end();
-      if (until_now || Exists(run.claim())) {
+      if (until_now || FileLock::IsHeld(run.claim())) {
         running_.push_back(&run);
       } else {
         ++waiting_;
@@ -183,17 +182,11 @@ class LocalWorkers {
     }
   }
 
-  /// Starts workers for waiting runs and for runs that have lost their worker.
+  /// Starts workers for waiting runs.
   void StartWorkers(Clock::time_point now) {
     const auto jobs = static_cast<size_t>(many_.jobs);
     if (workers_.size() >= jobs || open_.empty() || now < start_at_) return;
-    size_t runs = waiting_;
-    for (const SeedRun* run : running_) {
-      if (runs >= jobs) break;
-      const auto lease = ReadLease(run->claim());
-      if (!lease || lease->lost) ++runs;
-    }
-    const size_t wanted = std::min(jobs - workers_.size(), runs);
+    const size_t wanted = std::min(jobs - workers_.size(), waiting_);
     for (size_t i = 0; i < wanted; ++i) {
       workers_.emplace_back(std::vector<std::string>{"study", "--work", many_.plan.folder.string()},
                             log_);
@@ -236,10 +229,7 @@ FolderLock Prepare(const ManyRuns& many, const std::function<void()>& checked) {
   checked();
   WritePlan(plan);
   if (!many.study_file.empty()) WriteIfOther(plan.folder / "study.toml", many.study_file);
-  for (const SeedRun& run : RunsOf(plan)) {
-    fs::remove(run.failed());  // so that it is tried again
-    if (fs::exists(run.claim())) (void)Lease::Take(run.claim(), "tidies up");  // if it is lost
-  }
+  for (const SeedRun& run : RunsOf(plan)) fs::remove(run.failed());  // so that it is tried again
   return lock ? std::move(*lock) : FolderLock(plan.folder);
 }
 

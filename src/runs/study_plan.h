@@ -58,7 +58,7 @@ struct SeedRun {
   bool finished = false;            // whether the file done() says that it is finished
 
   std::filesystem::path log() const { return With(".log"); }        // output of the run
-  std::filesystem::path claim() const { return With(".claim"); }    // Lease of its worker
+  std::filesystem::path claim() const { return With(".claim"); }    // FileLock of its worker
   std::filesystem::path done() const { return With(".done"); }      // its result
   std::filesystem::path failed() const { return With(".failed"); }  // failure reason, one line
   /// Whether its state is at the end. done() may not say so yet.

@@ -44,8 +44,7 @@ def watch(folder):
         for run, of_run in spans.items():
             if run in done:
                 continue
-            # The claim's first two words: host and process.
-            holder = " ".join(read(folder / f"{run}.claim").split()[:2])
+            holder = read(folder / f"{run}.claim").strip()  # host and process
             grown = size(folder / run / "metrics.csv")
             if holder and (not of_run or of_run[-1][0] != holder or of_run[-1][3] < now - 2):
                 of_run.append([holder, now, now, now])
@@ -65,7 +64,7 @@ def watch(folder):
 def draw(spans):
     """The spans as SVG: full colour while a run makes progress, pale while it is only claimed."""
     end = max([span[3] for of_run in spans.values() for span in of_run] + [1])
-    hosts = sorted({span[0].split("/")[0] for of_run in spans.values() for span in of_run})
+    hosts = sorted({span[0].split()[0] for of_run in spans.values() for span in of_run})
     colour = {host: COLOURS[i % len(COLOURS)] for i, host in enumerate(hosts)}
     height = TOP + ROW * len(spans) + 40
 
@@ -89,7 +88,7 @@ def draw(spans):
         y = TOP + ROW * row
         parts.append(f'<text x="{LEFT - 8}" y="{y + 14}" text-anchor="end">{escape(run)}</text>')
         for i, (holder, first, progress, last) in enumerate(of_run):
-            fill = colour[holder.split("/")[0]]
+            fill = colour[holder.split()[0]]
             for a, b, opacity in ((first, progress, 1), (progress, last, 0.25)):
                 if b > a:
                     parts.append(f'<rect x="{x(a):.1f}" y="{y + 3}" width="{x(b) - x(a):.1f}" '
