@@ -13,8 +13,8 @@ from pages import pages
 
 DARK = "@media (prefers-color-scheme:dark)"
 
-# Pictures drawn by the program itself, not by tools/results/figures.py: they show a user's output.
-OUTPUT = {"map.svg", "workers.svg"}
+# Drawn by the program itself, not by tools/results/figures.py: it shows a user's output.
+OUTPUT = {"map.svg"}
 
 
 def shown():
