@@ -6,12 +6,11 @@
 #include "base/text.h"
 #include "cli/commands.h"
 #include "cli/compare_report.h"
-#include "cli/many_runs_view.h"
 #include "cli/say.h"
 #include "cli/study_work.h"
+#include "cli/train_many.h"
 #include "os/file.h"
 #include "os/host.h"
-#include "runs/many_runs.h"
 #include "runs/seeds.h"
 
 namespace upswing {
@@ -104,7 +103,7 @@ int RunStudy(const StudyArguments& arguments) {
     return 0;
   }
   SayIfNoFigures();
-  const int exit_code = TrainManyAndShow(many);
+  const int exit_code = TrainMany(many);
   return exit_code != 0 ? exit_code : CompareStudy(many.plan);
 }
 

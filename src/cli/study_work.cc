@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <cstdio>
-#include <list>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -16,7 +15,6 @@
 #include "cli/signals.h"
 #include "cli/train_view.h"
 #include "os/file.h"
-#include "runs/many_runs.h"
 #include "runs/run_folder.h"
 #include "runs/study_plan.h"
 
@@ -109,13 +107,6 @@ bool TrainLogged(const SeedRun& run) {
   }
 }
 
-/// Result of a worker.
-struct WorkerOutcome {
-  int64_t done = 0, failed = 0;   // number of runs
-  int64_t claimed_by_others = 0;  // runs that other workers train
-  bool stopped = false;
-};
-
 /// Worker that trains the unfinished runs of a plan one after the other. Any number of workers on
 /// this host and others can do so at the same time: each claims a run before it works on it.
 ///
@@ -125,45 +116,49 @@ class Worker {
  public:
   explicit Worker(const StudyPlan& plan) : plan_(plan) {}
 
-  /// Ends when no run is left to claim, or at a stop signal. Throws Failure if several runs in a
-  /// row fail here, or if nothing can be written. Throws as FileLock does.
-  WorkerOutcome Run() {
+  /// Ends when no run is left to claim, or at a stop signal. Prints a line and returns the exit
+  /// code. Throws Failure if several runs in a row fail here, or if nothing can be written. Throws
+  /// as FileLock does.
+  int Run() {
     std::vector<SeedRun> runs = RunsOf(plan_);
-    std::list<SeedRun*> open;
-    for (SeedRun& run : runs) open.push_back(&run);
     // Repeat while a round trains a run, because another worker may have left a run meanwhile.
-    for (bool tried = true; tried && !open.empty() && !outcome_.stopped;) {
+    for (bool tried = true; tried && !stopped_;) {
       tried = false;
-      outcome_.claimed_by_others = 0;
-      for (auto it = open.begin(); it != open.end() && !outcome_.stopped;) {
-        const Turn turn = Try(**it);
-        tried = tried || turn == Turn::kTried;
-        if (turn == Turn::kClaimedByOthers) ++outcome_.claimed_by_others;
-        it = turn == Turn::kClaimedByOthers ? std::next(it) : open.erase(it);
+      claimed_by_others_ = 0;
+      for (SeedRun& run : runs) {
+        stopped_ = stopped_ || StopSignal() != 0;
+        if (stopped_) break;
+        tried = Try(run) || tried;
       }
     }
-    return outcome_;
+    Say("{}: this worker finished {}, {} failed{}{}\n", Printable(plan_.folder.string()), done_,
+        failed_,
+        claimed_by_others_ > 0 ? fmt::format(", {} claimed by other workers", claimed_by_others_)
+                               : "",
+        stopped_ ? ", stopped" : "");
+    if (stopped_) return kTryAgain;
+    return failed_ > 0 ? 1 : 0;
   }
 
  private:
-  enum class Turn { kNothingToDo, kClaimedByOthers, kTried };
-
-  Turn Try(SeedRun& run) {
-    outcome_.stopped = StopSignal() != 0;
-    if (outcome_.stopped) return Turn::kNothingToDo;
-    run.Refresh();
-    if (run.finished || run.HasFailed()) return Turn::kNothingToDo;
+  /// Claims and trains a run unless it has ended; returns whether it did so.
+  bool Try(SeedRun& run) {
+    if (!run.finished) run.Refresh();
+    if (run.finished || run.HasFailed()) return false;
     const FileLock claim(run.claim());
-    if (!claim.held()) return Turn::kClaimedByOthers;
+    if (!claim.held()) {
+      ++claimed_by_others_;
+      return false;
+    }
     try {
       run.Read();
       // Another worker has ended it meanwhile.
-      if (run.finished || run.HasFailed()) return Turn::kNothingToDo;
+      if (run.finished || run.HasFailed()) return false;
       Train(run);
     } catch (const std::exception& error) {
       CountFailure(run, error);
     }
-    return Turn::kTried;
+    return true;
   }
 
   /// Writes the reason of a run's failure. Throws Failure if that fails, or after several failures
@@ -175,7 +170,7 @@ class Worker {
     } catch (const Error&) {
       throw Failure(Concat(run.name, ": ", error.what()));
     }
-    ++outcome_.failed;
+    ++failed_;
     if (++failed_in_a_row_ < kMostInARow) return;
     throw Failure(Concat(kMostInARow, " runs in a row failed on this worker; last ", run.name, ": ",
                          error.what()));
@@ -183,17 +178,19 @@ class Worker {
 
   void Train(const SeedRun& run) {
     if (!run.AtEnd() && !TrainLogged(run)) {
-      outcome_.stopped = true;
+      stopped_ = true;
       return;
     }
     Finish(run, plan_.keep);
-    ++outcome_.done;
+    ++done_;
     failed_in_a_row_ = 0;
   }
 
   const StudyPlan& plan_;
-  WorkerOutcome outcome_;
+  int64_t done_ = 0, failed_ = 0;  // number of runs
+  int64_t claimed_by_others_ = 0;  // runs that other workers train
   int failed_in_a_row_ = 0;
+  bool stopped_ = false;
 };
 
 }  // namespace
@@ -201,15 +198,7 @@ class Worker {
 int WorkOnStudy(const fs::path& folder) {
   InstallSignalHandlers(kStoppingTraining);
   const StudyPlan plan = ReadPlan(folder);
-  const WorkerOutcome outcome = Worker(plan).Run();
-  Say("{}: this worker finished {}, {} failed{}{}\n", Printable(folder.string()), outcome.done,
-      outcome.failed,
-      outcome.claimed_by_others > 0
-          ? fmt::format(", {} claimed by other workers", outcome.claimed_by_others)
-          : "",
-      outcome.stopped ? ", stopped" : "");
-  if (outcome.stopped) return kTryAgain;
-  return outcome.failed > 0 ? 1 : 0;
+  return Worker(plan).Run();
 }
 
 int PrintStudyStatus(const fs::path& folder, bool as_json) {

@@ -11,13 +11,12 @@
 #include "base/text.h"
 #include "cli/commands.h"
 #include "cli/compare_report.h"
-#include "cli/many_runs_view.h"
 #include "cli/signals.h"
+#include "cli/train_many.h"
 #include "cli/train_view.h"
 #include "os/host.h"
 #include "os/streams.h"
 #include "runs/config_files.h"
-#include "runs/many_runs.h"
 #include "runs/seeds.h"
 #include "runs/training_run.h"
 
@@ -54,7 +53,7 @@ int RunSeeds(const TrainArguments& arguments) {
   many.jobs = arguments.jobs > 0 ? arguments.jobs : DefaultJobs(config.train.threads);
   many.more_steps = StepsGiven(arguments.flags);
   CheckMemory(config, AvailableMemory(), many.jobs);
-  const int exit_code = TrainManyAndShow(many);
+  const int exit_code = TrainMany(many);
   if (exit_code == 0) PrintComparison(CompareRuns(plan));
   return exit_code;
 }

@@ -45,7 +45,13 @@ bool SeedRun::HasFailed() const {
   return fs::exists(fs::symlink_status(failed(), error));
 }
 
-bool SeedRun::ReadIfFinished() {
+void SeedRun::Read() {
+  CheckNoLink(path);
+  problem.clear();
+  if (HasFailed()) {
+    problem = std::string(Trim(ReadOwnFile(failed(), 1 << 16)));
+    if (problem.empty()) problem = "failed";
+  }
   state.reset();
   const auto result = FinishedRun::Read(done());
   if (result && result->settings != settings) {
@@ -54,20 +60,9 @@ bool SeedRun::ReadIfFinished() {
   }
   if (result) state = result->state;
   finished = AtEnd();
-  if (!finished) state.reset();  // a state with fewer steps than now planned
-  return finished;
-}
-
-void SeedRun::Read() {
-  CheckNoLink(path);
-  problem.clear();
-  if (HasFailed()) {
-    problem = std::string(Trim(ReadOwnFile(failed(), 1 << 16)));
-    if (problem.empty()) problem = "failed";
-  }
-  if (!ReadIfFinished() && !IsReduced()) {
-    state = ReadTrainState(path, variant->config.Spec());
-  }
+  if (finished) return;
+  state.reset();  // a state with fewer steps than now planned
+  if (!IsReduced()) state = ReadTrainState(path, variant->config.Spec());
 }
 
 void SeedRun::Refresh() {

@@ -69,8 +69,6 @@ struct SeedRun {
   bool IsReduced() const;
   /// Steps made, from the checkpoint or the metrics, whichever is further.
   int64_t Steps() const;
-  /// Reads whether it is finished, and its final state. Throws BadInput.
-  bool ReadIfFinished();
   /// Reads state and problem. Throws BadInput.
   void Read();
   /// Reads state and problem. An error becomes the run's problem.
