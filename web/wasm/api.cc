@@ -185,7 +185,7 @@ UPSWING_EXPORT(policy_make) Controller* PolicyMake(const char* name, size_t size
   return Guarded([&] {
     const std::string called(name, size);
     auto controller = std::make_unique<Controller>(
-        LoadedPolicy{called, "", MakeController(called, {}), kDoublePendulum, Plant(), ""});
+        LoadedPolicy{called, "", MakeController(called, {}), kDoublePendulum, Plant()});
     SetText(About(*controller, PolicyMetadata(controller->loaded.policy->info())));
     return controller.release();
   });
