@@ -115,7 +115,7 @@ class Lqr(ProgramTest):
         self.assertIn("upright    from 0.00 s to the end", text)
         self.assertTrue((self.folder / "runs/plot-lqr/episode.svg").exists())
         self.succeed("plot", "lqr", "--start", "3.1,0,0,0", "--seconds", 2)
-        self.assertTrue((self.folder / "runs/plot-lqr-2/phase.png").exists())
+        self.assertTrue((self.folder / "runs/plot-lqr-2/episode.png").exists())
 
     def test_what_cannot_be_held(self):
         self.refuse(["eval", "lqr", "--made-for", LOST], "lqr: found no gain", "3.804/s",

@@ -103,7 +103,7 @@ int RunPlot(const PlotArguments& a) {
 
   MakeNewFolder(folder);
   std::vector<std::pair<std::string, Figure>> figures{
-      {"episode", EpisodeFigure(rollout, *loaded.policy)}, {"phase", PhaseFigure(rollout)}};
+      {"episode", EpisodeFigure(rollout, *loaded.policy)}};
   if (auto terms = TermsFigure(a.policy.name)) figures.emplace_back("terms", std::move(*terms));
   std::vector<std::string> files;
   for (auto& [name, figure] : figures) {
@@ -142,7 +142,7 @@ void AddPlot(CommandLine& line) {
   line.Footer(
       "episode.svg and .png show angles, velocities, energy, torque, reward terms and the\n"
       "policy's estimates over time: Q-values, or the actor's mean torque with its central\n"
-      "68% interval, and V. phase.svg and .png show velocity over angle for both joints.\n"
+      "68% interval, and V.\n"
       "Of a run folder, terms.svg and .png show the sums of the reward's terms over training.\n"
       "`simulate` writes the same episode as a table.\n\n"
       "Without --out, the figures go into plot in the run folder, or into runs/plot-NAME for\n"

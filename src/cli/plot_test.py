@@ -10,7 +10,7 @@ import xml.dom.minidom
 
 from testing import REWARD_TERMS, ProgramTest, train_once
 
-FILES = ("episode.svg", "episode.png", "phase.svg", "phase.png", "terms.svg", "terms.png")
+FILES = ("episode.svg", "episode.png", "terms.svg", "terms.png")
 
 
 class PlotTest(ProgramTest):
@@ -34,14 +34,9 @@ class PlotTest(ProgramTest):
                      "torque (N·m)", "Q-value (reward)", "greedy action", "time (s)",
                      "policy.safetensors", *(name.replace("_", " ") for name in REWARD_TERMS)):
             self.assertIn(word, episode)
-        phase, _ = self.svg(out / "phase.svg")
-        for word in ("angle of joint 1 (°)", "velocity of joint 1 (rad/s)", "angle of joint 2 (°)",
-                     "velocity of joint 2 (rad/s)", "begin", "end", "upright"):
-            self.assertIn(word, phase)
-        for name, size in (("episode", (1000, 1190)), ("phase", (1200, 540))):
-            png = (out / f"{name}.png").read_bytes()
-            self.assertEqual(png[:8], b"\x89PNG\r\n\x1a\n")
-            self.assertEqual(struct.unpack(">II", png[16:24]), size)
+        png = (out / "episode.png").read_bytes()
+        self.assertEqual(png[:8], b"\x89PNG\r\n\x1a\n")
+        self.assertEqual(struct.unpack(">II", png[16:24]), (1000, 1190))
 
     def test_figures_of_an_actor(self):
         actor = train_once(type(self), agent="sac", hidden="16,16", head=None, steps=2000)
@@ -68,7 +63,7 @@ class PlotTest(ProgramTest):
         for number in ("", "-2", "-3"):
             self.succeed("plot", self.policy, "--seconds", 0.1)
             self.addCleanup(shutil.rmtree, self.policy / f"plot{number}")
-            self.assertTrue((self.policy / f"plot{number}/phase.png").is_file())
+            self.assertTrue((self.policy / f"plot{number}/episode.png").is_file())
         # A policy file outside any run folder.
         shutil.copy(self.policy / "policy.safetensors", self.folder / "mine.safetensors")
         for number in ("", "-2"):
@@ -86,17 +81,9 @@ class PlotTest(ProgramTest):
     def test_texts_of_the_figures(self):
         self.succeed("plot", self.policy, "--seconds", 0.2, "--set", "mass2=1.3", "--delay", 0.04,
                      "--start", "3,0,0,0", "--seed", 5, "--out", "out")
-        for name in ("out/episode.svg", "out/phase.svg"):
-            text, _ = self.svg(name)
-            for words in ("start 3,0,0,0", "seed 5", "mujoco", "mass2 1.3 kg (training: 1)",
-                          "delay 0.04"):
-                self.assertIn(words, text)
-
-    def test_the_way_between_two_steps_is_no_straight_line(self):
-        self.succeed("plot", self.policy, "--seconds", 1, "--start", "0,0,4,0", "--out", "out")
-        # 50 steps have four pieces each; held torques instead have right-angled corners.
-        longest = max(self.curves("out/phase.svg"), key=len)
-        self.assertGreater(len(longest), 150)
+        text, _ = self.svg("out/episode.svg")
+        for words in ("start 3,0,0,0", "seed 5", "mujoco", "mass2 1.3 kg (training: 1)", "delay 0.04"):
+            self.assertIn(words, text)
 
     def test_held_values_are_drawn_as_steps(self):
         self.succeed("plot", self.policy, "--seconds", 4, "--start", "3.1,0.1,0,0", "--out", "out")

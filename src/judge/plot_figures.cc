@@ -14,93 +14,49 @@ using Rows = std::vector<RolloutRow>;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 // Angles wrap here, degrees: hanging and upright are well away from it.
-constexpr double kLinkLow = -135, kJointLow = -180;
-
-/// A state of the motion, at a row or between two rows.
-struct Moment {
-  double t;  // s
-  PendulumState state;
-};
-
-/// The rows, with three interpolated moments between neighbours, because the motion is curved.
-std::vector<Moment> MotionOf(const Rows& rows) {
-  constexpr int kPieces = 4;
-  std::vector<Moment> motion;
-  for (size_t i = 0; i + 1 < rows.size(); ++i) {
-    const PendulumState a = rows[i].state;
-    const PendulumState b = rows[i + 1].state;
-    const double h = rows[i + 1].t - rows[i].t;
-    for (int k = 0; k < kPieces; ++k) {
-      const double share = static_cast<double>(k) / kPieces;
-      motion.push_back({rows[i].t + share * h, StateBetween(a, b, h, share)});
-    }
-  }
-  motion.push_back({rows.back().t, rows.back().state});
-  return motion;
-}
+constexpr double kLow = -135;
 
 double Link1(const PendulumState& s) { return s.q1 * kDegrees; }
 double Link2(const PendulumState& s) { return (s.q1 + s.q2) * kDegrees; }
-double Joint2(const PendulumState& s) { return s.q2 * kDegrees; }
 
-/// An angle in degrees, wrapped into [low, low + 360).
-double Wrapped(double degrees, double low) {
-  return degrees - 360 * std::floor((degrees - low) / 360);
-}
-
-/// A curve of a quantity over an angle (degrees) that wraps within [low, low + 360). At a wrap, the
-/// curve ends at one edge and starts again at the other.
-class WrappingCurve {
- public:
-  explicit WrappingCurve(double low) : low_(low) {}
-
-  void Add(double angle, double other) {
-    const double turns = std::floor((angle - low_) / 360);
-    if (!angles.empty() && turns != last_turns_) {
-      const double edge = low_ + 360 * std::max(turns, last_turns_);
-      const double at_edge =
-          std::lerp(last_other_, other, (edge - last_angle_) / (angle - last_angle_));
-      const bool up = turns > last_turns_;
-      Push(up ? low_ + 360 : low_, at_edge);
-      Push(kNone, kNone);  // a gap
-      Push(up ? low_ : low_ + 360, at_edge);
-    }
-    Push(angle - 360 * turns, other);
-    last_angle_ = angle;
-    last_other_ = other;
-    last_turns_ = turns;
-  }
-
-  std::vector<double> angles, others;
-
- private:
-  void Push(double angle, double other) {
-    angles.push_back(angle);
-    others.push_back(other);
-  }
-  double low_, last_angle_ = 0, last_other_ = 0, last_turns_ = 0;
-};
-
-/// A curve through rows or moments.
-template <typename Samples, typename Y>
-Line OverTime(const std::string& name, const Samples& samples, Y y) {
+/// A curve through the rows.
+template <typename Y>
+Line OverTime(const std::string& name, const Rows& rows, Y y) {
   Line line;
   line.name = name;
-  for (const auto& m : samples) {
-    line.x.push_back(m.t);
-    line.y.push_back(y(m));
+  for (const RolloutRow& row : rows) {
+    line.x.push_back(row.t);
+    line.y.push_back(y(row));
   }
   return line;
 }
 
-template <typename Angle>
-Line AngleOverTime(const std::string& name, const std::vector<Moment>& motion, Angle angle) {
-  WrappingCurve curve(kLinkLow);
-  for (const Moment& m : motion) curve.Add(angle(m.state), m.t);
+/// A curve of an angle (degrees) that wraps within [kLow, kLow + 360). At a wrap, it ends at one
+/// edge and starts again at the other.
+Line AngleOverTime(const std::string& name, const Rows& rows,
+                   double (*angle_of)(const PendulumState&)) {
   Line line;
   line.name = name;
-  line.x = std::move(curve.others);
-  line.y = std::move(curve.angles);
+  double last_angle = 0, last_turns = 0;
+  const auto push = [&](double t, double angle) {
+    line.x.push_back(t);
+    line.y.push_back(angle);
+  };
+  for (size_t i = 0; i < rows.size(); ++i) {
+    const double angle = angle_of(rows[i].state), turns = std::floor((angle - kLow) / 360);
+    if (i > 0 && turns != last_turns) {
+      const double edge = kLow + 360 * std::max(turns, last_turns);
+      const double at_edge =
+          std::lerp(rows[i - 1].t, rows[i].t, (edge - last_angle) / (angle - last_angle));
+      const bool up = turns > last_turns;
+      push(at_edge, up ? kLow + 360 : kLow);
+      push(kNone, kNone);  // a gap
+      push(at_edge, up ? kLow : kLow + 360);
+    }
+    push(rows[i].t, angle - 360 * turns);
+    last_angle = angle;
+    last_turns = turns;
+  }
   return line;
 }
 
@@ -127,27 +83,28 @@ Panel PanelOf(const std::string& y_label, std::vector<Line> lines) {
   return panel;
 }
 
-Panel Angles(const std::vector<Moment>& motion) {
+Panel Angles(const Rows& rows) {
   Panel panel =
-      PanelOf("angle (°)", {AngleOverTime("link 1", motion, Link1),
-                            AngleOverTime("link 2, absolute", motion, Link2),
-                            OverTime("upright", motion, [](const Moment&) { return 180.0; })});
-  panel.y_range = {kLinkLow, kLinkLow + 360};
+      PanelOf("angle (°)",
+              {AngleOverTime("link 1", rows, Link1), AngleOverTime("link 2, absolute", rows, Link2),
+               OverTime("upright", rows, [](const RolloutRow&) { return 180.0; })});
+  panel.y_range = {kLow, kLow + 360};
   panel.y_tick = 90;
   return panel;
 }
 
-Panel Velocities(const std::vector<Moment>& motion) {
+Panel Velocities(const Rows& rows) {
   return PanelOf("velocity (rad/s)",
-                 {OverTime("joint 1", motion, [](const Moment& m) { return m.state.w1; }),
-                  OverTime("joint 2", motion, [](const Moment& m) { return m.state.w2; })});
+                 {OverTime("joint 1", rows, [](const RolloutRow& row) { return row.state.w1; }),
+                  OverTime("joint 2", rows, [](const RolloutRow& row) { return row.state.w2; })});
 }
 
-Panel Energies(const std::vector<Moment>& motion, const Plant& plant) {
+Panel Energies(const Rows& rows, const Plant& plant) {
   const double target = EnergyTarget(plant);
-  return PanelOf("energy (J)", {OverTime("energy", motion,
-                                         [&](const Moment& m) { return Energy(plant, m.state); }),
-                                OverTime("target", motion, [&](const Moment&) { return target; })});
+  const auto energy = [&](const RolloutRow& row) { return Energy(plant, row.state); };
+  return PanelOf("energy (J)",
+                 {OverTime("energy", rows, energy),
+                  OverTime("target", rows, [&](const RolloutRow&) { return target; })});
 }
 
 constexpr const char* kTorqueLabel = "torque (N·m)";
@@ -220,52 +177,14 @@ Panel QValues(const Rows& rows, std::span<const double> torques) {
   return panel;
 }
 
-/// The axes of a phase portrait.
-struct PhaseAxes {
-  const char *angle_label, *velocity_label;
-  double (*angle)(const PendulumState&);  // degrees
-  double PendulumState::*velocity;
-  double low, upright;  // wrap of the angle, and its value upright, degrees
-};
-
-Panel Portrait(const std::vector<Moment>& motion, const PhaseAxes& axes) {
-  WrappingCurve curve(axes.low);
-  for (const Moment& m : motion) curve.Add(axes.angle(m.state), m.state.*axes.velocity);
-  Panel panel = PanelOf(axes.velocity_label, {});
-  panel.x_label = axes.angle_label;
-  // The reached range of the angle, upright included, with a margin.
-  double low = axes.upright, high = axes.upright;
-  for (const double angle : curve.angles) {
-    low = std::min(low, angle);
-    high = std::max(high, angle);
-  }
-  const double margin = std::max(1.0, 0.05 * (high - low));
-  panel.x_range = {std::max(axes.low, low - margin), std::min(axes.low + 360, high + margin)};
-  if (high - low > 180) panel.x_tick = 45;
-  panel.lines.emplace_back();
-  panel.lines.back().x = std::move(curve.angles);
-  panel.lines.back().y = std::move(curve.others);
-  const auto mark = [&](const char* name, double x, double y, Marker marker) {
-    panel.lines.push_back({name, {x}, {y}, {}, {}, true, marker});
-  };
-  const auto of = [&](const char* name, const Moment& m, Marker marker) {
-    mark(name, Wrapped(axes.angle(m.state), axes.low), m.state.*axes.velocity, marker);
-  };
-  of("begin", motion.front(), Marker::kDot);
-  of("end", motion.back(), Marker::kSquare);
-  mark("upright", axes.upright, 0, Marker::kCross);
-  return panel;
-}
-
 }  // namespace
 
 Figure EpisodeFigure(const Rollout& rollout, const Policy& policy) {
   const Rows& rows = rollout.rows;
   Figure figure;
   figure.width = 1000;
-  const std::vector<Moment> motion = MotionOf(rows);
-  figure.panels = {Angles(motion), Velocities(motion), Energies(motion, rollout.plant),
-                   Torques(rows), Rewards(rows)};
+  figure.panels = {Angles(rows), Velocities(rows), Energies(rows, rollout.plant), Torques(rows),
+                   Rewards(rows)};
   constexpr int kPanelHeight = 170;
   if (rows.front().spread) figure.panels.push_back(Spread(rows));
   if (!rows.front().q.empty()) figure.panels.push_back(Values(rows));
@@ -275,19 +194,6 @@ Figure EpisodeFigure(const Rollout& rollout, const Policy& policy) {
   figure.height = kPanelHeight * static_cast<int>(figure.panels.size());
   for (Panel& panel : figure.panels) panel.x_range = {0, rows.back().t};
   figure.panels.back().x_label = "time (s)";
-  return figure;
-}
-
-Figure PhaseFigure(const Rollout& rollout) {
-  const std::vector<Moment> motion = MotionOf(rollout.rows);
-  Figure figure;
-  figure.width = 1200;
-  figure.height = 540;
-  figure.columns = 2;
-  figure.panels = {Portrait(motion, {"angle of joint 1 (°)", "velocity of joint 1 (rad/s)", Link1,
-                                     &PendulumState::w1, kLinkLow, 180}),
-                   Portrait(motion, {"angle of joint 2 (°)", "velocity of joint 2 (rad/s)", Joint2,
-                                     &PendulumState::w2, kJointLow, 0})};
   return figure;
 }
 

@@ -126,7 +126,7 @@ class PanelScript {
     Label(3, panel_.x_label, (box_.left + box_.right) / 2, bottom + 8, false);
     Label(4, panel_.y_label, box_.left - 60, (box_.bottom + box_.top) / 2, true);
     Say("unset label 5");
-    Ticks("x", panel_.x_tick);
+    Ticks("x", 0);
     Ticks("y", panel_.y_tick);
     // Show large numbers in thousands or millions, so that tick labels do not overlap.
     const double largest = LargestX();

@@ -35,7 +35,7 @@ struct Panel {
   std::vector<Line> lines;
   std::optional<HeatMap> heat_map;
   std::optional<std::pair<double, double>> x_range, y_range;  // nothing: range of the data
-  double x_tick = 0, y_tick = 0;  // distance between ticks; 0: chosen by gnuplot
+  double y_tick = 0;  // distance between ticks; 0: chosen by gnuplot
 };
 
 /// Panels with aligned axes, row by row, with `columns` panels per row.
