@@ -13,7 +13,7 @@
 #include "rl/mirror.h"
 #include "rl/testing.h"
 #include "rl/torque_levels.h"
-#include "rl/toy_env.h"
+#include "rl/toy_env_testing.h"
 
 namespace upswing {
 namespace {

@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "nn/network_policy.h"
-#include "rl/toy_env.h"
+#include "rl/toy_env_testing.h"
 
 namespace upswing {
 namespace {

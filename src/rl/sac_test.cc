@@ -10,7 +10,7 @@
 #include "base/testing.h"
 #include "nn/network_policy.h"
 #include "rl/testing.h"
-#include "rl/toy_env.h"
+#include "rl/toy_env_testing.h"
 
 namespace upswing {
 namespace {

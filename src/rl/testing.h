@@ -10,7 +10,7 @@
 #include "base/safetensors.h"
 #include "base/testing.h"
 #include "rl/agent_config.h"
-#include "rl/toy_env.h"
+#include "rl/toy_env_testing.h"
 
 /// Helpers for tests of agents.
 namespace upswing {

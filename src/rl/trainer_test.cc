@@ -9,7 +9,7 @@
 #include "base/safetensors.h"
 #include "rl/dqn.h"
 #include "rl/ppo.h"
-#include "rl/toy_env.h"
+#include "rl/toy_env_testing.h"
 
 namespace upswing {
 namespace {
