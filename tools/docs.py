@@ -226,7 +226,7 @@ def headers_of(layer):
     return {path.relative_to(root).as_posix(): path
             for root, folder in ((ROOT / "src", layer), (ROOT, f"extras/{layer}"))
             for path in sorted((root / folder).glob("*.h"))
-            if path.name != "testing.h" and not path.name.endswith("-inl.h")}
+            if not path.name.endswith(("testing.h", "-inl.h"))}
 
 
 # Parts of a header that its page shows: everything except private parts.
@@ -286,7 +286,8 @@ def for_doxygen(text):
     text = re.sub(r"^namespace upswing \{\n|^\}  // namespace upswing\n", "", text, flags=re.MULTILINE)
     # A comment after a member describes the member.
     text = re.sub(r"([;,]) +// +", r"\1  ///< ", text)
-    # Sphinx's C++ parser does not accept lambdas.
+    # Sphinx's C++ parser accepts neither a literal in several lines nor lambdas.
+    text = re.sub(r'"\n +"', "", text)
     return re.sub(r"=\s*\[\] *\{[^{}]*\}(\(\))?(?=[;,)])", "= {}", text)
 
 
