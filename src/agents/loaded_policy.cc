@@ -81,7 +81,8 @@ Plant TrainingPlant(const PolicyInfo& info, const std::string& where) {
 
 LoadedPolicy ReadPolicy(const Tensors& file) {
   const std::string& where = file.where();
-  if (file.metadata.contains("model")) {
+  if (const auto model = file.metadata.find("model");
+      model != file.metadata.end() && !model->second.empty()) {
     throw BadInput(Concat(where,
                           ": metadata \"model\": expected none, got an MJCF model of version "
                           "0.5.0; ",

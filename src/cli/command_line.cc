@@ -204,6 +204,12 @@ std::string ExplainCommands(const CLI::App& app, const std::string& got) {
   std::vector<std::string> names;
   for (const CLI::App* sub : app.get_subcommands({})) names.push_back(sub->get_name());
   const std::string where = app.get_parent() == nullptr ? "" : Concat(app.get_name(), ": ");
+  for (const auto& [removed, instead] : {std::pair("bench", "`upswing train` prints its speed"),
+                                         std::pair("bounds", "see `upswing eval mpc`")}) {
+    if (where.empty() && (got == removed || got.starts_with(Concat("\"", removed, "\"")))) {
+      return Concat(removed, ": was removed; ", instead);
+    }
+  }
   return Concat(where, "expected a command, one of ", Join(names, ", "), "; got ", got);
 }
 

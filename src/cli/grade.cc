@@ -84,7 +84,7 @@ void AddGrade(CommandLine& line) {
       "The same files give the same table on every machine. Therefore physics is the closed\n"
       "form, and kernels use no fused multiply-adds: figures may differ from those of `eval`\n"
       "in the last digits.\n\n"
-      "A link, another file, a policy of another task or model, and a file above 8 MiB are\n"
+      "A link, another file, a policy of another task, and a file above 8 MiB are\n"
       "refused, each with a line. Exit code: 0 if all are graded, 1 if some are refused,\n"
       "2 for bad usage.\n\n"
       "Examples:\n"

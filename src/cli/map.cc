@@ -14,6 +14,7 @@
 #include "judge/policy_map.h"
 #include "os/file.h"
 #include "os/host.h"
+#include "pendulum/plant.h"
 #include "runs/find_policy.h"
 
 namespace upswing {
@@ -100,6 +101,7 @@ void AddMap(CommandLine& line) {
   a.Describe(own);
   line.Arguments(own);
   line.Removed("--check", "--physics mujoco makes a map in MuJoCo");
+  line.Removed("--model", kInsteadOfModel);
   AddPlant(line, a.trial.plant);
   AddSet(line, a.trial.set, "value of a quantity on neither axis, such as gravity=9.7");
   AddPhysics(line, a.trial.physics);

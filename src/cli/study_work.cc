@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "base/error.h"
 #include "base/format.h"
@@ -117,8 +118,7 @@ class Worker {
   explicit Worker(const StudyPlan& plan) : plan_(plan) {}
 
   /// Ends when no run is left to claim, or at a stop signal. Prints a line and returns the exit
-  /// code. Throws Failure if several runs in a row fail here, or if nothing can be written. Throws
-  /// as FileLock does.
+  /// code. Throws Failure if several runs in a row fail here, or if nothing can be written.
   int Run() {
     std::vector<SeedRun> runs = RunsOf(plan_);
     // Repeat while a round trains a run, because another worker may have left a run meanwhile.
@@ -144,17 +144,23 @@ class Worker {
   /// Claims and trains a run unless it has ended; returns whether it did so.
   bool Try(SeedRun& run) {
     if (!run.finished) run.Refresh();
-    if (run.finished || run.HasFailed()) return false;
-    const FileLock claim(run.claim());
-    if (!claim.held()) {
-      ++claimed_by_others_;
-      return false;
-    }
+    const bool ended = run.finished || run.HasFailed();
+    if (ended && !Exists(run.claim())) return false;
+    std::optional<FileLock> claim;  // removes the file of a killed worker, too
     try {
+      claim.emplace(run.claim());
+      if (ended) return false;
+      if (!claim->held()) {
+        ++claimed_by_others_;
+        return false;
+      }
       run.Read();
       // Another worker has ended it meanwhile.
       if (run.finished || run.HasFailed()) return false;
       Train(run);
+    } catch (const FolderBusy&) {  // a process without a claim, such as `train --resume`
+      ++claimed_by_others_;
+      return false;
     } catch (const std::exception& error) {
       CountFailure(run, error);
     }

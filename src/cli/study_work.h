@@ -7,9 +7,9 @@ namespace upswing {
 /// Exit code of a worker that was told to stop: "try again later" in sysexits.h.
 inline constexpr int kTryAgain = 75;
 
-/// Runs a worker of the study in a folder: trains runs without another worker until none is left. A
-/// run's output goes to its log; one line about each run goes to standard output. Returns the exit
-/// code: 0, 1 if a run failed, kTryAgain if a signal stopped the worker.
+/// Runs a worker of the study in a folder: trains unclaimed runs until none is left. A run's output
+/// goes to its log, and a line about the worker to standard output. Returns the exit code: 0, 1 if
+/// a run failed, kTryAgain if a signal stopped the worker.
 int WorkOnStudy(const std::filesystem::path& folder);
 
 /// Prints the progress and the workers of the study in a folder; as JSON the progress only.

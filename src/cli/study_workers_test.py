@@ -109,7 +109,8 @@ class WorkersTest(ProgramTest):
                 kills += 1
         for worker in workers:
             self.assertIn(worker.wait(PATIENCE), (0, -signal.SIGKILL))
-        self.assertFalse(list(study.rglob("*.failed")))
+        self.work()  # a worker may have died before it removed its claim
+        self.assertFalse(list(study.rglob("*.claim")) + list(study.rglob("*.failed")))
         self.succeed("study", "little.toml", "--out", "whole", "--keep", "tables")
         self.assert_same_study("study", "whole", range(1, SEEDS + 1))
 
@@ -236,27 +237,31 @@ class WorkersTest(ProgramTest):
         status = self.succeed("study", "study", "--status")
         self.assertRegex(status, r"one +0 +0 +1 +0 +0 +3\n")
         self.assertRegex(status, rf"one/seed1 .* claimed by {socket.gethostname()} {worker.pid}\n")
+        (study / "one/seed1.claim").unlink()  # its run is still taken
+        third = self.start_worker()
+        self.wait_for((study / "one/seed2/log.txt").exists)
+        self.assertFalse(list(study.rglob("*.failed")))
         worker.send_signal(signal.SIGCONT)
-        for process in (worker, other):
+        for process in (worker, other, third):
             process.terminate()
             self.assertEqual(process.wait(PATIENCE), 75)
         self.assertFalse(list(study.rglob("*.failed")))
 
     def test_odd_things_in_place_of_files(self):
         study = self.prepare()
+        (study / "one/seed1.claim").mkdir()
         (study / "one/seed2.failed").mkdir()
         self.write("study/one/seed2.failed/precious", "mine")
         (one, *_) = json.loads(self.succeed("study", "study", "--status", "--json"))["variants"]
         self.assertEqual((one["variant"], one["failed"]), ("one", 1))
-        self.work()
-        self.assertEqual(len(list(study.rglob("*.done"))), 7)
+        self.work(code=1)
+        self.assertEqual(len(list(study.rglob("*.done"))), 6)
         again = ["study", "little.toml", "--out", "study"]
         self.assertIn("seed2.failed", self.run_here(*again).stderr)
         shutil.rmtree(study / "one/seed2.failed")
-        (study / "one/seed2.claim").mkdir()
-        error = "cannot write study/one/seed2.claim: Is a directory"
-        self.refuse(["study", "--work", "study"], error)
-        self.assertIn(error, self.run_here(*again).stderr)
+        self.assertIn("cannot write study/one/seed1.claim: Is a directory",
+                      self.run_here(*again).stderr)
+        self.assertEqual(len(list(study.rglob("*.done"))), 7)
         self.refuse(["study", "study", "--status", "--keep", "all"], "--status: expected no --keep")
 
     # ---- Kept files.

@@ -48,8 +48,8 @@ std::string TextOf(std::span<const std::byte> bytes) {
   return text;
 }
 
-/// A lock of a whole file for one process. Choose locks of byte ranges, because on NFS they also
-/// count on the server itself, and those of open files, because a second thread is another holder.
+/// A lock of a whole file. It is one of a byte range, which a process on the NFS server respects,
+/// too. It is one of an open file: a second descriptor of this process does not get it.
 struct flock WholeFile() {
   struct flock lock {};
   lock.l_type = F_WRLCK;
@@ -221,7 +221,7 @@ FolderLock::FolderLock(const fs::path& folder)
   if (descriptor_.get() < 0) throw PathError("cannot read", folder, errno);
   if (flock(descriptor_.get(), LOCK_EX | LOCK_NB) == 0) return;
   if (errno != EWOULDBLOCK) throw PathError("cannot lock", folder, errno);
-  throw BadInput(Concat(folder.string(), ": another process is at work here"));
+  throw FolderBusy(Concat(folder.string(), ": another process is at work here"));
 }
 
 AppendFile::AppendFile(fs::path path)
@@ -267,6 +267,8 @@ void AppendFile::Append(std::span<const std::byte> bytes) {
 }
 
 FileLock::FileLock(const fs::path& path) {
+  // The file of another user counts as locked.
+  if (Exists(path) && access(path.c_str(), W_OK) != 0 && errno == EACCES) return;
   AppendFile file(path);
   struct flock whole = WholeFile();
   if (fcntl(file.descriptor(), F_OFD_SETLK, &whole) != 0) {

@@ -74,10 +74,16 @@ void MakeFolder(const std::filesystem::path& folder);
 /// Makes a folder. It may exist if it is empty. Throws as CheckFree and MakeFolder do.
 void MakeNewFolder(const std::filesystem::path& folder);
 
+/// Error: another process works in the folder.
+class FolderBusy : public Error {
+ public:
+  explicit FolderBusy(const std::string& message) : Error(2, message) {}
+};
+
 /// Lock that keeps other processes from working in a folder while the object exists.
 class FolderLock {
  public:
-  /// Throws BadInput if another process holds the lock. Otherwise throws as PathError does.
+  /// Throws FolderBusy if another process holds the lock. Otherwise throws as PathError does.
   explicit FolderLock(const std::filesystem::path& folder);
 
  private:

@@ -132,19 +132,18 @@ void NoteLoads(const std::vector<RunRecord>& runs, std::vector<std::string>& not
 
 /// Adds notes on conditions that change the times and differ between runs, other than settings.
 void NoteTimes(const std::vector<RunRecord>& runs, std::vector<std::string>& notes) {
-  std::set<std::string> threads, processors, vectors;
-  std::set<int64_t> intervals;
+  std::set<std::string> processors, vectors;
+  std::set<int64_t> threads, intervals;
   for (const RunRecord& run : runs) {
     const RunConditions& c = run.conditions;
     intervals.insert(run.config.train.eval_every);
-    for (const int64_t count : c.threads) threads.insert(std::to_string(count));
+    threads.insert(c.threads.begin(), c.threads.end());
     for (const std::string& name : c.processors) processors.insert(Printable(name));
     for (const std::string& name : c.vectors) vectors.insert(Printable(name));
   }
-  const auto note = [&](std::string_view what, const std::set<std::string>& names) {
-    if (names.size() < 2) return;
-    notes.push_back(
-        Concat("times were measured ", what, ": ", Join({names.begin(), names.end()}, "; ")));
+  const auto note = [&](std::string_view what, const auto& values) {
+    if (values.size() < 2) return;
+    notes.push_back(fmt::format("times were measured {}: {}", what, fmt::join(values, "; ")));
   };
   note("with different numbers of threads", threads);
   note("on different processors", processors);

@@ -41,8 +41,8 @@ struct StudyPlan {
 };
 
 /// Parses the text of a study file: a plan without a folder; without seeds if the file has none.
-/// `keep` counts if the file has no such line. `where` is the path of the file, and the path of a
-/// model is relative to its folder. Throws BadInput with the line.
+/// `keep` counts if the file has no such line. `where` is the path of the file. Throws BadInput
+/// with the line.
 StudyPlan ParseStudy(std::string_view text, const std::string& where, Keep keep = Keep::kAll);
 
 /// A run of a plan. Its state is in files next to its folder. Any process on any host with access
@@ -85,7 +85,7 @@ struct SeedRun {
 std::vector<SeedRun> RunsOf(const StudyPlan& plan);
 
 /// Writes plan.json into the plan's folder, and the settings of each variant into
-/// VARIANT/settings.toml. Also writes the model of a variant if it is not built in.
+/// VARIANT/settings.toml.
 void WritePlan(const StudyPlan& plan);
 
 /// The plan in plan.json, without its folder and its variants' settings. Adds the SettingsMark of
