@@ -210,6 +210,45 @@ def episode():
     return fig
 
 
+@figure("post")
+def post():
+    """Success of the post's DQN and its extensions, and the values that they expect and attain."""
+    import numpy as np
+    rows, random = data_of(CSV / "post.csv"), np.random.default_rng(1)
+    fig = canvas(800, 450)
+    for k, agent in enumerate(("dqn", "double-dqn", "dueling-dqn", "d3qn")):
+        own = [row for row in rows if row["variant"] == agent]
+        steps = sorted({int(row["step"]) for row in own})
+        seeds = sorted({row["seed"] for row in own})
+        left, millions = 70 + 184 * k, [step / 1e6 for step in steps]
+        success, values = panel(fig, left, 45, 164, 140), panel(fig, left, 215, 164, 170)
+        columns = {name: np.array([[float(row[name]) for row in own if row["seed"] == seed] for seed in seeds])
+                   for name in ("success_rate", "value", "discounted_return")}
+        for axes, name, color in ((success, "success_rate", AGENTS[agent]), (values, "value", AGENTS[agent]),
+                                  (values, "discounted_return", MUTED)):
+            curves = columns[name]
+            means = curves[random.integers(len(seeds), size=(2000, len(seeds)))].mean(axis=1)
+            axes.fill_between(millions, *np.percentile(means, (2.5, 97.5), axis=0), color=color, alpha=0.25,
+                              linewidth=0)
+            axes.plot(millions, curves.mean(axis=0), color=color)
+        note(fig, left + 82, 25, agent, ha="center", color=AGENTS[agent], fontweight="bold")
+        for axes in (success, values):
+            axes.set_xlim(0, 1)
+            axes.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])
+        success.set_ylim(-0.02, 1.02)
+        success.set_yticks([0, 0.5, 1], ["0%", "50%", "100%"] if k == 0 else [""] * 3)
+        values.set_ylim(-20, 820)
+        values.set_yticks([0, 200, 400, 600, 800], None if k == 0 else [""] * 5)
+        success.tick_params(labelbottom=False)
+        if k == 0:
+            success.set_ylabel("success")
+            values.set_ylabel("value at the start")
+            fig.align_ylabels([success, values])
+    note(fig, 428, 425, "million steps", ha="center")
+    note(fig, 70, 425, "colour: expected, grey: attained", color=MUTED, fontsize=12)
+    return fig
+
+
 @figure("machine-motion")
 def machine_motion():
     """Measured angles of left-out runs, and predictions of the twin and the benchmark's own model."""

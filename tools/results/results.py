@@ -352,6 +352,15 @@ for _name in STUDIES:
     RECIPES[_name] = functools.partial(study, name=_name)
 
 
+@recipe("post")
+def the_post(lab):
+    columns, rows = study(lab, "post")
+    groups = {group["group"]: group for group in lab.json("compare", lab.folder / "post", record=False)["groups"]}
+    for row in rows:
+        row.append(f"{groups[row[0].strip('`')]['final_value_ratio']['median']:.2f}")
+    return [*columns, "expected / attained value at the end: median"], rows
+
+
 @recipe("control-decision")
 def control_decision(lab):
     """Processor time of a decision in many episodes at once, physics included."""
