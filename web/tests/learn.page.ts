@@ -457,8 +457,8 @@ test("a finger holds the slider under the chart, and the numbers match the worke
   await page.getByRole('button', { name: 'Learn', exact: true }).click();
   const scrub = page.locator('#learn-scrub');
   await expect(scrub).toBeEnabled();
-  const { x, y, width, height } = (await scrub.boundingBox())!;
-  await page.mouse.move(x + width - 2, y + height / 2); // at the newest policy
+  const { width, height } = (await scrub.boundingBox())!;
+  await scrub.hover({ position: { x: width - 2, y: height / 2 } }); // at the newest policy
   await page.mouse.down();
   const steps = async () =>
     Number((await page.locator('#learn-steps').innerText()).replaceAll(',', ''));
