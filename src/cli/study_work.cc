@@ -143,7 +143,7 @@ class Worker {
  private:
   /// Claims and trains a run unless it has ended; returns whether it did so.
   bool Try(SeedRun& run) {
-    if (!run.finished) run.Refresh();
+    if (!run.finished && Exists(run.done())) run.Refresh();
     const bool ended = run.finished || run.HasFailed();
     if (ended && !Exists(run.claim())) return false;
     std::optional<FileLock> claim;  // removes the file of a killed worker, too

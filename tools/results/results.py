@@ -328,8 +328,9 @@ def overview(lab):
 STUDIES = ("curriculum", "extensions", "ppo-parts", "reward", "sac-extensions")
 
 
-def study(lab, name):
-    """A study's variants, in the order of its file."""
+def study(lab, name, last=None):
+    """A study's variants, in the order of its file. `last` is a further column: its name, and a
+    function that returns the cell of a group."""
     file = Path("configs/studies", f"{name}.toml")
     out = lab.folder / name
     lab.run("study", file, *(["--seeds", 2] if lab.few else []), "--jobs", 1, "--out", out)
@@ -343,22 +344,17 @@ def study(lab, name):
         rows.append([f"`{variant}`", f"{group['solved']} of {len(group['runs'])}",
                      NONE if steps is None else f"{steps:,.0f}",
                      f"{value['value']:,.0f} ({low:,.0f} to {high:,.0f})",
-                     f"{once_solved['steady_seeds']} of {once_solved['seeds']}" if once_solved["seeds"] else NONE])
+                     f"{once_solved['steady_seeds']} of {once_solved['seeds']}" if once_solved["seeds"] else NONE,
+                     *([last[1](group)] if last else [])])
     return ["variant", "solved", "steps to solve: median", "return at the end: IQM (95% interval)",
-            "stayed solved"], rows
+            "stayed solved", *([last[0]] if last else [])], rows
 
 
 for _name in STUDIES:
     RECIPES[_name] = functools.partial(study, name=_name)
-
-
-@recipe("post")
-def the_post(lab):
-    columns, rows = study(lab, "post")
-    groups = {group["group"]: group for group in lab.json("compare", lab.folder / "post", record=False)["groups"]}
-    for row in rows:
-        row.append(f"{groups[row[0].strip('`')]['final_value_ratio']['median']:.2f}")
-    return [*columns, "expected / attained value at the end: median"], rows
+RECIPES["post"] = functools.partial(
+    study, name="post", last=("expected / attained value at the end: median",
+                              lambda group: f"{group['final_value_ratio']['median']:.2f}"))
 
 
 @recipe("control-decision")
