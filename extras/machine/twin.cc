@@ -1,10 +1,10 @@
 #include "extras/machine/twin.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 #include "agents/toml_settings.h"
@@ -18,46 +18,21 @@
 namespace upswing::machine {
 namespace {
 
-using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
 constexpr size_t kMostSessions = 1000;
 
-/// A factor L of the covariance L L'. Throws BadInput if the matrix is not a covariance.
-Matrix Factor(const Twin& twin, const std::string& where) {
-  const int n = static_cast<int>(twin.uncertain.size());
-  const Eigen::Map<const Matrix> covariance(twin.covariance.data(), n, n);
-  // Scaled to ones on the diagonal, so that the test does not depend on units.
-  const Eigen::VectorXd deviation = covariance.diagonal().cwiseMax(0).cwiseSqrt();
-  const auto refuse = [&](const std::string& of, const std::string& expected, double got) {
-    throw BadInput(Concat(where, ": [covariance]: ", of, ": expected ", expected, ", got ", got));
-  };
-  Matrix correlation = Matrix::Zero(n, n);
-  constexpr double kRounding = 1e-6;
-  const std::vector<std::string>& names = twin.uncertain;
-  for (int i = 0; i < n; ++i) {
-    if (covariance(i, i) < 0) refuse(names[i], "a variance of 0 or more", covariance(i, i));
+/// The rows of a factor L of the covariance L L'. Throws BadInput if the matrix is not a
+/// covariance.
+std::vector<std::vector<double>> Factor(const Twin& twin, const std::string& where) {
+  std::vector<std::vector<double>> rows;
+  for (size_t i = 0; i < twin.uncertain.size(); ++i) {
+    const double* row = &twin.covariance[i * twin.uncertain.size()];
+    const std::string place = Concat(where, ": [covariance]: ", twin.uncertain[i], ": expected ");
+    if (row[i] < 0) throw BadInput(Concat(place, "a variance of 0 or more, got ", row[i]));
+    std::optional<std::vector<double>> L = FactorRow({row, row + i + 1}, rows);
+    if (!L) throw BadInput(Concat(place, "this and the rows above to be positive semidefinite"));
+    rows.push_back(std::move(*L));
   }
-  for (int i = 0; i < n; ++i) {
-    for (int j = 0; j < n; ++j) {
-      const double scale = deviation(i) * deviation(j);
-      if (std::abs(covariance(i, j)) > (1 + kRounding) * scale) {
-        refuse(Concat(names[i], " and ", names[j]),
-               Concat("a covariance within ", scale, ", the product of their standard deviations"),
-               covariance(i, j));
-      }
-      if (scale > 0) correlation(i, j) = covariance(i, j) / scale;
-    }
-  }
-  const Eigen::LDLT<Matrix> factors(correlation);
-  const Eigen::VectorXd D = factors.vectorD();
-  if (D.minCoeff() < -kRounding) {
-    throw BadInput(Concat(where,
-                          ": [covariance]: expected a positive semidefinite matrix, got one ",
-                          "with a negative eigenvalue"));
-  }
-  Matrix L = factors.matrixL();
-  L = factors.transpositionsP().transpose() * L;
-  return deviation.asDiagonal() * L * D.cwiseMax(0).cwiseSqrt().asDiagonal();
+  return rows;
 }
 
 /// Reads the table [sessions]: for each session, a table of its values.
@@ -250,17 +225,16 @@ Twin InSession(const Twin& twin, const MachineLog& log) {
 
 Twin DrawTwin(const Twin& twin, Rng& rng) {
   Twin drawn = twin;
-  const int n = static_cast<int>(twin.uncertain.size());
-  if (n == 0) return drawn;
-  Eigen::VectorXd z(n);
-  for (double& number : z) number = rng.Normal();
-  const Eigen::VectorXd change = Factor(twin, twin.name) * z;
+  const std::vector<std::vector<double>> L = Factor(twin, twin.name);
+  std::vector<double> z;
+  for (size_t i = 0; i < L.size(); ++i) z.push_back(rng.Normal());
   const Options options = OptionsOf(drawn);
-  for (int i = 0; i < n; ++i) {
-    const Option& option = *options.Get(twin.uncertain[static_cast<size_t>(i)]);
+  for (size_t i = 0; i < L.size(); ++i) {
+    const Option& option = *options.Get(twin.uncertain[i]);
     double& value = *std::get<double*>(option.target);
+    for (size_t j = 0; j <= i; ++j) value += L[i][j] * z[j];
     const Range range = UncertainRange(option);
-    value = std::clamp(value + change(i), range.low, range.high);
+    value = std::clamp(value, range.low, range.high);
   }
   return drawn;
 }

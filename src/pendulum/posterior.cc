@@ -19,8 +19,13 @@ constexpr std::string_view kLatency = "sensor_latency";
 constexpr std::string_view kCertain[] = {"torque_limit", "actuated_joint", "rotor_inertia",
                                          "gear_ratio"};
 
-/// Row `covariance` of the Cholesky factor L, after the given rows of L; nothing if the matrix is
-/// not positive. A value without variance has a row of zeros.
+}  // namespace
+
+Range UncertainRange(const Option& option) {
+  const bool of_link = option.name.starts_with("center") || option.name.starts_with("inertia");
+  return {of_link ? kSmallestLink : option.range.low, option.range.high};
+}
+
 std::optional<std::vector<double>> FactorRow(const std::vector<double>& covariance,
                                              const std::vector<std::vector<double>>& rows) {
   std::vector<double> L(covariance.size());
@@ -40,13 +45,6 @@ std::optional<std::vector<double>> FactorRow(const std::vector<double>& covarian
   // A value that depends on others has only rounding left.
   L.back() = rest > kRounding * kRounding * variance ? std::sqrt(rest) : 0;
   return L;
-}
-
-}  // namespace
-
-Range UncertainRange(const Option& option) {
-  const bool of_link = option.name.starts_with("center") || option.name.starts_with("inertia");
-  return {of_link ? kSmallestLink : option.range.low, option.range.high};
 }
 
 bool Posterior::Knows(std::string_view name) {

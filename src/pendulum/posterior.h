@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -14,6 +15,12 @@ namespace upswing {
 /// The range of an uncertain value: that of its setting. A centre or inertia of a link stays above
 /// 0, which stands for a capsule.
 Range UncertainRange(const Option& option);
+
+/// The next row of the Cholesky factor L. `covariance`: the value's covariances with the values
+/// above, then its variance. Nothing if the matrix is not positive semidefinite. A value without
+/// variance has a row of zeros.
+std::optional<std::vector<double>> FactorRow(const std::vector<double>& covariance,
+                                             const std::vector<std::vector<double>>& rows);
 
 /// A joint normal distribution of a machine's values about the nominal ones, such as the posterior
 /// of an identification. The values are settings of the plant, and the sensors' latency.
