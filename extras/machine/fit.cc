@@ -115,6 +115,7 @@ class Problem {
          CutWindows(logs, config.windows, first.plant.length1, first.plant.length2)) {
       starts_.emplace_back(w.start.q1, w.start.q2, w.start.w1, w.start.w2);
       shots_.push_back({w, starts_.back(), session_of_[w.log]});
+      seen_.insert(session_of_[w.log]);
     }
   }
 
@@ -129,18 +130,9 @@ class Problem {
     const std::vector<Block> blocks = BlocksOf(shares);
     const double before = CostOf(shares, theta_, starts_);
     for (; damping_ < 1e6; damping_ *= 8) {
-      std::vector<Reduced> sums(sessions_.size(), {ConstantsMatrix::Zero(), Constants::Zero()});
-      for (int w = 0; w < windows(); ++w) {
-        const Reduced r = blocks[w].Eliminate(damping_);
-        sums[shots_[w].session].H += r.H;
-        sums[shots_[w].session].g += r.g;
-      }
-      MatrixXd A = prior_;
-      VectorXd b = prior_ * (theta_ - guess_);
-      for (size_t s = 0; s < sums.size(); ++s) {
-        A += slopes[s].transpose() * sums[s].H * slopes[s];
-        b += slopes[s].transpose() * sums[s].g;
-      }
+      const Evidence evidence = EvidenceOf(blocks, slopes, damping_);
+      MatrixXd A = evidence.H + prior_;
+      VectorXd b = evidence.g + prior_ * (theta_ - guess_);
       A.diagonal() *= 1 + damping_;
       A.diagonal().array() += 1e-12;
       for (int i = 0; i < size(); ++i) {
@@ -156,8 +148,8 @@ class Problem {
       std::vector<Vector4d> starts;
       for (int w = 0; w < windows(); ++w) {
         const Constants change = slopes[shots_[w].session] * (theta - theta_);
-        starts.push_back(starts_[w] -
-                         blocks[w].Inverse(damping_) * (blocks[w].gx + blocks[w].Hxc * change));
+        starts.emplace_back(starts_[w] -
+                            blocks[w].Inverse(damping_) * (blocks[w].gx + blocks[w].Hxc * change));
       }
       const double after = CostOf(SharesAt(theta, starts, false), theta, starts);
       if (!(after < before)) continue;
@@ -169,12 +161,33 @@ class Problem {
     return false;
   }
 
+  /// Expectation maximisation for the covariance between sessions (Laird and Ware, 1982), with the
+  /// normal equations at this θ. The first assumption counts as one more session, so a single one,
+  /// which shows no differences, keeps it. False if no value differs between sessions.
+  bool EstimateBetween() {
+    if (adapts_ || between_.size() == 0) return false;
+    const Evidence evidence = EvidenceOf(BlocksOf(Linearize()), Slopes(), 0);
+    for (int i = 0; i < 200; ++i) {
+      const auto [change, inverse] = Solve(evidence);
+      MatrixXd sum = FirstBetween();
+      for (const int s : seen_) {
+        const std::vector<int> own = OwnOf(s);
+        const VectorXd difference = (theta_ + change)(own);
+        sum += difference * difference.transpose() + inverse(own, own);
+      }
+      SetBetween(sum / (std::ssize(seen_) + 1.0));
+    }
+    damping_ = 1e-3;
+    return true;
+  }
+
   FitResult Result() {
     const std::vector<Share> shares = Linearize();
     FitResult result;
     result.twin = TwinAt(theta_, -1);
     Covariances(shares, result.twin);
-    for (int s = 0; s < static_cast<int>(sessions_.size()) && !adapts_; ++s) {
+    for (const int s : seen_) {
+      if (adapts_) break;
       const Twin own = TwinAt(theta_, s);
       Session& session = result.twin.sessions.emplace_back();
       session.name = sessions_[s];
@@ -235,19 +248,43 @@ class Problem {
   void SetPrior(const Twin& first) {
     prior_ = MatrixXd::Zero(size(), size());
     if (adapts_) {
-      const MatrixXd covariance = NewSessionOf(first);
-      // Scaled to ones on the diagonal, because the units differ by orders of magnitude.
-      const VectorXd scale = covariance.diagonal().cwiseSqrt().cwiseInverse();
-      const MatrixXd correlation = scale.asDiagonal() * covariance * scale.asDiagonal();
-      prior_ = scale.asDiagonal() * correlation.inverse() * scale.asDiagonal();
+      prior_ = NewSessionOf(first).inverse();
       return;
     }
     for (int i = 0; i < size(); ++i) {
-      const Value& v = values_[i];
-      const bool is_time = v.name == "delay" || v.name == "lag" || v.name == "current_delay";
-      if (v.session < 0 && !is_time) continue;
-      prior_(i, i) =
-          std::pow(v.session < 0 ? DeviationsOf(v.name).guess : SessionDeviation(v.name), -2);
+      const std::string& name = values_[i].name;
+      const bool is_time = name == "delay" || name == "lag" || name == "current_delay";
+      if (is_time && values_[i].session < 0) prior_(i, i) = std::pow(DeviationsOf(name).guess, -2);
+    }
+    SetBetween(FirstBetween());
+  }
+
+  /// Indices in θ of a session's values.
+  std::vector<int> OwnOf(int session) const {
+    std::vector<int> own;
+    for (int i = 0; i < size(); ++i) {
+      if (values_[i].session == session) own.push_back(i);
+    }
+    return own;
+  }
+
+  /// The covariance of a session's values that is assumed at first.
+  MatrixXd FirstBetween() const {
+    VectorXd deviations(std::ssize(OwnOf(0)));
+    int k = 0;
+    for (const int i : OwnOf(0)) {
+      const double known = DeviationsOf(values_[i].name).sessions;
+      deviations(k++) = known > 0 ? known : std::abs(NumberIn(twin_, values_[i].name)) / 10;
+    }
+    return deviations.cwiseAbs2().asDiagonal();
+  }
+
+  void SetBetween(const MatrixXd& covariance) {
+    between_ = covariance;
+    const MatrixXd inverse = covariance.inverse();
+    for (int s = 0; s < static_cast<int>(sessions_.size()); ++s) {
+      const std::vector<int> own = OwnOf(s);
+      prior_(own, own) = inverse;
     }
   }
 
@@ -264,14 +301,9 @@ class Problem {
       }
       const double wide = DeviationsOf(values_[i].name).guess;
       if (!(at(i, i) > 0)) covariance(i, i) = std::pow(wide > 0 ? wide : guess_(i) / 2, 2);
-      covariance(i, i) *= 1 + 1e-6;
+      covariance(i, i) *= 1 + 1e-4;  // positive in spite of rounding
     }
     return covariance;
-  }
-
-  double SessionDeviation(const std::string& name) const {
-    const double deviation = DeviationsOf(name).sessions;
-    return deviation > 0 ? deviation : std::abs(NumberIn(twin_, name)) / 10;
   }
 
   /// The twin with the values θ of a session; of the machine for -1.
@@ -379,82 +411,80 @@ class Problem {
     return Median(errors);
   }
 
-  /// Covariance (n × n) of θ. An identification takes the sandwich estimate, right also where the
-  /// residuals are not white. An adaptation has too few windows for it.
-  MatrixXd CovarianceOf(const std::vector<Share>& shares) const {
-    const std::vector<MatrixXd> slopes = Slopes();
-    const std::vector<Block> blocks = BlocksOf(shares);
-    MatrixXd A = prior_, meat = MatrixXd::Zero(size(), size());
-    // Windows overlap, so neighbours share rows: the scores of several in a row count as one.
+  /// Normal equations H θ = g of the windows, after the elimination of damped start states.
+  struct Evidence {
+    MatrixXd H;
+    VectorXd g;
+    MatrixXd scatter;  // sum of the squares of the parts of g that the blocks of windows give
+    int blocks;
+  };
+  Evidence EvidenceOf(const std::vector<Block>& blocks, const std::vector<MatrixXd>& slopes,
+                      double damping) const {
+    const MatrixXd zero = MatrixXd::Zero(size(), size());
+    Evidence e{zero, VectorXd::Zero(size()), zero, 0};
+    std::vector<ConstantsMatrix> H(sessions_.size(), ConstantsMatrix::Zero());
+    // Windows overlap, so neighbours share rows: several in a row count as one.
     constexpr int kInARow = 6;
-    int count = 0;
-    VectorXd sum = VectorXd::Zero(size());
+    VectorXd score = VectorXd::Zero(size());
     for (int w = 0; w < windows(); ++w) {
-      const Reduced r = blocks[w].Eliminate(0);
-      const MatrixXd& slope = slopes[shots_[w].session];
-      A += slope.transpose() * r.H * slope;
-      sum += slope.transpose() * r.g;
+      const Reduced r = blocks[w].Eliminate(damping);
+      H[shots_[w].session] += r.H;
+      score += slopes[shots_[w].session].transpose() * r.g;
       if (w + 1 == windows() || shots_[w + 1].window.log != shots_[w].window.log ||
           (w + 1) % kInARow == 0) {
-        meat += sum * sum.transpose();
-        sum.setZero();
-        ++count;
+        e.g += score;
+        e.scatter += score * score.transpose();
+        score.setZero();
+        ++e.blocks;
       }
     }
-    // The fit makes the scores smaller than those of the true values: MacKinnon and White (1985),
-    // HC1, with these sums as observations.
-    meat *= static_cast<double>(count) / std::max(1, count - size());
-    if (adapts_) meat = A;
+    for (size_t s = 0; s < H.size(); ++s) e.H += slopes[s].transpose() * H[s] * slopes[s];
+    return e;
+  }
+
+  /// The solution of the normal equations: the change (n) of θ, and the inverse of the matrix.
+  std::pair<VectorXd, MatrixXd> Solve(const Evidence& e) const {
+    MatrixXd A = e.H + prior_;
+    VectorXd b = e.g + prior_ * (theta_ - guess_);
+    A.diagonal().array() += 1e-12;
+    MatrixXd I = MatrixXd::Identity(size(), size());
     // A value at the limit of its range is taken as known.
     for (int i = 0; i < size(); ++i) {
       const Value& v = values_[i];
       if (theta_(i) > v.range.low && theta_(i) < v.range.high) continue;
-      Forget(i, A, meat);
-      meat.col(i).setZero();
+      Forget(i, A, b);
+      I(i, i) = 0;
     }
-    A.diagonal().array() += 1e-12;
-    const MatrixXd inverse = A.ldlt().solve(MatrixXd::Identity(size(), size()));
-    const MatrixXd covariance = inverse * meat * inverse;
-    return (covariance + covariance.transpose()) / 2;
+    const Eigen::LDLT<MatrixXd> factors(A);
+    return {-factors.solve(b), factors.solve(I)};
   }
 
   /// Sets the names and the covariance of the machine's values.
   void Covariances(const std::vector<Share>& shares, Twin& twin) const {
-    const MatrixXd covariance = CovarianceOf(shares);
+    const Evidence evidence = EvidenceOf(BlocksOf(shares), Slopes(), 0);
+    MatrixXd covariance = Solve(evidence).second;
+    if (!adapts_) {
+      // The fit makes the scores smaller than those of the true values: MacKinnon and White (1985),
+      // HC1, with blocks as observations, and without what the prior determines.
+      const double rest = evidence.blocks - (covariance * evidence.H).trace();
+      const double factor = evidence.blocks / std::max(evidence.blocks / 2.0, rest);
+      covariance = covariance * (factor * evidence.scatter + prior_) * covariance;
+    }
+    covariance = (covariance + covariance.transpose()).eval() / 2;
     std::vector<int> own;  // the entries of θ without a session
     for (int i = 0; i < size(); ++i) {
       if (values_[i].session >= 0) continue;
       own.push_back(i);
       twin.uncertain.push_back(values_[i].name);
     }
-    const int n = static_cast<int>(own.size());
-    const MatrixXd between = BetweenSessions(n);
-    for (int i = 0; i < n; ++i) {
-      for (int j = 0; j < n; ++j) {
-        twin.covariance.push_back(covariance(own[i], own[j]) + between(i, j));
-      }
+    MatrixXd total = covariance(own, own);
+    // A session's values follow the machine's in θ.
+    std::vector<int> differ;
+    for (int k = 0; k < std::ssize(own); ++k) {
+      if (own[k] + 1 < size() && values_[own[k] + 1].session >= 0) differ.push_back(k);
     }
-  }
-
-  /// Covariance (n × n) of the differences between sessions, for n values of the machine. The prior
-  /// counts as one session. So a single session, which shows no differences, gets the prior's
-  /// covariance.
-  MatrixXd BetweenSessions(int n) const {
-    MatrixXd squares = MatrixXd::Zero(n, n);
-    MatrixXd difference = MatrixXd::Zero(std::ssize(sessions_), n);
-    int column = -1;
-    for (int i = 0; i < size(); ++i) {
-      if (values_[i].session < 0) {
-        ++column;
-      } else {
-        squares(column, column) = std::pow(SessionDeviation(values_[i].name), 2);
-        difference(values_[i].session, column) = theta_(i);
-      }
-    }
-    squares += difference.transpose() * difference;
-    std::set<int> seen;  // sessions with windows; their mean takes one degree of freedom
-    for (const Shot& shot : shots_) seen.insert(shot.session);
-    return squares / std::max<double>(std::ssize(seen), 1);
+    total(differ, differ) += between_;
+    twin.covariance.assign(total.data(), total.data() + total.size());
   }
 
   std::span<const MachineLog> logs_;
@@ -467,7 +497,9 @@ class Problem {
   std::vector<Value> values_;
   VectorXd theta_, guess_;        // (n) now, and at first
   MatrixXd prior_;                // (n × n) inverse covariance about the guess; 0: none
+  MatrixXd between_;              // (k × k) covariance of a session's k values about the machine's
   std::vector<Shot> shots_;       // (windows)
+  std::set<int> seen_;            // sessions with windows
   std::vector<Vector4d> starts_;  // (windows) start states now
   double damping_ = 1e-3;
   double scale_ = kLargestScale, torque_scale_ = 1;  // rad, N·m
@@ -484,10 +516,10 @@ FitResult Fit(std::span<const MachineLog> logs, const Twin& first, const Structu
                           Counted(static_cast<int64_t>(logs.size()), "log"),
                           "; machine check finds units and rests"));
   }
-  for (int i = 0; i < config.iterations; ++i) {
-    const bool goes_on = problem.Step(config.tolerance);
-    if (progress) progress(goes_on ? i + 1 : config.iterations, config.iterations);
-    if (!goes_on) break;
+  for (int round = 0; round == 0 || (round < 3 && problem.EstimateBetween()); ++round) {
+    for (int i = 0; i < config.iterations && problem.Step(config.tolerance); ++i) {
+      if (progress) progress(i, config.iterations);
+    }
   }
   FitResult result = problem.Result();
   constexpr double kHopeless = 10;  // median error in a window, rad

@@ -207,16 +207,19 @@ std::vector<double> CovarianceOfZeros(const std::vector<double>& zeros) {
       .twin.covariance;
 }
 
-TEST(Fit, CountsThePriorAsASessionInTheCovarianceBetweenSessions) {
-  constexpr double kPrior = 0.05 * 0.05;
+/// The first assumption counts as a session. A new session differs from the mean of the known ones,
+/// which is uncertain itself.
+TEST(Fit, EstimatesTheCovarianceBetweenSessions) {
+  constexpr double kFirst = 0.05 * 0.05;
   const std::vector<double> one = CovarianceOfZeros({0.02});
-  EXPECT_NEAR(one[0], kPrior, 0.1 * kPrior);
-  EXPECT_NEAR(one[1], 0, 0.1 * kPrior);
+  EXPECT_NEAR(one[0], 2 * kFirst, 0.1 * kFirst);
+  EXPECT_NEAR(one[1], 0, 0.1 * kFirst);
   const std::vector<double> four = CovarianceOfZeros({-0.06, -0.02, 0.02, 0.06});
   constexpr double kSquares = 2 * (0.06 * 0.06 + 0.02 * 0.02);
-  EXPECT_NEAR(four[0], (kPrior + kSquares) / 4, 0.2e-3);
-  EXPECT_NEAR(four[3], (kPrior + kSquares) / 4, 0.2e-3);
-  EXPECT_NEAR(four[1], -kSquares / 4, 0.2e-3);
+  constexpr double kMean = 1.0 / 4;
+  EXPECT_NEAR(four[0], (1 + kMean) * (kFirst + kSquares) / 4, 0.1e-3);
+  EXPECT_NEAR(four[3], (1 + kMean) * (kFirst + kSquares) / 4, 0.1e-3);
+  EXPECT_NEAR(four[1], -(1 + kMean) * kSquares / 4, 0.1e-3);
 }
 
 /// Simulation, prediction and fit give the times of the motors the same meaning and sign.
