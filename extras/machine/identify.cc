@@ -63,7 +63,7 @@ void ExpectCommands(const MachineLog& log) {
 
 }  // namespace
 
-std::vector<Structure> Structures(bool has_motors) {
+std::vector<Structure> Structures(bool has_motors, bool one_body) {
   std::vector<Structure> structures;
   Structure now{"", {"center1", "inertia1", "inertia2"}};
   const auto add = [&](const char* name, const std::vector<std::string>& more) {
@@ -81,7 +81,7 @@ std::vector<Structure> Structures(bool has_motors) {
   }
   now.of_session.insert(now.of_session.end(), {"zero1", "zero2"});
   add("and zeros of each session", {"zero1", "zero2"});
-  if (!has_motors) return structures;
+  if (!has_motors || one_body) return structures;
   now.of_session.insert(now.of_session.end(),
                         {"center1", "center2", "inertia1", "inertia2", "armature"});
   add("and a body of each session", {});
@@ -91,7 +91,7 @@ std::vector<Structure> Structures(bool has_motors) {
 Identification Identify(std::span<const MachineLog> logs, const Twin& first,
                         const IdentifyConfig& config, ThreadPool* pool, const Progress& progress) {
   for (const MachineLog& log : logs) ExpectCommands(log);
-  const std::vector<Structure> structures = Structures(HasCommands(logs));
+  const std::vector<Structure> structures = Structures(HasCommands(logs), config.one_body);
   Identification result;
   const int n = static_cast<int>(logs.size());
   const double fits = 1.0 + config.folds * static_cast<double>(structures.size());

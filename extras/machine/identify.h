@@ -11,8 +11,8 @@ namespace upswing::machine {
 
 /// The structures to choose from. Each adds values to the structure before it. `has_motors`:
 /// whether the logs have torques. A motion without torques determines only ratios of masses; then
-/// the centre of link 2 stays at the first guess.
-std::vector<Structure> Structures(bool has_motors);
+/// the centre of link 2 stays at the first guess. `one_body`: all sessions have the same body.
+std::vector<Structure> Structures(bool has_motors, bool one_body);
 
 /// A structure's errors on runs that were left out.
 struct StructureError {
@@ -26,6 +26,7 @@ struct IdentifyConfig {
   // Number of folds. Each run is predicted by the twin of the other folds. 0 or 1: no
   // cross-validation; the last structure is chosen.
   int folds = 5;
+  bool one_body = false;  // all sessions share centres, inertias and armature
 };
 
 /// The result of an identification with cross-validation.

@@ -203,7 +203,8 @@ class Learner {
       const Twin guess = FirstTwin(logs_, twin_);
       if (logs_.size() == 1 || ErrorOf(guess) < ErrorOf(twin_)) twin_ = guess;
       FitConfig config{.windows = {window, window}, .iterations = 30, .tolerance = 1e-4};
-      std::vector<std::string> values = Structures(/*has_motors=*/true).back().values;
+      std::vector<std::string> values =
+          Structures(/*has_motors=*/true, /*one_body=*/false).back().values;
       values.push_back("length1");
       std::vector<MachineLog> logs = logs_;
       if (result_.tries > 0) logs.push_back(logs_.back());

@@ -35,7 +35,7 @@ struct MachineArguments {
   std::vector<std::string> against;
   int64_t folds = 5, threads = 0;
   double seconds = 1;
-  bool as_json = false;
+  bool as_json = false, one_body = false;
 };
 
 void PrintCheck(const LogCheck& check) {
@@ -302,6 +302,7 @@ int RunIdentify(const MachineArguments& a) {
       });
   IdentifyConfig config;
   config.folds = adapts ? 0 : static_cast<int>(a.folds);
+  config.one_body = a.one_body;
   config.fit.adapts = adapts;
   config.fit.windows.seconds = a.seconds;
   config.fit.windows.hop = a.seconds / 2;
@@ -386,6 +387,7 @@ void AddIdentify(CommandLine& line) {
             "plant file or shipped plant with masses, lengths and first guesses");
   line.Text("--out", a.out, "FILE", "TOML file of the twin to write");
   AddPredictions(line, a);
+  line.Flag("--one-body", a.one_body, "give all sessions the same centres, inertias and armature");
   Options own;
   own.Add(&a.folds, "folds", {0, 100}, "",
           "number of folds of the cross-validation that chooses the model; 0: none");

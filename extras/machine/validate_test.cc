@@ -154,7 +154,7 @@ TEST(Identify, PredictsLeftOutRunsOfTheRealMachine) {
     }
   }
   const Twin first = RealPlant();
-  const Structure structure = Structures(true).back();
+  const Structure structure = Structures(true, false).back();
   ThreadPool pool(2);
   std::vector<double> own, published;
   for (const int left_out : {0, 2}) {
