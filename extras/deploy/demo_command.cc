@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/text.h"
+#include "cli/command_line.h"
 #include "cli/python_child.h"
 #include "cli/signals.h"
 #include "extras/deploy/export.h"

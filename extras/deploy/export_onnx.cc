@@ -223,7 +223,7 @@ std::string AddActor(OnnxModel& model, const ExportedPolicy& policy) {
   };
   model.AddNode("log_std", "Clip", {raw, scalar("log_std.low", low), scalar("log_std.high", high)});
   const float minus_one = -1, one = 1;
-  const std::string action =
+  std::string action =
       squashed
           ? model.AddNode(UnitActionName(policy), "Tanh", {"mean"})
           : model.AddNode(UnitActionName(policy), "Clip",

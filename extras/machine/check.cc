@@ -36,7 +36,6 @@ std::vector<Cycle> CyclesOf(Pieces pieces) {
 
 std::vector<double> SortedSeconds(const std::vector<Cycle>& cycles) {
   std::vector<double> seconds;
-  seconds.reserve(cycles.size());
   for (const Cycle& cycle : cycles) seconds.push_back(cycle.seconds);
   std::ranges::sort(seconds);
   return seconds;

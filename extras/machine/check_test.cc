@@ -123,7 +123,7 @@ TEST(MachineCheck, LostCyclesAndGaps) {
 
 TEST(MachineCheck, ManyGapsGetALineTogether) {
   MachineLog log = GoodLog();
-  for (int k = 0; k < log.rows(); ++k) log.time[k] += 0.5 * (k / 200);  // 24 gaps
+  for (int k = 0; k < log.rows(); ++k) log.time[k] += k / 200 / 2.0;  // 24 gaps
   const Findings found = Check(log);
   EXPECT_EQ(std::ranges::count(found, Severity::kFault, &Finding::severity), 11);
   EXPECT_TRUE(std::ranges::count(found, "14 more gaps", &Finding::text) == 1);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <tuple>
 
+#include "base/format.h"
 #include "base/text.h"
 #include "extras/machine/check.h"
 
