@@ -261,26 +261,6 @@ Estimator Replay(const MachineLog& log, const Twin& twin,
   return estimator;
 }
 
-/// The twin is identified from these runs, too.
-TEST(Estimator, FindsTheZerosOfRealSessions) {
-  if (RealData().empty()) GTEST_SKIP() << "no measured data";
-  const Twin twin = ReadTwin("realaigym-twin", "test");
-  double estimated = 0, given = 0;  // sums of squares, rad²
-  for (const std::vector<MachineLog>& logs : RealSessions(3)) {
-    for (const MachineLog& log : logs) {
-      const MachineSensors session = InSession(twin, log).sensors;
-      const auto square = [&](const Joints& zero) {
-        const double e1 = zero[0] - session.zero1, e2 = zero[1] - session.zero2;
-        return e1 * e1 + e2 * e2;
-      };
-      Replay(log, twin,
-             [&](const Estimator& now) { estimated += square(now.zero()) / log.rows(); });
-      given += square({twin.sensors.zero1, twin.sensors.zero2});
-    }
-  }
-  EXPECT_LT(estimated, 0.8 * given);
-}
-
 /// The twin with the zeros and the friction that an estimator finds over a log.
 Twin FoundIn(const MachineLog& log, const Twin& twin) {
   const Estimator estimator = Replay(log, twin);
