@@ -49,7 +49,10 @@ export class Lesson {
   private next(): void {
     const { session, rewardScale, asked, done } = this;
     const all = session!.examples.flatMap((example) => questionOf(example, rewardScale) ?? []);
-    if (all.every(({ update }) => done.has(update))) done.clear();
+    if (all.every(({ update }) => done.has(update))) {
+      done.clear();
+      if (asked && all.length > 1) done.add(asked.update); // not again at once
+    }
     const open = all.filter(({ update }) => !done.has(update)).reverse();
     const other = open.find((question) => !asked || rises(question) !== rises(asked));
     this.asked = other ?? open[0] ?? null;
