@@ -205,7 +205,7 @@ class Learner {
       FitConfig config{.windows = {window, window}, .iterations = 30, .tolerance = 1e-4};
       std::vector<std::string> values =
           Structures(/*has_motors=*/true, /*one_body=*/false).back().values;
-      values.push_back("length1");
+      values.emplace_back("length1");
       std::vector<MachineLog> logs = logs_;
       if (result_.tries > 0) logs.push_back(logs_.back());
       const double quantum = twin_.sensors.quantum;

@@ -293,7 +293,7 @@ int MachinesOfARun() { return std::getenv("UPSWING_RUNS") != nullptr ? 200 : 4; 
 HardwareReport OnTwin(Robot robot, const std::vector<MachineLog>& real) {
   const RebuiltTvlqr law(TvlqrRuns(robot, "swingup"), robot);
   const TrialRules rules{.count = 5 * MachinesOfARun()};
-  const HardwareReport report = RunTvlqrTrials(TwinOfRobot(), robot, law, real, rules);
+  HardwareReport report = RunTvlqrTrials(TwinOfRobot(), robot, law, real, rules);
   std::printf("%s%s: %d of %d machines succeed, mean score %.3f\n", NameOf(robot),
               report.pushed ? ", pushed" : "", report.successes(), rules.count, report.mean());
   return report;
