@@ -161,15 +161,15 @@ class Problem {
     return false;
   }
 
-  /// Expectation maximisation for the covariance between sessions (Laird and Ware, 1982), with the
-  /// normal equations at this θ. The first assumption counts as one more session, so a single one,
-  /// which shows no differences, keeps it. False if no value differs between sessions.
+  /// Expectation maximisation for the covariance between sessions (Laird and Ware, 1982) at this θ.
+  /// The first assumption counts as one more session. False if no value differs between sessions.
   bool EstimateBetween() {
     if (adapts_ || between_.size() == 0) return false;
     const Evidence evidence = EvidenceOf(BlocksOf(Linearize()), Slopes(), 0);
+    const MatrixXd first = FirstBetween();
     for (int i = 0; i < 200; ++i) {
       const auto [change, inverse] = Solve(evidence);
-      MatrixXd sum = FirstBetween();
+      MatrixXd sum = first;
       for (const int s : seen_) {
         const std::vector<int> own = OwnOf(s);
         const VectorXd difference = (theta_ + change)(own);
@@ -471,18 +471,16 @@ class Problem {
       covariance = covariance * (factor * evidence.scatter + prior_) * covariance;
     }
     covariance = (covariance + covariance.transpose()).eval() / 2;
-    std::vector<int> own;  // the entries of θ without a session
+    std::vector<int> own, differ;  // the machine's entries of θ; places in it of those of sessions
     for (int i = 0; i < size(); ++i) {
       if (values_[i].session >= 0) continue;
+      // A session's values follow the machine's in θ.
+      const bool differs = i + 1 < size() && values_[i + 1].session >= 0;
+      if (differs) differ.push_back(static_cast<int>(own.size()));
       own.push_back(i);
       twin.uncertain.push_back(values_[i].name);
     }
     MatrixXd total = covariance(own, own);
-    // A session's values follow the machine's in θ.
-    std::vector<int> differ;
-    for (int k = 0; k < std::ssize(own); ++k) {
-      if (own[k] + 1 < size() && values_[own[k] + 1].session >= 0) differ.push_back(k);
-    }
     total(differ, differ) += between_;
     twin.covariance.assign(total.data(), total.data() + total.size());
   }
@@ -516,11 +514,13 @@ FitResult Fit(std::span<const MachineLog> logs, const Twin& first, const Structu
                           Counted(static_cast<int64_t>(logs.size()), "log"),
                           "; machine check finds units and rests"));
   }
-  for (int round = 0; round == 0 || (round < 3 && problem.EstimateBetween()); ++round) {
+  constexpr int kRounds = 3;
+  for (int round = 0; round == 0 || (round < kRounds && problem.EstimateBetween()); ++round) {
     for (int i = 0; i < config.iterations && problem.Step(config.tolerance); ++i) {
-      if (progress) progress(i, config.iterations);
+      if (progress) progress(round + (i + 1.0) / config.iterations, kRounds);
     }
   }
+  if (progress) progress(kRounds, kRounds);
   FitResult result = problem.Result();
   constexpr double kHopeless = 10;  // median error in a window, rad
   const bool is_finite =
