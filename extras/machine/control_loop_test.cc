@@ -258,7 +258,7 @@ TEST(Supervisor, TakesTheReadingsOfARealMachineForMotions) {
       running += supervisor.state() == LoopState::kRunning ? 1 : 0;
     }
   }
-  EXPECT_GE(running, 20);
+  EXPECT_GE(running, 23);
   EXPECT_GT(rows, 50'000);
 }
 

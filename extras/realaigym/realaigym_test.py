@@ -70,7 +70,8 @@ class RealAIGym(ProgramTest):
                   ("model", "velocity noise", "torque noise", "response", "delay", "pushes")]
         self.assertAlmostEqual(found["robustness"]["score"], sum(shares) / 6, delta=1e-12)
         # Any number of threads gives the same scores.
-        text = self.succeed("realaigym", "score", *TVLQR, "--score-version", 2, "--threads", 3)
+        self.assertEqual(self.score(*TVLQR, "--score-version", 2, "--threads", 3), found)
+        text = self.succeed("realaigym", "score", *TVLQR, "--score-version", 2)
         for word in (f"S {found['performance']['score']:.3f}", "723 simulations",
                      *(f"{100 * share:.1f}%" for share in shares)):
             self.assertIn(word, text)
