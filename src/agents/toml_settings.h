@@ -25,6 +25,6 @@ std::optional<std::string> TextOf(const toml::node& node);
 /// Sets the options in the sections of a table; if `flat`, also options outside of sections.
 /// Returns the settings that it applied. Throws BadInput with the line.
 std::vector<FlagValue> ApplyTable(const Options& options, const toml::table& table,
-                                  const std::string& where, bool alone);
+                                  const std::string& where, bool flat);
 
 }  // namespace upswing
