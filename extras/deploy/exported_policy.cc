@@ -74,10 +74,11 @@ std::vector<LayerView> ExportedPolicy::ActingLayers() const {
 }
 
 ExportedPolicy ViewForExport(const LoadedPolicy& loaded) {
-  if (loaded.identifies()) {
-    throw BadInput(Concat(loaded.path,
-                          ": expected a policy without identification of the plant, which exports "
-                          "do not contain, got one with it"));
+  for (const auto& [has, what] : {std::pair(loaded.identifies(), "identification of the plant"),
+                                  std::pair(loaded.seeks_any_pose(), "a choice of its goal")}) {
+    if (!has) continue;
+    throw BadInput(Concat(loaded.path, ": expected a policy without ", what,
+                          ", which exports do not contain, got one with it"));
   }
   const std::string where = loaded.path;
   ExportedPolicy exported;

@@ -27,6 +27,8 @@ int main(int argc, char** argv) try {
   config.plants = {loaded.plant};
   config.memory = loaded.memory();
   if (loaded.identifies()) config.identified_from = loaded.plant;
+  config.any_pose = loaded.seeks_any_pose();
+  config.goal = Pose();
   PendulumEnv env(config);
   const auto* learned = dynamic_cast<const NetworkPolicy*>(&policy);
   const bool is_actor = learned != nullptr && learned->is_actor();

@@ -20,7 +20,8 @@ class PolicyController {
         before_(obs_.size()),
         memory_(policy_->policy->Start(1)),
         builder_(1, policy_->memory(),
-                 policy_->identifies() ? std::optional(policy_->plant) : std::nullopt) {}
+                 policy_->identifies() ? std::optional(policy_->plant) : std::nullopt,
+                 policy_->seeks_any_pose()) {}
 
   double Torque(int64_t step, const PendulumState& state) {
     const Plant& plant = policy_->plant;

@@ -51,6 +51,10 @@ void Config::DescribeEnvironment(Options& o) {
   o.Add(&identify, "identify",
         "let the agent observe an estimate of the plant's constants, identified from its motion")
       .implied = true;
+  o.Add(&any_pose, "any_pose",
+        "ask each episode for one of the four poses at rest, each link up or down; the agent "
+        "observes which")
+      .implied = true;
   o.AddChoice(
       &physics, "physics", EngineNames(),
       "physics engine of the training; closed-form is faster than mujoco, with the same physics");
@@ -85,6 +89,7 @@ EnvConfig Config::Environments() const {
   env.episode_seconds = episode_seconds;
   env.memory = static_cast<int>(memory);
   if (identify) env.identified_from = plant;
+  env.any_pose = any_pose;
   env.start = {train.start_noise, random_start_share, random_start_velocity};
   env.reward = reward;
   env.seed = static_cast<uint64_t>(train.seed);

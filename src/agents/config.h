@@ -37,7 +37,7 @@ struct Config {
   std::string environment;   // description of a foreign task's environment; empty: double pendulum
   double episode_seconds = 4, random_start_share = 0.9, random_start_velocity = 5;
   int64_t memory = 0;
-  bool identify = false;
+  bool identify = false, any_pose = false;
   std::string physics = "mujoco";       // engine of the training
   std::string eval_physics{kScreened};  // engine of evaluations, or kScreened
   Plant plant;

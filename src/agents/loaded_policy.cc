@@ -8,29 +8,38 @@
 namespace upswing {
 namespace {
 
+/// Inputs of the memory.
+int RememberedInputs(const LoadedPolicy& loaded) {
+  return loaded.policy->obs_size() - kObservationSize -
+         (loaded.identifies() ? kIdentifiedSize : 0) - (loaded.seeks_any_pose() ? kGoalSize : 0);
+}
+
 /// Throws BadInput unless the policy's observations are those of this program's double pendulum.
 /// Names of observations are not compared, because they are only for people.
 void CheckObservation(const LoadedPolicy& loaded, const std::string& where) {
   const int inputs = loaded.policy->obs_size();
-  const int remembered = inputs - kObservationSize - (loaded.identifies() ? kIdentifiedSize : 0);
+  const int remembered = RememberedInputs(loaded);
   if (remembered < 0 || remembered % kMemorySize != 0 || loaded.memory() > kMostMemory) {
     throw BadInput(Concat(
         where, ": expected a policy of ", kObservationSize, " observations, ",
-        loaded.identifies() ? Concat(kIdentifiedSize, " of identification, ") : "", "and ",
-        kMemorySize, " for each of at most ", kMostMemory, " steps of memory, got ", inputs));
+        loaded.identifies() ? Concat(kIdentifiedSize, " of identification, ") : "",
+        loaded.seeks_any_pose() ? Concat(kGoalSize, " of the goal, ") : "", "and ", kMemorySize,
+        " for each of at most ", kMostMemory, " steps of memory, got ", inputs));
   }
   const auto& given = loaded.policy->info().observation;
   if (!given) throw BadInput(Concat(where, ": no metadata \"observation\""));
-  const ObservationInfo expected = ObservationInfoOf(loaded.memory(), loaded.identifies());
+  const ObservationInfo expected =
+      ObservationInfoOf(loaded.memory(), loaded.identifies(), loaded.seeks_any_pose());
   const auto same_memory = [&] {
     if (!given->memory || !expected.memory) return !given->memory && !expected.memory;
     return given->memory->steps == expected.memory->steps &&
            given->memory->velocity == expected.memory->velocity &&
            given->memory->torque == expected.memory->torque;
   };
+  const bool same_goal = given->goal.size() == expected.goal.size();
   const bool same_scale =
       !given->identified || given->identified->scale == expected.identified->scale;
-  if (given->max_velocity != expected.max_velocity || !same_scale || !same_memory()) {
+  if (given->max_velocity != expected.max_velocity || !same_scale || !same_goal || !same_memory()) {
     throw BadInput(
         Concat(where,
                ": metadata \"observation\": expected the names and scales of this version "
@@ -106,12 +115,17 @@ void ExpectPendulum(const LoadedPolicy& loaded) {
 }
 
 int LoadedPolicy::memory() const {
-  return is_foreign() ? 0 : MemorySteps(policy->obs_size(), identifies());
+  return is_foreign() ? 0 : RememberedInputs(*this) / kMemorySize;
 }
 
 bool LoadedPolicy::identifies() const {
   const auto& observation = policy->info().observation;
   return !is_foreign() && observation && observation->identified;
+}
+
+bool LoadedPolicy::seeks_any_pose() const {
+  const auto& observation = policy->info().observation;
+  return !is_foreign() && observation && !observation->goal.empty();
 }
 
 PolicyInfo InfoOf(const Config& config) {
@@ -125,7 +139,7 @@ PolicyInfo InfoOf(const Config& config) {
   info.control_period = spec.step_seconds;
   if (config.is_foreign()) return info;
   for (const auto& [name, value] : PlantValues(config.plant)) info.plant[name] = value;
-  info.observation = ObservationInfoOf(config.memory, config.identify);
+  info.observation = ObservationInfoOf(config.memory, config.identify, config.any_pose);
   return info;
 }
 

@@ -28,6 +28,8 @@ struct LoadedPolicy {
   int memory() const;
   /// Whether its observations contain an estimate of the plant.
   bool identifies() const;
+  /// Whether its observations contain the pose to reach.
+  bool seeks_any_pose() const;
   /// Origin: "training", or "design" for a controller.
   const char* origin() const { return path.empty() ? "design" : "training"; }
 };

@@ -35,7 +35,7 @@ std::map<std::string, double> ParsePlant(const std::string& text) {
 
 ObservationInfo ParseObservation(const std::string& text) {
   const json object = ParseJsonObject(text);
-  ObservationInfo observation{Texts(object, "names"), {}, {}, {}};
+  ObservationInfo observation{Texts(object, "names"), {}};
   for (const json& item : JsonList(object, "max_velocity", 2)) {
     if (!item.is_number()) throw BadInput("\"max_velocity\": expected a list of numbers");
     observation.max_velocity.push_back(item.get<double>());
@@ -45,6 +45,7 @@ ObservationInfo ParseObservation(const std::string& text) {
     if (!identified.is_object()) throw BadInput("\"identified\": expected an object");
     observation.identified = {Texts(identified, "names"), JsonNumber(identified, "scale")};
   }
+  if (object.contains("goal")) observation.goal = Texts(object, "goal");
   if (!object.contains("memory")) return observation;
   const json& memory = JsonMember(object, "memory");
   if (!memory.is_object()) throw BadInput("\"memory\": expected an object");
@@ -58,6 +59,7 @@ std::string ObservationText(const ObservationInfo& observation) {
   if (const auto& identified = observation.identified) {
     object["identified"] = {{"names", identified->names}, {"scale", identified->scale}};
   }
+  if (!observation.goal.empty()) object["goal"] = observation.goal;
   if (const auto& memory = observation.memory) {
     object["memory"] = {{"steps", memory->steps},
                         {"names", memory->names},

@@ -21,6 +21,8 @@ struct ObservationInfo {
   };
   std::optional<Identified> identified = {};
 
+  std::vector<std::string> goal = {};  // names of the inputs with the pose to reach; empty: none
+
   /// Past steps in an observation.
   struct Memory {
     int64_t steps = 0;
@@ -28,7 +30,7 @@ struct ObservationInfo {
     double velocity = 0, torque = 0;  // rad/s, N·m; changes and torques are divided by them
     bool operator==(const Memory&) const = default;
   };
-  std::optional<Memory> memory;
+  std::optional<Memory> memory = {};
 };
 
 /// The metadata of a policy file, with types and checked ranges. Missing optional metadata are

@@ -173,7 +173,8 @@ class PolicyFileTest(SmallRunTest):
             "observation": ("{}", "nonsense", json.dumps(observation | {"max_velocity": [10, 10]}),
                             json.dumps(observation | {"memory": {"steps": 2, "names": [],
                                                                  "velocity": 1, "torque": 5}}),
-                            json.dumps(observation | {"identified": 13})),
+                            json.dumps(observation | {"identified": 13}),
+                            json.dumps(observation | {"goal": 1})),
         }.items() for text in texts]
         for key, text in changes:
             with self.subTest(key=key, text=text):

@@ -95,6 +95,10 @@ void PrintEvalTable(const EvalReport& report) {
   fmt::print("  success        {} of {} = {:.1f}%   (95% interval {:.1f}% to {:.1f}%)\n",
              e.successes, e.episodes, 100 * e.success_rate(), 100 * e.success_interval.low,
              100 * e.success_interval.high);
+  for (const Transition& t : TransitionsOf(report)) {
+    fmt::print("    {:<9} to {:<9} {} of {}\n", PoseName(t.from), PoseName(t.to), t.successes,
+               t.episodes);
+  }
   PrintSuccesses(e);
   fmt::print("  return         {}   in the first {} s\n", MomentsText(e.reward_sum),
              kReturnSeconds);

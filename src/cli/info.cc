@@ -44,6 +44,7 @@ std::string ObservationText(const LoadedPolicy& loaded) {
   if (loaded.identifies()) {
     text += fmt::format(", {} for the identified plant", kIdentifiedSize);
   }
+  if (loaded.seeks_any_pose()) text += fmt::format(", {} for the goal", kGoalSize);
   const int steps = loaded.memory();
   if (steps > 0) {
     text +=
@@ -207,6 +208,7 @@ ordered_json PolicyJson(const LoadedPolicy& loaded) {
   if (!loaded.is_foreign()) {
     j["memory"] = loaded.memory();
     j["identifies"] = loaded.identifies();
+    j["any_pose"] = loaded.seeks_any_pose();
     for (const auto& [name, value] : PlantValues(loaded.plant)) j["plant"][name] = value;
   }
   if (const auto* learned = dynamic_cast<const NetworkPolicy*>(&policy)) {

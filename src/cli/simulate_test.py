@@ -313,6 +313,45 @@ class PolicyRolloutTest(ProgramTest):
         write_tensors(self.folder / "scaled.safetensors", metadata, tensors)
         self.refuse(["eval", "scaled.safetensors"], "observation")
 
+    def test_a_policy_for_any_pose_observes_its_goal(self):
+        self.succeed(*small(memory=1, out="poses"), "--any-pose")
+        metadata, tensors = read_tensors(self.folder / "poses/policy.safetensors")
+        self.assertEqual(json.loads(metadata["observation"])["goal"],
+                         ["goal of link 1", "goal of link 2"])
+        self.assertIn(" motion, 2 for the goal, 3 for the last step\n",
+                      self.succeed("info", "poses"))
+        # The reward of a row at rest in its goal: all of energy, height and balance.
+        for start, goal in (("0,0,0,0", "down-down"), (f"{math.pi},{math.pi},0,0", "up-down")):
+            row = numbers(parse(self.succeed("simulate", "poses", "--start", start, "--goal", goal,
+                                             "--seconds", 0.1))[0])
+            self.assertEqual(row["inverted"], 1)
+            self.assertAlmostEqual(row["reward"], 7 - 0.05 * row["torque"]**2, 12)
+        # `eval` draws the goals, `--episode` has the same ones.
+        report = json.loads(self.succeed("eval", "poses", "--episodes", 40, "--json",
+                                         "--episodes-csv", "episodes.csv"))
+        rows = parse((self.folder / "episodes.csv").read_text())
+        self.assertEqual({(row["goal1"], row["goal2"]) for row in rows},
+                         {("1", "1"), ("1", "-1"), ("-1", "1"), ("-1", "-1")})
+        self.assertEqual(sum(t["episodes"] for t in report["transitions"]), 40)
+        self.assertNotIn(True, [t["from"] == t["to"] for t in report["transitions"]])
+        first = numbers(parse(self.succeed("simulate", "poses", "--episode", 7, "--seconds",
+                                           10))[0])
+        self.assertEqual([first[name] for name in STATE],
+                         [float(rows[7][name]) for name in ("q1", "q2", "w1", "w2")])
+        # One goal for all: the episodes start hanging.
+        self.assertIn("down-down to up-down   ",
+                      self.succeed("eval", "poses", "--episodes", 3, "--goal", "up-down"))
+        self.refuse(["eval", "poses", "--goal", "up"],
+                    '--goal: expected up-up, up-down, down-up, down-down, got "up"')
+        for words in (["eval", "run"], ["eval", "mpc"], ["simulate"]):
+            self.refuse([*words, "--goal", "up-down"], "--goal up-down: expected a policy for any pose")
+        for flag in ("--c", "--onnx"):
+            self.refuse(["export", "poses", flag, "out"], "expected a policy without a choice of its goal")
+        # A network without the inputs that its metadata claim.
+        metadata["observation"] = json.dumps(json.loads(metadata["observation"]) | {"goal": ["up"]})
+        write_tensors(self.folder / "one.safetensors", metadata, tensors)
+        self.refuse(["eval", "one.safetensors"], "observation")
+
 
 if __name__ == "__main__":
     unittest.main()

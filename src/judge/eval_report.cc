@@ -48,6 +48,10 @@ void AddCells(const EvalReport& report, const JudgedEpisode& episode, CsvTable& 
   add("q2", episode.start.q2);
   add("w1", episode.start.w1);
   add("w2", episode.start.w2);
+  if (const auto& goal = episode.goal) {
+    add("goal1", goal->up1 ? 1 : -1);
+    add("goal2", goal->up2 ? 1 : -1);
+  }
   for (const auto& [name, value] : PlantValues(episode.plant)) add(name, value);
   const double delta = ModesOf(episode.plant).delta;
   add("delta", delta, std::isfinite(delta));
@@ -122,7 +126,8 @@ void JudgeEpisodes(const Policy& policy, const DesignFor* design_for,
   PendulumEnv env(config);
   const auto first = report.episodes.size();
   for (int i = 0; i < config.num_envs; ++i) {
-    report.episodes.push_back({env.state(i), env.plant(i), env.disturbance(i), false, {}});
+    report.episodes.push_back(
+        {env.state(i), env.goal(i), env.plant(i), env.disturbance(i), false, {}});
   }
   if (design_for) return JudgeDesigned(policy, *design_for, config, progress, first, report);
   std::vector<EvaluationEpisode> results = EvaluateEpisodes(policy, env, config.pool, progress);
@@ -145,7 +150,7 @@ EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& tria
   EvalReport report;
   report.policy = loaded.name;
   report.known_plant = trial.known_plant;
-  report.env = TrialEnvironments(trial, &loaded);
+  report.env = EvalEnvironments(trial, &loaded);
   report.env.num_envs = static_cast<int>(episodes);
   report.knows_values = loaded.policy->info().gamma.value_or(0) > 0;
   report.only_balances = OnlyBalances(loaded.policy->kind());
@@ -168,6 +173,22 @@ EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& tria
   return report;
 }
 
+std::vector<Transition> TransitionsOf(const EvalReport& report) {
+  std::vector<Transition> transitions;
+  for (const Pose& from : kPoses) {
+    for (const Pose& to : kPoses) {
+      Transition t{from, to};
+      for (const JudgedEpisode& episode : report.episodes) {
+        if (episode.goal != to || !Inverted(SeenFrom(from, episode.start))) continue;
+        ++t.episodes;
+        t.successes += episode.result.success ? 1 : 0;
+      }
+      if (t.episodes > 0) transitions.push_back(t);
+    }
+  }
+  return transitions;
+}
+
 int64_t NumDesigned(const EvalReport& report) {
   return std::ranges::count(report.episodes, true, &JudgedEpisode::for_its_plant);
 }
@@ -188,6 +209,12 @@ std::string EvalJson(const EvalReport& report) {
     j[option.section][option.name] = JsonOf(option);
   }
   AddFigures(report, j);
+  for (const Transition& t : TransitionsOf(report)) {
+    j["transitions"].push_back({{"from", PoseName(t.from)},
+                                {"to", PoseName(t.to)},
+                                {"episodes", t.episodes},
+                                {"successes", t.successes}});
+  }
   return PrintableJson(j);
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@ namespace upswing {
 /// One episode: its conditions and its result.
 struct JudgedEpisode {
   PendulumState start;
+  std::optional<Pose> goal;  // of a policy for any pose
   Plant plant;
   Disturbance disturbance;
   bool for_its_plant = false;  // had its own controller (TrialArguments::known_plant)
@@ -36,6 +38,15 @@ struct EvalReport {
 /// `progress` counts episodes. Throws BadInput.
 EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& trial, int64_t episodes,
                           ThreadPool& pool, const Progress& progress);
+
+/// The episodes of a policy for any pose that begin near one pose and ask for another.
+struct Transition {
+  Pose from, to;
+  int64_t episodes = 0, successes = 0;
+};
+
+/// The transitions with at least one episode.
+std::vector<Transition> TransitionsOf(const EvalReport& report);
 
 /// Number of episodes with a controller designed for their plant.
 int64_t NumDesigned(const EvalReport& report);

@@ -39,12 +39,13 @@ void AddEstimates(const Policy& policy, Matrix<const float> obs, Policy::Memory&
   policy.Spread(obs, {&row.spread->low, 1, 1}, {&row.spread->high, 1, 1}, memory);
 }
 
-/// Sets the reward for the state and torque of a row.
-void RewardRow(const Plant& plant, RolloutRow& row) {
-  row.terms = RewardTerms(plant, row.state, row.torque);
+/// Sets the reward for the state and torque of a row; no goal: upright.
+void RewardRow(const Plant& plant, const std::optional<Pose>& goal, RolloutRow& row) {
+  row.terms = goal ? RewardTerms(plant, row.state, row.torque, *goal)
+                   : RewardTerms(plant, row.state, row.torque);
   row.reward = 0;
   for (const double term : row.terms) row.reward += term;
-  row.inverted = Inverted(row.state);
+  row.inverted = Inverted(SeenFrom(goal.value_or(Pose()), row.state));
 }
 
 }  // namespace
@@ -80,7 +81,7 @@ void Episode::Step(const std::array<double, 2>& push) {
   if (config_.estimates) AddEstimates(*config_.policy, env_->obs(), *memory_, row);
   env_->Step({&torque, 1}, result_);
   row.torque = result_.torque[0];
-  RewardRow(rollout_.plant, row);
+  RewardRow(rollout_.plant, env_->goal(0), row);
   rollout_.rows.push_back(std::move(row));
   if (result_.terminated[0] == 0) return;
   throw Failure(

@@ -69,11 +69,25 @@ PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy*
     env.memory = loaded->memory();
     if (loaded->identifies()) env.identified_from = loaded->plant;
     if (a.unknown_plant) env.assumed_plant = loaded->plant;
+    env.any_pose = loaded->seeks_any_pose();
+  }
+  env.goal = a.goal.empty() ? Pose() : ParsePose(a.goal, "--goal");
+  // A controller balances only upright, also one whose swing-up is a policy for any pose.
+  const bool is_learned = loaded != nullptr && !loaded->design_for;
+  if (!(env.any_pose && is_learned) && env.goal != Pose()) {
+    throw BadInput(Concat("--goal ", a.goal, ": expected a policy for any pose (--any-pose), got ",
+                          loaded != nullptr ? Printable(loaded->name) : "none"));
   }
   ApplyChanges(OptionsOf(plant), a.set);
   env.plants = {plant};
   env.seed = static_cast<uint64_t>(a.seed);
   env.stream = "evaluation";
+  return env;
+}
+
+PendulumEnvConfig EvalEnvironments(const TrialArguments& a, const LoadedPolicy* loaded) {
+  PendulumEnvConfig env = TrialEnvironments(a, loaded);
+  if (loaded != nullptr && !loaded->design_for && a.goal.empty()) env.goal.reset();
   return env;
 }
 
@@ -113,7 +127,7 @@ RolloutConfig TrialEpisode(const TrialArguments& a, const LoadedPolicy* loaded) 
   }
   RolloutConfig config;
   if (loaded != nullptr) config.policy = loaded->policy.get();
-  config.env = TrialEnvironments(a, loaded);
+  config.env = a.is_of_eval() ? EvalEnvironments(a, loaded) : TrialEnvironments(a, loaded);
   config.env.first_index = static_cast<uint64_t>(std::max<int64_t>(0, a.episode));
   if (!a.start.empty()) {
     config.start = ParseStart(a.start);

@@ -23,6 +23,7 @@ struct TrialArguments {
   int64_t seed = 0;
   bool unknown_plant = false;
   bool known_plant = false;  // design a controller for each episode's plant; only in eval
+  std::string goal;  // name of the pose to reach; empty: upright, or in eval one for each episode
   // The single episode of `simulate`, `plot` and `view`: its start (empty: hanging), or its index
   // in `eval` (negative: none).
   std::string start;
@@ -47,8 +48,13 @@ TrialConditions ConditionsOf(const std::vector<FlagValue>& flags);
 
 /// The environments of a trial: the environments of the policy's training with the changes of the
 /// arguments; without a policy (null), environments of the built-in plant. Environment i has
-/// episode i. Throws BadInput, also if the policy is not for the double pendulum.
+/// episode i. The goal is upright if the arguments name none. Throws BadInput, also if the policy
+/// is not for the double pendulum.
 PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded);
+
+/// The same for `eval`: if the arguments name no goal, each episode of a learned policy for any
+/// pose draws its own.
+PendulumEnvConfig EvalEnvironments(const TrialArguments& a, const LoadedPolicy* loaded);
 
 /// An environment whose only episode is episode `index` of `config`.
 PendulumEnv OneEpisode(PendulumEnvConfig config, int index);

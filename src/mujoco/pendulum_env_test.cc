@@ -325,6 +325,102 @@ TEST_P(PendulumEnvs, StartsAreHangingWithNoiseOrAnywhere) {
   EXPECT_NEAR(std::sqrt(square / (config.num_envs - anywhere)), 0.1, 0.01);
 }
 
+TEST_P(PendulumEnvs, EpisodesWithGoalsBeginInAnotherPoseOrAnywhere) {
+  PendulumEnvConfig config = Config();
+  config.num_envs = 4800;
+  config.any_pose = true;
+  config.start = {0.05, 0.25, 5};
+  const PendulumEnv env(config);
+  std::array<std::array<int, 4>, 5> count{};  // starts near each pose, and anywhere, by goal
+  for (int i = 0; i < config.num_envs; ++i) {
+    const auto near = std::ranges::find_if(kPoses, [&](const Pose& pose) {
+      const auto [lean1, lean2] = Lean(SeenFrom(pose, env.state(i)));
+      return std::max({std::abs(lean1), std::abs(lean2), std::abs(env.state(i).w1),
+                       std::abs(env.state(i).w2)}) < 0.35;
+    });
+    const auto goal = std::ranges::find(kPoses, *env.goal(i));
+    ++count[static_cast<size_t>(near - kPoses.begin())][static_cast<size_t>(goal - kPoses.begin())];
+  }
+  for (size_t from = 0; from < 5; ++from) {
+    for (size_t to = 0; to < 4; ++to) {
+      const double share = from == 4 ? 0.25 / 4 : from == to ? 0 : 0.75 / 12;
+      // A random start, too, may be near a pose, but hardly ever is.
+      EXPECT_NEAR(count[from][to], 4800 * share, from == to ? 3 : 5 * std::sqrt(4800 * share));
+    }
+  }
+}
+
+TEST_P(PendulumEnvs, GoalsAreObservedAndJudged) {
+  PendulumEnvConfig config = SmallConfig();
+  config.num_envs = 60;
+  config.episode_seconds = 1;
+  config.memory = 1;
+  config.any_pose = true;
+  config.start = {0.1, 0.5, 5};
+  config.reward.weight = {1, 0.5, 2, 3, 1};
+  PendulumEnv env(config);
+  // The expression of the built-in reward sees the goals, too.
+  PendulumEnvConfig by_expression = config;
+  by_expression.reward.expression =
+      "E + 0.5*h + 10*inverted - 0.03*inverted*(w1*w1 + w2*w2) - (0.01 + 0.04*inverted)*tau*tau";
+  PendulumEnv own(by_expression);
+  ASSERT_EQ(env.spec().obs_size, kObservationSize + kGoalSize + kMemorySize);
+  EXPECT_EQ(env.spec().mirror_signs,
+            (std::vector<float>{1, -1, -1, 1, -1, -1, 1, 1, 1, 1, -1, -1, -1}));
+  StepResult result = env.MakeResult(), own_result = own.MakeResult();
+  std::vector<double> torque(60);
+  Rng rng(3, "torques");
+  std::array<int, 4> at_goal{};
+  for (int step = 0; step < 200; ++step) {
+    std::vector<Pose> goals;
+    for (int i = 0; i < config.num_envs; ++i) goals.push_back(*env.goal(i));
+    for (double& x : torque) x = rng.Uniform(-5, 5);
+    env.Step(torque, result);
+    own.Step(torque, own_result);
+    for (int i = 0; i < config.num_envs; ++i) {
+      const auto k = static_cast<size_t>(i);
+      const Pose& goal = goals[k];
+      const float* seen = &result.next_obs[k * static_cast<size_t>(env.spec().obs_size)];
+      ASSERT_EQ(seen[kObservationSize], goal.up1 ? 1 : -1);
+      ASSERT_EQ(seen[kObservationSize + 1], goal.up2 ? 1 : -1);
+      ASSERT_NEAR(seen[kObservationSize + 4], torque[k] / kMemoryTorque, 1e-6);
+      ASSERT_NEAR(result.reward[k], own_result.reward[k], 1e-9);
+      if (result.truncated[k] != 0) continue;  // the state is that of the next episode
+      const PendulumState s = env.state(i);
+      const auto terms = RewardTerms(env.plant(i), s, result.torque[k], goal);
+      double sum = 0;
+      for (size_t term = 0; term < kRewardTerms; ++term) {
+        sum += config.reward.weight[term] * terms[term];
+      }
+      ASSERT_NEAR(result.reward[k], sum, 1e-12);
+      const bool is_there = Inverted(SeenFrom(goal, s));
+      ASSERT_EQ(result.at_goal[k] != 0, is_there);
+      if (is_there)
+        ++at_goal[static_cast<size_t>(std::ranges::find(kPoses, goal) - kPoses.begin())];
+    }
+  }
+  for (const int steps : at_goal) EXPECT_GT(steps, 0);
+  ExpectLoadedGoesOn(config, 7);
+}
+
+TEST_P(PendulumEnvs, AFixedGoalKeepsTheStarts) {
+  PendulumEnvConfig config = SmallConfig();
+  config.start.random_share = 0.5;
+  const PendulumEnv usual(config);
+  config.any_pose = true;
+  config.goal = Pose{true, false};
+  const PendulumEnv env(config);
+  for (int i = 0; i < config.num_envs; ++i) {
+    EXPECT_EQ(env.goal(i), config.goal);
+    EXPECT_EQ(env.state(i).q1, usual.state(i).q1);
+    EXPECT_EQ(env.state(i).w2, usual.state(i).w2);
+    std::array<double, 2> lean{};
+    env.Lean(i, lean);
+    const auto expected = Lean(SeenFrom(*config.goal, env.state(i)));
+    EXPECT_EQ(lean, expected);
+  }
+}
+
 TEST_P(PendulumEnvs, TheCurriculumsNoiseHoldsFromTheNextStartOn) {
   PendulumEnvConfig config = SmallConfig();
   config.num_envs = 500;

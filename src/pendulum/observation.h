@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "base/archive.h"
 #include "base/policy_info.h"
@@ -22,10 +23,9 @@ inline constexpr std::array<float, kObservationSize> kMirrorSigns{1, -1, -1, 1, 
 /// kMemoryTorque. The plant's response reveals what the state lacks: masses, lengths, and torques
 /// that are still delayed.
 inline constexpr int kMemorySize = 3;
-/// Number of past control steps in an observation of `obs_size` numbers.
-constexpr int MemorySteps(int obs_size, bool identified = false) {
-  return (obs_size - kObservationSize - (identified ? kIdentifiedSize : 0)) / kMemorySize;
-}
+/// Numbers that a goal adds to an observation, before the memory: for each link, 1 if it is to
+/// point up and -1 if down.
+inline constexpr int kGoalSize = 2;
 /// Typical change of a velocity by the motor in one control period (rad/s), and the standard torque
 /// limit (N·m).
 inline constexpr double kMemoryVelocity = 1.0, kMemoryTorque = 5.0;
@@ -34,18 +34,25 @@ inline constexpr double kMemoryVelocity = 1.0, kMemoryTorque = 5.0;
 /// filled already. `before` is the previous observation, at which the torque (N·m) was chosen.
 void Remember(std::span<const float> before, double torque, int steps, std::span<float> obs);
 
-/// Description, for a policy file, of observations with `memory` past steps and, if `identified`,
-/// an identified plant.
-ObservationInfo ObservationInfoOf(int64_t memory, bool identified = false);
+/// Description, for a policy file, of observations with `memory` past steps; if `identified`, an
+/// identified plant; if `any_pose`, a goal.
+ObservationInfo ObservationInfoOf(int64_t memory, bool identified = false, bool any_pose = false);
 
 /// Builds the observations (D) of N environments from what their sensors measure:
 ///   8             of the measured state, see Observe
 ///   13            of the identified plant, if there is one
+///   2             of the goal, if it can be any pose
 ///   3 × `memory`  of the past control steps
 class ObservationBuilder {
  public:
   /// `identified_from`: the nominal plant where identification starts; none: no identification.
-  ObservationBuilder(int num_envs, int memory, const std::optional<Plant>& identified_from);
+  /// `any_pose`: whether observations have a goal, which is upright at first.
+  ObservationBuilder(int num_envs, int memory, const std::optional<Plant>& identified_from,
+                     bool any_pose);
+
+  /// The goal that the next observations have; nothing if it is always upright.
+  void SetGoal(int env, const Pose& goal);
+  std::optional<Pose> goal(int env) const;
 
   /// Writes the first observation of an episode. `plant` gives its energy and height. Its memory is
   /// zero.
@@ -58,12 +65,15 @@ class ObservationBuilder {
   void Complete(int env, const Measurement& measured, std::span<const float> before, double chosen,
                 std::span<float> obs);
 
-  /// Saves or loads the identified plants.
+  /// Saves or loads the identified plants and the goals.
   void State(const Archive& archive);
 
  private:
+  void WriteGoal(int env, std::span<float> obs) const;
+
   int memory_;
   std::optional<Identifier> identifier_;
+  std::vector<int64_t> goals_;  // (N) indices of kPoses; empty: always upright
 };
 
 }  // namespace upswing

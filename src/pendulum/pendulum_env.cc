@@ -40,7 +40,7 @@ EnvSpec PendulumSpec(const PendulumEnvConfig& config) {
   spec.task = kDoublePendulum;
   spec.num_envs = config.num_envs;
   spec.obs_size = kObservationSize + (config.identified_from ? kIdentifiedSize : 0) +
-                  config.memory * kMemorySize;
+                  (config.any_pose ? kGoalSize : 0) + config.memory * kMemorySize;
   spec.action_limit = {config.plant(0).torque_limit};
   spec.step_seconds = kControlPeriod;
   spec.term_names = {kRewardTermNames.begin(), kRewardTermNames.end()};
@@ -51,6 +51,7 @@ EnvSpec PendulumSpec(const PendulumEnvConfig& config) {
     spec.mirror_signs.insert(spec.mirror_signs.end(), kIdentifiedMirrorSigns.begin(),
                              kIdentifiedMirrorSigns.end());
   }
+  if (config.any_pose) spec.mirror_signs.insert(spec.mirror_signs.end(), kGoalSize, 1.0F);
   spec.mirror_signs.resize(static_cast<size_t>(spec.obs_size), -1.0F);
   spec.bodies = 2;
   spec.evaluation = {kEvaluationSeconds, kReturnSeconds, kHoldSeconds, 0};
@@ -64,7 +65,7 @@ PendulumEnv::PendulumEnv(const PendulumEnvConfig& config)
       episode_steps_(std::max<int64_t>(1, std::llround(config_.episode_seconds / kControlPeriod))),
       disturber_(MakeDisturber(config)),
       posterior_(config.randomization.MakePosterior()),
-      builder_(config.num_envs, config.memory, config.identified_from),
+      builder_(config.num_envs, config.memory, config.identified_from, config.any_pose),
       exact_(!disturber_ && !config.assumed_plant && !config.identified_from) {
   const auto n = static_cast<size_t>(config_.num_envs);
   const std::string& reward = config.reward.expression;
@@ -84,7 +85,7 @@ PendulumEnv::PendulumEnv(const PendulumEnvConfig& config)
 }
 
 void PendulumEnv::Lean(int env, std::span<double> lean) const {
-  std::ranges::copy(upswing::Lean(state(env)), lean.begin());
+  std::ranges::copy(upswing::Lean(SeenFrom(goal(env).value_or(Pose()), state(env))), lean.begin());
 }
 
 Matrix<const float> PendulumEnv::obs() const {
@@ -126,13 +127,21 @@ void PendulumEnv::Reset(int env) {
   Rng& rng = rngs_[static_cast<size_t>(env)];
   const StartStates& start = config_.start;
   PendulumState s;
-  if (rng.Uniform() < start.random_share) {
+  const bool is_random = rng.Uniform() < start.random_share;
+  if (is_random) {
     s = {rng.Uniform(-kPi, kPi), rng.Uniform(-kPi, kPi),
          rng.Uniform(-start.random_velocity, start.random_velocity),
          rng.Uniform(-start.random_velocity, start.random_velocity)};
   } else {
     s = {start.noise * rng.Normal(), start.noise * rng.Normal(), start.noise * rng.Normal(),
          start.noise * rng.Normal()};
+  }
+  if (config_.any_pose) {
+    const uint64_t drawn = config_.goal ? 0 : rng.Below(is_random ? 4 : 12);
+    builder_.SetGoal(env, config_.goal.value_or(kPoses[drawn % 4]));
+    // Another pose than the goal: one of the three that follow it in kPoses.
+    const Pose from = kPoses[(drawn + 1 + drawn / 4) % 4];
+    if (!config_.goal && !is_random) s = SeenFrom({!from.up1, !from.up2}, s);
   }
   SetState(env, s);
 }
@@ -155,6 +164,7 @@ void PendulumEnv::Hold(int env) {
 void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
   if (reward_) reward_->SwapTerms(result);
   physics_->Step(Actuate(torque), result);
+  JudgeByGoal(result);
   if (reward_) reward_->SwapTerms(result);
   RestoreHeld(result);
   JudgeByOwnReward(result);
@@ -177,6 +187,23 @@ void PendulumEnv::RestoreHeld(StepResult& result) {
   }
 }
 
+void PendulumEnv::JudgeByGoal(StepResult& result) const {
+  if (!config_.any_pose) return;
+  const auto weight = PhysicsOf(config_).reward.weight;
+  for (int env = 0; env < config_.num_envs; ++env) {
+    const auto i = static_cast<size_t>(env);
+    const PendulumState s = state(env);
+    const auto terms = std::span(result.reward_terms).subspan(i * kRewardTerms, kRewardTerms);
+    std::ranges::copy(RewardTerms(plant(env), s, result.torque[i], *goal(env)), terms.begin());
+    result.reward[i] = 0;
+    for (size_t k = 0; k < kRewardTerms; ++k) {
+      terms[k] *= weight[k];
+      result.reward[i] += terms[k];
+    }
+    result.at_goal[i] = Inverted(SeenFrom(*goal(env), s)) ? 1 : 0;
+  }
+}
+
 void PendulumEnv::JudgeByOwnReward(StepResult& result) {
   for (int env = 0; reward_ && env < config_.num_envs; ++env) {
     if (IsHeld(env) || result.terminated[static_cast<size_t>(env)]) continue;
@@ -185,7 +212,7 @@ void PendulumEnv::JudgeByOwnReward(StepResult& result) {
 }
 
 void PendulumEnv::ObserveSuccessors(std::span<const double> chosen, StepResult& result) {
-  if (exact_ && config_.memory == 0) return;
+  if (exact_ && config_.memory == 0 && !config_.any_pose) return;
   for (int env = 0; env < config_.num_envs; ++env) {
     if (IsHeld(env)) continue;
     const auto i = static_cast<size_t>(env);

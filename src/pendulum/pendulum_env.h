@@ -31,6 +31,12 @@ struct StartStates {
 struct PendulumEnvConfig : PhysicsConfig {
   double episode_seconds = kEvaluationSeconds;
   int memory = 0;  // number of past control steps in an observation
+  // Whether an episode asks for one of kPoses, its goal, which observations contain. Reward and
+  // goal are then of this pose.
+  bool any_pose = false;
+  // With any_pose: the goal of every episode. None: each episode draws its goal, and begins in a
+  // random state or, with the noise of its start, in another pose.
+  std::optional<Pose> goal = {};
   StartStates start;
   uint64_t seed = 0;
   std::string stream = "environment";  // environment i draws from (seed, stream, first_index + i)
@@ -87,6 +93,8 @@ class PendulumEnv : public VectorEnv {
   const Plant& plant(int env) const {
     return plants_.empty() ? config_.plant(env) : plants_[static_cast<size_t>(env)];
   }
+  /// The pose that the running episode asks for; nothing without any_pose, which is upright.
+  std::optional<Pose> goal(int env) const { return builder_.goal(env); }
   /// The disturbance of the running episode.
   Disturbance disturbance(int env) const {
     return disturber_ ? disturber_->disturbance(env) : Disturbance();
@@ -109,6 +117,8 @@ class PendulumEnv : public VectorEnv {
   void ObserveSuccessors(std::span<const double> chosen, StepResult& result);
   /// Counts the steps of the episodes and truncates those whose time is up.
   void KeepTime(StepResult& result);
+  /// Judges by the goals of the episodes.
+  void JudgeByGoal(StepResult& result) const;
   /// Replaces the built-in reward by the expression of the settings.
   void JudgeByOwnReward(StepResult& result);
   /// Puts held environments back into their states.
