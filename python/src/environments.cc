@@ -146,6 +146,11 @@ class Environments {
     });
   }
 
+  /// The goal as in observations; upright if episodes have none.
+  std::array<float, kGoalSize> Goal(int env) {
+    return Alone([&] { return GoalInputs(env_.goal(env).value_or(Pose())); });
+  }
+
   Plant PlantOf(int env) {
     return Alone([&] { return env_.plant(env); });
   }
@@ -264,6 +269,7 @@ void BindEnvironments(nb::module_& m) {
       .def("spec", &DescribeTask)
       .def("get_state", &Environments::State, nb::arg("env"))
       .def("set_state", &Environments::SetState, nb::arg("env"), nb::arg("state"))
+      .def("goal", &Environments::Goal, nb::arg("env"))
       .def(
           "plant", [](Environments& self, int env) { return PlantDict(self.PlantOf(env)); },
           nb::arg("env"))

@@ -157,6 +157,7 @@ void BindPolicies(nb::module_& m) {
   add("task", &LoadedPolicy::task);
   add("memory", &LoadedPolicy::memory);
   add("identifies", &LoadedPolicy::identifies);
+  add("any_pose", &LoadedPolicy::seeks_any_pose);
   add("obs_size", &Policy::obs_size);
   add("action_size", &Policy::action_size);
   add("num_parameters", &Policy::num_parameters);

@@ -48,6 +48,23 @@ class Policies(unittest.TestCase):
                     obs, _, _, _, info = env.step(policy.act(obs))
                     self.assertEqual(info["torque"], row["torque"])
 
+    def test_a_policy_for_any_pose_reaches_the_goals_of_its_environment(self):
+        policy = upswing.load_policy(AGENTS / "any-pose.safetensors")
+        self.assertTrue(policy.any_pose)
+        env = gym.make(ID, any_pose=True, random_start_share=0, episode_seconds=12,
+                       physics="closed-form")
+        self.assertEqual(env.observation_space.shape, (policy.obs_size,))
+        goals = set()
+        for seed in range(12):
+            obs, _ = env.reset(seed=seed)
+            goal, truncated = tuple(obs[8:]), False
+            goals.add(goal)
+            while not truncated:
+                obs, _, _, truncated, info = env.step(policy.act(obs))
+                self.assertEqual(tuple(obs[8:]), goal)
+            self.assertTrue(info["at_goal"])
+        self.assertEqual(goals, {(1, 1), (1, -1), (-1, 1), (-1, -1)})
+
     def test_one_and_many_observations(self):
         obs = np.random.default_rng(0).normal(size=(70, 8)).astype(np.float32)
         for name in ("d3qn", "sac"):

@@ -190,6 +190,7 @@ class Pictures:
             width, height = self._size
             scene = self._drawing(lambda view: view.Scene([plant], width / height))
             self._scenes[i] = scene
+        scene.goals = [env.goal(i)]
         scene.show(env.get_state(i), env.torque[i])
         return scene
 

@@ -63,6 +63,8 @@ class Scene:
         self.model = mujoco.MjModel.from_xml_string(self._mjcf(distance))
         self.data = mujoco.MjData(self.model)
         self.torques = [0.0] * len(plants)
+        # Of each pendulum: for each link 1 if it is to point up, -1 if down.
+        self.goals: Sequence[Sequence[float]] = [(1, 1)] * len(plants)
         self.labels = [""] * len(plants)  # texts below the pendulums
         self._paths: list[deque[tuple[float, float]]] = [deque() for _ in plants]
         self._times: deque[float] = deque()
@@ -144,10 +146,10 @@ class Scene:
             for path in self._paths:
                 path.popleft()
 
-    def upright(self, i: int) -> bool:
-        """Whether both links are within 30° of upright."""
-        q1, q2 = self.data.qpos[2 * i:2 * i + 2]
-        return bool(max(np.cos(q1), np.cos(q1 + q2)) < -np.cos(np.pi / 6))
+    def at_goal(self, i: int) -> bool:
+        """Whether both links are within 30° of the goal."""
+        (up1, up2), (q1, q2) = self.goals[i], self.data.qpos[2 * i:2 * i + 2]
+        return bool(max(up1 * np.cos(q1), up2 * np.cos(q1 + q2)) < -np.cos(np.pi / 6))
 
     def pulls(self, perturb: Any) -> list[float]:
         """Torques about all joints (2 N) [N·m] of the mouse that pulls at a link in the viewer."""
@@ -190,8 +192,9 @@ class Scene:
                  (*PATH[:3], PATH[3] * age * age), 0.5)
 
     def _add_goal(self, scene: mujoco.MjvScene, i: int) -> None:
-        top = self.plants[i]["length1"] + self.plants[i]["length2"]
-        reached = self.upright(i)
+        up1, up2 = self.goals[i]
+        top = up1 * self.plants[i]["length1"] + up2 * self.plants[i]["length2"]
+        reached = self.at_goal(i)
         ring = _arc((self.places[i], 0, top), 0.075 * self.reach, np.linspace(0, 2 * np.pi, 33))
         for start, end in zip(ring, ring[1:]):
             _add(scene, mujoco.mjtGeom.mjGEOM_CAPSULE, 0.009 * self.reach, start, end,
@@ -387,6 +390,7 @@ class Episodes:
         self.steps = 0.0  # time, control steps
         self.names = [name.encode("ascii", "replace").decode() for name in job["names"]]
         self.scene = Scene(job["plants"], aspect)
+        self.scene.goals = job["goals"]
 
     def go(self, steps: float, pulls: Sequence[float] = ()) -> None:
         """Goes to another time; back to 0 starts again. `pulls`: torques of the mouse [N·m]."""

@@ -27,7 +27,8 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
     Observation (8,), float32: cos q1, sin q1, w1/10, cos q2, sin q2, w2/20, energy (0 hanging at
     rest, 1 upright at rest), height of the tip (-1 to 1). Angles are in rad, 0 hanging, q2 relative
     to link 1; velocities are in rad/s. `memory` adds 3 numbers per past step: changes of w1 and w2
-    [rad/s] and the torque over 5 N·m.
+    [rad/s] and the torque over 5 N·m. `any_pose` adds, before them, the goal: for each link 1 if it is
+    to point up and -1 if down.
 
     Action: torque (1,) [N·m], held for 0.02 s and limited to `torque_limit`. With actions="levels":
     index of one of `levels` evenly spaced torques, from the largest negative one upwards.
@@ -36,7 +37,7 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
     `episode_seconds`; it terminates only if the simulation diverges.
 
     Info: "torque", the applied torque [N·m]; "at_goal", whether both links are within 30° of
-    upright; "reward_terms", whose sum is the reward.
+    upright, or of the goal; "reward_terms", whose sum is the reward.
 
     Args:
         actions: "continuous" or "levels"
@@ -45,7 +46,7 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
         width, height: size of pictures [pixels]
         **settings: settings of the environment with the defaults of a training, the ones with
             `environment` in `upswing.settings()`: agent, which sets the defaults; physics ("mujoco"
-            or "closed-form"), episode_seconds, random_start_share, start_noise, memory; the plant
+            or "closed-form"), episode_seconds, random_start_share, start_noise, memory, any_pose; the plant
             (mass1, …, torque_limit, actuated_joint, rotor_inertia, gear_ratio, coulomb1, coulomb2,
             center1, center2, inertia1, inertia2, armature); plant, a plant file (TOML with a
             table [plant]) or a shipped plant such as "realaigym", which these change; sensor_noise, delay, encoder_counts, velocity_window, velocity_filter,

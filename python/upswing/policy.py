@@ -23,10 +23,11 @@ class Policy:
         kind: kind of the policy, such as "q-network" or "lqr"
         description: description in words
         task: task of the policy, such as "double-pendulum"
-        obs_size: D, for the double pendulum 8, plus 3 per step of `memory`
+        obs_size: D, for the double pendulum 8, plus 13 if it `identifies`, 2 for `any_pose` and 3 per step of `memory`
         action_size: A
         memory: number of past control steps in the observations
         identifies: whether the observations contain an estimate of the plant
+        any_pose: whether the observations contain the pose to reach
         num_parameters: number of learned parameters; 0 for a controller
         info: metadata of the file: origin and plant; None where the file has none
     """
@@ -43,6 +44,7 @@ class Policy:
         self.action_size: int = handle.action_size
         self.memory: int = handle.memory
         self.identifies: bool = handle.identifies
+        self.any_pose: bool = handle.any_pose
         self.num_parameters: int = handle.num_parameters
         self.info: dict[str, Any] = handle.info()
 

@@ -97,12 +97,13 @@ class Show {
     if (policies.empty()) add(nullptr);
   }
 
-  /// Adds names and plants.
+  /// Adds names, plants and goals.
   void Describe(nlohmann::json& job) const {
     for (const Episode& episode : episodes_) {
       job["names"].push_back(Printable(episode.config().title));
       nlohmann::json& plant = job["plants"].emplace_back();
       for (const auto& [name, value] : PlantValues(episode.rollout().plant)) plant[name] = value;
+      job["goals"].push_back(GoalInputs(episode.goal()));
     }
   }
 

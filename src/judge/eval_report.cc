@@ -49,8 +49,9 @@ void AddCells(const EvalReport& report, const JudgedEpisode& episode, CsvTable& 
   add("w1", episode.start.w1);
   add("w2", episode.start.w2);
   if (const auto& goal = episode.goal) {
-    add("goal1", goal->up1 ? 1 : -1);
-    add("goal2", goal->up2 ? 1 : -1);
+    const auto [goal1, goal2] = GoalInputs(*goal);
+    add("goal1", goal1);
+    add("goal2", goal2);
   }
   for (const auto& [name, value] : PlantValues(episode.plant)) add(name, value);
   const double delta = ModesOf(episode.plant).delta;

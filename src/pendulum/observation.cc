@@ -33,8 +33,7 @@ void ObservationBuilder::WriteGoal(int env, std::span<float> obs) const {
   const std::optional<Pose> pose = goal(env);
   if (!pose) return;
   const auto at = obs.last(static_cast<size_t>(kGoalSize + memory_ * kMemorySize));
-  at[0] = pose->up1 ? 1.0F : -1.0F;
-  at[1] = pose->up2 ? 1.0F : -1.0F;
+  std::ranges::copy(GoalInputs(*pose), at.begin());
 }
 
 void ObservationBuilder::Begin(int env, const Plant& plant, const PendulumState& measured,

@@ -26,6 +26,9 @@ inline constexpr int kMemorySize = 3;
 /// Numbers that a goal adds to an observation, before the memory: for each link, 1 if it is to
 /// point up and -1 if down.
 inline constexpr int kGoalSize = 2;
+constexpr std::array<float, kGoalSize> GoalInputs(const Pose& goal) {
+  return {goal.up1 ? 1.0F : -1.0F, goal.up2 ? 1.0F : -1.0F};
+}
 /// Typical change of a velocity by the motor in one control period (rad/s), and the standard torque
 /// limit (N·m).
 inline constexpr double kMemoryVelocity = 1.0, kMemoryTorque = 5.0;

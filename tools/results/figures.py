@@ -3,7 +3,7 @@
 
     python3 tools/results/figures.py                  draw all figures
     python3 tools/results/figures.py pareto maps      draw these
-    python3 tools/results/figures.py --measure        run the program for the data of episode, maps, lqr-catch and machine-learn
+    python3 tools/results/figures.py --measure        run the program for the data of episode, poses, maps, lqr-catch and machine-learn
 
 Each figure is a function with @figure. It reads docs/results/data/*.json or docs/figures/**/*.csv. Drawing
 needs matplotlib (tools/docs-requirements.txt) and no built program. Draw again when a data file changes:
@@ -34,6 +34,7 @@ AGENTS = {
     "d3qn-randomized": "#8a6fe0", "d3qn-adaptive": "#b98200",
     "lqr": "#7f8794", "energy": "#a8764a", "pfl": "#8f8072", "tvlqr": "#5b88ad", "mpc": "#d84a4a", "hybrid": "#2b96b8",
 }
+POSES = {"up-up": (math.pi, 0), "up-down": (math.pi, math.pi), "down-up": (0, math.pi), "down-down": (0, 0)}  # q1, q2
 CONTROLLERS = {"lqr", "energy", "pfl", "tvlqr", "mpc", "hybrid"}
 
 # Colours that change in dark mode: name: (placeholder for matplotlib, light, dark).
@@ -207,6 +208,44 @@ def episode():
                   [name.replace(" penalty", "\npenalty") for name in order], loc="center left",
                   bbox_to_anchor=(1.005, 0.5), handlelength=1, borderpad=0, labelspacing=0.7)
     fig.align_ylabels([angles, torque, reward])
+    return fig
+
+
+@figure("poses")
+def poses():
+    """One policy goes from each pose at rest to every other: start, end and the way of the tip."""
+    motions = {}
+    for row in data_of(CSV / "poses.csv"):
+        motions.setdefault((row["from"], row["to"]), []).append([float(row[name]) for name in ("t", "q1", "q2", "inverted")])
+    fig = canvas(800, 720)
+
+    def joints(q1, q2):
+        elbow = math.sin(q1), -math.cos(q1)
+        return (0, 0), elbow, (elbow[0] + math.sin(q1 + q2), elbow[1] - math.cos(q1 + q2))
+
+    def draw_pendulum(axes, q1, q2, **options):
+        pivot, elbow, tip = joints(q1, q2)
+        axes.plot(*zip(pivot, elbow), color=LINK1, linewidth=7, **options)
+        axes.plot(*zip(elbow, tip), color=LINK2, linewidth=3, **options)  # visible on a folded link 1
+
+    for i, start in enumerate(POSES):
+        note(fig, 16, 120 + 165 * i, start, rotation=90, ha="center", color=MUTED)
+        note(fig, 120 + 180 * i, 16, f"to {start}", ha="center", color=MUTED)
+        for k, goal in enumerate(POSES):
+            axes = panel(fig, 40 + 180 * k, 40 + 165 * i, 170, 160)
+            axes.set_axis_off()
+            axes.set_xlim(-2.25, 2.25)
+            axes.set_ylim(-2.12, 2.12)
+            if start == goal:
+                draw_pendulum(axes, *POSES[start], alpha=0.3)
+                continue
+            motion = motions[start, goal]
+            tips = [joints(q1, q2)[2] for _, q1, q2, _ in motion]
+            axes.plot(*zip(*tips), color=MUTED, linewidth=1)
+            draw_pendulum(axes, *POSES[start], alpha=0.3)
+            draw_pendulum(axes, *motion[-1][1:3])
+            away = [t for t, _, _, inverted in motion if inverted == 0]
+            axes.text(2.2, -2.05, f"{away[-1]:.1f} s", ha="right", color=INK)
     return fig
 
 
@@ -554,6 +593,14 @@ def measure(program):
     rows = csv.DictReader(run("simulate", agents / "d3qn.safetensors", "--seconds", 6, "--csv", "-").splitlines())
     write("episode.csv", names.values(), [[f"{float(row[name]):.6g}" for name in names] for row in rows])
 
+    lines = []
+    for start, goal in ((a, b) for a in POSES for b in POSES if a != b):
+        text = run("simulate", agents / "any-pose.safetensors", "--start", ",".join(map(str, (*POSES[start], 0, 0))),
+                   "--goal", goal, "--seconds", 6, "--csv", "-")
+        for row in csv.DictReader(text.splitlines()):
+            lines.append([start, goal, *(f"{float(row[name]):.5g}" for name in ("t", "qpos0", "qpos1", "inverted"))])
+    write("poses.csv", ["from", "to", "t", "q1", "q2", "inverted"], lines)
+
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
         run("map", *(agents / f"{name}.safetensors" for name in ("d3qn", "d3qn-adaptive")), "--x", "mass1=-40%:+40%:21",
@@ -606,7 +653,7 @@ def draw(name):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("figures", nargs="*", metavar="FIGURE", help=f"figures to draw [all]: {', '.join(DRAWN)}")
-    parser.add_argument("--measure", action="store_true", help="run the program for episode, maps, lqr-catch and machine-learn first")
+    parser.add_argument("--measure", action="store_true", help="run the program for episode, poses, maps, lqr-catch and machine-learn first")
     parser.add_argument("--program", default=str(ROOT / "upswing"), help="program that --measure runs")
     a = parser.parse_args()
     for name in a.figures:
