@@ -96,6 +96,7 @@ json About(const Controller& c, const std::map<std::string, std::string>& metada
           {"limit", c.limit()},
           {"memory", c.loaded.memory()},
           {"identifies", c.loaded.identifies()},
+          {"any_pose", c.loaded.seeks_any_pose()},
           {"selfCheckError", c.self_check_error()},
           {"metadata", metadata}};
 }
@@ -251,12 +252,20 @@ namespace {
 
 // Inputs of the formulas, in the order in which the page writes their numbers.
 
-/// A pendulum at a control step, and a push.
+/// A pendulum at a control step.
 struct PendulumInput {
   std::array<double, 8> plant;
   PendulumState state;
-  double torque;             // N·m
+  double torque;  // N·m
+};
+
+struct PushedInput : PendulumInput {
   double link, along, x, z;  // see Push
+};
+
+/// The goal is as in an observation; zeros: it is always upright.
+struct JudgedInput : PendulumInput {
+  double goal1, goal2;
 };
 
 /// A measured state, and the torque of the control period before it.
@@ -290,24 +299,27 @@ void Output(std::initializer_list<double> numbers) { std::ranges::copy(numbers, 
 
 }  // namespace
 
-/// Input: plant, state, torque. Output: observation (8), energy, energy upright, normalised energy,
-/// tip height, whether both links are inverted, the reward's terms (5).
+/// Input: plant, state, torque, goal. Output: observation (8), energy, energy upright, normalised
+/// energy, tip height, whether both links point to the goal within 30°, the reward's terms (5).
 UPSWING_EXPORT(pendulum_at) void PendulumAt() {
-  const auto in = Input<PendulumInput>();
+  const auto in = Input<JudgedInput>();
   const Plant plant = PlantAt(in.plant.data());
   const PendulumState& s = in.state;
+  const bool any_pose = in.goal1 != 0;
+  const Pose goal = any_pose ? Pose{in.goal1 > 0, in.goal2 > 0} : Pose();
   double* to = std::ranges::copy(Observe(plant, s), number.data()).out;
   to = std::ranges::copy(
            std::array{Energy(plant, s), EnergyTarget(plant), NormalizedEnergy(plant, s),
-                      TipHeight(plant, s), Inverted(s) ? 1.0 : 0.0},
+                      TipHeight(plant, s), Inverted(SeenFrom(goal, s)) ? 1.0 : 0.0},
            to)
            .out;
-  std::ranges::copy(RewardTerms(plant, s, in.torque), to);
+  std::ranges::copy(
+      any_pose ? RewardTerms(plant, s, in.torque, goal) : RewardTerms(plant, s, in.torque), to);
 }
 
 /// One physics step. Output: the state after it (4).
 UPSWING_EXPORT(pendulum_step) void PendulumStep() {
-  const auto in = Input<PendulumInput>();
+  const auto in = Input<PushedInput>();
   const Push push{static_cast<int>(in.link), in.along, in.x, in.z};
   const PendulumState s = Step(PlantAt(in.plant.data()), in.state, in.torque, push);
   Output({s.q1, s.q2, s.w1, s.w2});
