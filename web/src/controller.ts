@@ -12,6 +12,7 @@ interface About {
   limit: number; // N·m; for policies without a table of torques
   memory: number; // steps
   identifies: boolean;
+  any_pose: boolean; // whether it observes its goal
   selfCheckError: number;
   metadata: Record<string, string>;
 }

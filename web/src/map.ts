@@ -1,5 +1,5 @@
 import type { Decision } from './decision';
-import type { Plant, State } from './pendulum';
+import type { Goal, Plant, State } from './pendulum';
 import type { World } from './world';
 
 /// A map of the agent's value or torque over two of the four state variables; the others keep their
@@ -58,6 +58,7 @@ export class ValueMap {
   private next = 0; // block to compute next
   private around: State | null = null; // values of the other variables
   private plant: Readonly<Plant> | null = null; // of the map in progress
+  private goal: Goal | null = null; // the same
 
   /// `coarse`: cells along a side of a block of the first map, which is there sooner. It divides
   /// both numbers of cells.
@@ -84,8 +85,9 @@ export class ValueMap {
   /// begun when that map is complete, else null. A change of the plant starts the map again.
   work(world: World, milliseconds: number): State | null {
     const end = performance.now() + milliseconds;
-    if (this.plant !== world.plant) this.restart();
+    if (this.plant !== world.plant || this.goal !== world.target) this.restart();
     this.plant = world.plant;
+    this.goal = world.target;
     this.around ??= this.atRest ? { ...world.state, w1: 0, w2: 0 } : world.state;
     const { block } = this;
     const across = this.columns / block;

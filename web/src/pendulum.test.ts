@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest';
-import { runProgram } from '../tests/program';
+import { policyPath, runProgram } from '../tests/program';
 import { DelayLine, DISTURBANCE_LIMITS } from './disturbance';
 import * as pendulum from './pendulum';
 import type { State } from './pendulum';
@@ -9,10 +9,10 @@ import type { State } from './pendulum';
 const PLANT = { ...pendulum.NOMINAL, mass1: 1.2, length2: 0.4, gravity: 5, torque_limit: 3 };
 
 /// Rows of a policy's rollout on PLANT: t, state, torque, energy, height, inverted, reward, its terms.
-function rows(): number[][] {
+function rows(policy = 'pfl', ...goal: string[]): number[][] {
   const changes = ['mass1=1.2', 'length2=0.4', 'gravity=5', 'torque_limit=3'];
   const flags = changes.flatMap((change) => ['--set', change]);
-  const text = runProgram('simulate', 'pfl', '--seconds', '5', ...flags);
+  const text = runProgram('simulate', policy, '--seconds', '5', ...goal, ...flags);
   return text
     .trim()
     .split('\n')
@@ -49,6 +49,16 @@ test('energy, height, upright, reward, observation', () => {
     );
   }
   expect(seen.size).toBe(2);
+});
+
+test.each(Object.values(pendulum.GOALS))('judgement and reward of the goal $name', (goal) => {
+  const all = rows(policyPath('any-pose'), '--goal', goal.name);
+  for (const [, q1, q2, w1, w2, torque, , , inverted, , ...terms] of all) {
+    const state = { q1, q2, w1, w2 } as State;
+    expect(pendulum.inverted(state, goal)).toBe(inverted === 1);
+    expectClose(pendulum.rewardTerms(PLANT, state, torque!, goal), terms);
+  }
+  expect(pendulum.inverted(pendulum.restIn(goal), goal)).toBe(true);
 });
 
 test("parameters and their ranges equal the program's", () => {

@@ -72,6 +72,37 @@ export interface State {
 
 export const HANGING: Readonly<State> = { q1: 0, q2: 0, w1: 0, w2: 0 };
 
+/// A pose at rest that a policy for any pose can reach, by its name in the program: which links
+/// point up.
+export interface Goal {
+  name: GoalName;
+  up1: boolean;
+  up2: boolean;
+}
+
+export type GoalName = 'up-up' | 'up-down' | 'down-up' | 'down-down';
+
+export const GOALS: Readonly<Record<GoalName, Goal>> = {
+  'up-up': { name: 'up-up', up1: true, up2: true },
+  'up-down': { name: 'up-down', up1: true, up2: false },
+  'down-up': { name: 'down-up', up1: false, up2: true },
+  'down-down': { name: 'down-down', up1: false, up2: false },
+};
+
+/// A goal in an observation: for each link 1 for up and -1 for down. Zeros for null, which is
+/// upright for a policy without a choice.
+export function goalNumbers(goal: Goal | null): [number, number] {
+  const sign = (up: boolean) => (up ? 1 : -1);
+  return goal ? [sign(goal.up1), sign(goal.up2)] : [0, 0];
+}
+
+/// Rest in the goal.
+export function restIn(goal: Goal | null): State {
+  const { up1, up2 } = goal ?? GOALS['up-up'];
+  const [q1, q12] = [up1, up2].map((up) => (up ? Math.PI : 0)) as [number, number];
+  return { q1, q2: q12 - q1, w1: 0, w2: 0 };
+}
+
 /// Principal moments of inertia (kg·m²) of a solid capsule, across and along its axis: mass m (kg),
 /// radius r (m), length l of its cylinder (m).
 export function capsuleInertia(m: number, r: number, l: number) {
@@ -81,8 +112,13 @@ export function capsuleInertia(m: number, r: number, l: number) {
 
 /// All the core's numbers about a state under a torque, in its order (web/wasm/api.cc). A call
 /// takes 3 µs, a tenth of a policy's decision, so one call for all is cheap enough.
-function at(plant: Plant, { q1, q2, w1, w2 }: State, torque = 0): Float64Array {
-  const numbers = [...plantNumbers(plant), q1, q2, w1, w2, torque];
+function at(
+  plant: Plant,
+  { q1, q2, w1, w2 }: State,
+  torque = 0,
+  goal: Goal | null = null,
+): Float64Array {
+  const numbers = [...plantNumbers(plant), q1, q2, w1, w2, torque, ...goalNumbers(goal)];
   return core().formula(numbers, core().exports.pendulum_at);
 }
 
@@ -121,9 +157,9 @@ export function relativeHeight(plant: Plant, s: State): number {
   return at(plant, s)[7]!;
 }
 
-/// Both links within 30° of straight up; the second by its absolute angle q1 + q2.
-export function inverted(s: State): boolean {
-  return at(NOMINAL, s)[12] === 1;
+/// Both links within 30° of the goal's directions; the second by its absolute angle q1 + q2.
+export function inverted(s: State, goal: Goal | null = null): boolean {
+  return at(NOMINAL, s, 0, goal)[12] === 1;
 }
 
 export const OBSERVATION_SIZE = 8;
@@ -153,9 +189,15 @@ export function remember(
 }
 
 /// The reward's five terms for being in state s under torque tau, signed, so that their sum is the
-/// reward: energy, height, balance, velocity penalty, torque penalty.
-export function rewardTerms(plant: Plant, s: State, tau: number): number[] {
-  return [...at(plant, s, tau).subarray(13, 18)];
+/// reward: energy, height, balance, velocity penalty, torque penalty. `goal` null: for a policy
+/// without a choice, whose energy counts beyond that of upright.
+export function rewardTerms(
+  plant: Plant,
+  s: State,
+  tau: number,
+  goal: Goal | null = null,
+): number[] {
+  return [...at(plant, s, tau, goal).subarray(13, 18)];
 }
 
 /// The model as MJCF, with all digits of the plant's numbers. Contacts and constraints are off: a

@@ -18,6 +18,8 @@ export class Policy {
   readonly memory: number;
   /// Whether an observation contains an estimate of the plant.
   readonly identifies: boolean;
+  /// Whether an observation contains the pose to reach. Otherwise that is upright.
+  readonly seeksAnyPose: boolean;
   /// The training plant, or a controller's design plant.
   readonly plant: Plant;
   /// Factor of the rewards, and so of its values, during training.
@@ -35,6 +37,7 @@ export class Policy {
       this.controller = controller;
       this.memory = controller.about.memory;
       this.identifies = controller.about.identifies;
+      this.seeksAnyPose = controller.about.any_pose;
       this.metadata = new Map(Object.entries(controller.about.metadata));
     } catch (error) {
       if (!(error instanceof BadInput)) throw error;

@@ -2,7 +2,7 @@ import loadMujoco from '@mujoco/mujoco';
 import type { MainModule } from '@mujoco/mujoco';
 import { beforeAll, beforeEach, expect, test } from 'vitest';
 import { policyPath, readPolicy, simulate } from '../tests/program';
-import { HANGING, NOMINAL } from './pendulum';
+import { goalNumbers, GOALS, HANGING, NOMINAL, restIn } from './pendulum';
 import { Policy } from './policy';
 import { Mujoco } from './mujoco';
 import { pointOn, World } from './world';
@@ -58,7 +58,37 @@ test.each(['d3qn', 'd3qn-adaptive', 'd3qn-randomized'])(
   },
 );
 
-// Their torques are continuous, and rounding differs.
+// Its torques are continuous, and rounding differs.
+test.each(Object.values(GOALS))('any-pose goes to $name as in `upswing simulate`', (goal) => {
+  agentOn('any-pose');
+  world.goal = goal;
+  const flags = ['--goal', goal.name, '--seconds', '5'];
+  expectTrajectory(run(5), simulate(policyPath('any-pose'), ...flags), 1e-3, 1e-2);
+});
+
+test('a new goal counts from the next control step on, also for the twin', () => {
+  agentOn('any-pose');
+  world.twin = new World(new Mujoco(mujoco));
+  world.twin.policy = world.policy;
+  run(0.02);
+  for (const goal of [GOALS['up-down'], GOALS['down-up'], GOALS['up-up'], GOALS['up-down']]) {
+    world.goal = goal;
+    expect(world.uprightFor).toBeNull();
+    const numbers = Float32Array.from(goalNumbers(goal));
+    expect(world.seen.subarray(8)).not.toEqual(numbers);
+    run(0.02);
+    expect(world.seen.subarray(8)).toEqual(numbers);
+    run(15);
+    expect(world.uprightFor).toBeGreaterThan(5);
+    expect(world.twin.uprightFor).toBe(world.uprightFor);
+  }
+  world.policy = new Policy(readPolicy('fast'));
+  expect(world.uprightFor).toBeNull();
+  world.reset(restIn(null));
+  expect(world.uprightFor).toBe(0);
+});
+
+// The same.
 test.each([
   ['lqr', 3.13],
   ['energy', 0],

@@ -3,6 +3,8 @@ import type { Disturbance } from './disturbance';
 import { Identifier } from './identifier';
 import {
   CONTROL_PERIOD,
+  goalNumbers,
+  GOALS,
   HANGING,
   inverted,
   NOMINAL,
@@ -12,7 +14,7 @@ import {
   relativeHeight,
   remember,
 } from './pendulum';
-import type { Plant, State } from './pendulum';
+import type { Goal, Plant, State } from './pendulum';
 import type { Decision, Memory } from './decision';
 import type { Policy } from './policy';
 import { Sensors } from './sensors';
@@ -62,6 +64,7 @@ export class World {
 
   private _plant: Plant = { ...NOMINAL };
   private _policy: Policy | null = null;
+  private _goal: Goal = GOALS['up-up'];
   private observation: Float32Array | null = null; // at the last control step; null at the start
   private chosen = 0; // N·m, chosen at that step
   private memory: Memory | null = null; // the policy's, since the start
@@ -72,7 +75,7 @@ export class World {
   private readonly sensors = new Sensors();
   private reading: Reading | null = null; // at the last control step; null at the start
   private steps = 0; // physics steps since the page was opened
-  private uprightSince: number | null = null; // physics step; null if the links are not upright
+  private uprightSince: number | null = null; // physics step; null if the links are not in the goal
   private untilControl = 0; // steps until the agent chooses again
   private begun = 0; // physics step of the start
   private shove = { force: 0, steps: 0 };
@@ -102,7 +105,24 @@ export class World {
     this.identifier = policy?.identifies ? new Identifier(policy.plant) : null;
     this.identifies = false;
     this.forget();
+    this.judge();
     this.look();
+  }
+
+  /// The pose to reach for a policy for any pose; also the twin's.
+  set goal(goal: Goal) {
+    this._goal = goal;
+    if (this.twin) this.twin.goal = goal;
+    this.judge();
+    this.look();
+  }
+  get goal(): Goal {
+    return this._goal;
+  }
+
+  /// The goal of its policy; null if that is always upright.
+  get target(): Goal | null {
+    return this._policy?.seeksAnyPose ? this._goal : null;
   }
 
   /// Restarts the policy without memory.
@@ -137,8 +157,8 @@ export class World {
     return this.untilControl === 0;
   }
 
-  /// How long (s) both links have been upright without a break; null if they are not. Counted in
-  /// steps, so that 1 s is exact.
+  /// How long (s) both links have been in the goal, usually upright, without a break; null if they
+  /// are not. Counted in steps, so that 1 s is exact.
   get uprightFor(): number | null {
     return this.uprightSince === null ? null : (this.steps - this.uprightSince) / STEPS_PER_SECOND;
   }
@@ -166,7 +186,8 @@ export class World {
     this.push = null;
     this.shoved = null;
     this.shove.steps = 0;
-    this.uprightSince = inverted(state) ? this.steps : null;
+    this.uprightSince = null;
+    this.judge();
     this.look();
     this.twin?.reset(state);
   }
@@ -233,12 +254,21 @@ export class World {
     return policy.act(observation);
   }
 
+  /// Counts the time in the goal.
+  private judge(): void {
+    if (!inverted(this.state, this.target)) this.uprightSince = null;
+    else this.uprightSince ??= this.steps;
+  }
+
   /// The observation of a measured state without memory. A policy that identifies the plant gets
   /// its estimate instead of the true plant.
   private present(measured: State): Float32Array {
-    const { plant, policy, identifier } = this;
-    if (!policy || !identifier) return observe(plant, measured);
-    return Float32Array.of(...observe(policy.plant, measured), ...identifier.observe(measured));
+    const { plant, policy, identifier, target } = this;
+    if (!identifier && !target) return observe(plant, measured);
+    const assumed = policy && identifier ? policy.plant : plant;
+    const estimate = identifier?.observe(measured) ?? [];
+    const goal = target ? goalNumbers(target) : [];
+    return Float32Array.of(...observe(assumed, measured), ...estimate, ...goal);
   }
 
   /// The present observation. Encoders show their values of the last control step.
@@ -277,8 +307,7 @@ export class World {
     const arriving = this.motor.apply(this.chosen, this.disturbance.delay);
     this.torque = Math.min(Math.max(arriving, -limit), limit);
 
-    if (!inverted(state)) this.uprightSince = null;
-    else this.uprightSince ??= this.steps;
+    this.judge();
     this.onMoment({
       t: this.time,
       state,

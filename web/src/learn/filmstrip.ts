@@ -71,8 +71,8 @@ export class Filmstrip {
       world.advance();
       upright = Math.max(upright, world.uprightFor ?? 0);
     }
-    const { plant, time, state, uprightFor } = world;
-    const last = { ...{ plant, time, uprightFor }, ...STILL };
+    const { plant, time, state, uprightFor, target } = world;
+    const last = { ...{ plant, time, uprightFor, target }, ...STILL };
     const paint = () => scene.draw(last, state, history.from(begun));
     this.pictures[i] = paint;
     paint();

@@ -16,12 +16,12 @@ const REWARD = [
 const KNOBS: Readonly<Record<string, readonly string[]>> = {
   fast: [
     ...['learning_rate', 'gamma', 'n_step', 'epsilon_start', 'epsilon_decay', 'epsilon_end'],
-    ...['double', 'dueling', 'layer_norm', 'prioritized', 'mirror'],
+    ...['double', 'dueling', 'layer_norm', 'prioritized', 'mirror', 'any_pose'],
     ...REWARD,
   ],
   'sac-fast': [
     ...['learning_rate', 'gamma', 'n_step', 'updates_per_step'],
-    ...['layer_norm', 'twin', 'mirror'],
+    ...['layer_norm', 'twin', 'mirror', 'any_pose'],
     ...REWARD,
   ],
 };

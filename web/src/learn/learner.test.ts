@@ -2,6 +2,7 @@ import { createHash } from 'node:crypto';
 import { expect, test } from 'vitest';
 import { coreModule } from '../../tests/core';
 import { Core, core } from '../core';
+import { OBSERVATION_SIZE } from '../pendulum';
 import { Policy } from '../policy';
 import { BadInput } from '../bad_input';
 import { agentSettings, Learner } from './learner';
@@ -45,6 +46,14 @@ test('SAC learns too, with settings of its own', async () => {
   expect(steps).toBe(320);
   expect(updates).toBeGreaterThan(0);
   expect(new Policy(learner.policy()).about('output')).toBe('squashed-gaussian');
+});
+
+test('a training for any pose gives a policy that observes its goal', async () => {
+  const learner = new Learner(await newCore(), 'fast', 1, { any_pose: 'true' });
+  learner.run(10);
+  const policy = new Policy(learner.policy());
+  expect(policy.seeksAnyPose).toBe(true);
+  expect(policy.controller.inputs).toBe(OBSERVATION_SIZE + 2);
 });
 
 test('settings are checked as the program checks them, in one line', async () => {

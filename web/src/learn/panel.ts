@@ -548,8 +548,9 @@ function milestone(session: Session): string {
     const steady = success < best ? ': learning is not steady.' : '.';
     return `It passes ${Math.round(100 * success)} of 100 tests${steady}`;
   }
-  // With another reward, returns prove nothing.
-  if (Object.keys(settings).some((name) => /reward|_weight$/.test(name))) return 'Learning …';
+  // With another reward or goal, returns prove nothing.
+  if (Object.keys(settings).some((name) => /reward|_weight$|any_pose/.test(name)))
+    return 'Learning …';
   for (const [proof, long] of PROOFS) {
     const trial = episodes.findIndex(({ reward }) => reward > proof);
     if (trial >= 0) return `Upright ${long}: trial ${trial + 1}.`;

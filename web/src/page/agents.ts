@@ -43,6 +43,9 @@ export interface Agent {
   policy: Policy;
 }
 
+/// ID of the shipped policy for any pose.
+const ANY_POSE = 'any-pose';
+
 const TITLES = new Map([
   ['d3qn', 'Dueling Double DQN'],
   ['dqn', 'DQN'],
@@ -54,6 +57,7 @@ const TITLES = new Map([
   ['sac', 'SAC: any torque'],
   ['sac-fast', 'SAC: a small network'],
   ['ppo', 'PPO: any torque'],
+  [ANY_POSE, 'Any pose: you choose'],
 ]);
 
 /// Descriptions of the page's agents, in plain words.
@@ -86,6 +90,10 @@ const PLAIN: ReadonlyMap<string, string> = new Map([
   ],
   ['sac', `It learned by trial, from all its past trials, and may use any torque. ${CAN}`],
   ['ppo', `It learned by trial, from its latest trials only, and may use any torque. ${CAN}`],
+  [
+    ANY_POSE,
+    'One network that goes from any pose at rest to any other. Choose the pose under the pendulum.',
+  ],
 ]);
 
 /// Controllers computed from the equations of motion (docs/controllers.md): title and description.
@@ -121,17 +129,27 @@ const NOT_LEARNED =
   'Not learned, but computed from the equations of motion of the unchanged pendulum.';
 
 /// An entry's title: its agent, and its ID if that differs.
-function titleOf({ id, agent }: Entry): string {
-  const title = TITLES.get(agent) ?? printable(agent);
-  return id === agent ? title : `${title}, ${printable(id)}`;
+function titleOf(entry: Entry): string {
+  const { id } = entry;
+  const kind = kindOf(entry);
+  const title = TITLES.get(kind) ?? printable(kind);
+  return id === kind ? title : `${title}, ${printable(id)}`;
+}
+
+/// An entry's agent, or its ID for the policy for any pose, which has no named agent of its own.
+function kindOf({ id, agent }: Entry): string {
+  return id === ANY_POSE ? id : agent;
 }
 
 /// A description of any policy, in plain words.
-function plainly({ controller }: Policy, agent: string): string {
+function plainly({ controller, seeksAnyPose }: Policy, agent: string): string {
   const { strongest } = controller;
+  const torques = `torques up to ${signed(strongest)} N·m`;
   return (
     PLAIN.get(agent) ??
-    `A policy that chooses torques up to ${signed(strongest)} N·m. Run it to see what it can do.`
+    (seeksAnyPose
+      ? `A policy for any pose, with ${torques}. Choose the pose under the pendulum.`
+      : `A policy that chooses ${torques}. Run it to see what it can do.`)
   );
 }
 
@@ -145,6 +163,7 @@ function describe(policy: Policy): string {
     text.charAt(0).toUpperCase() + text.slice(1),
     policy.memory > 0 ? `, remembers ${policy.memory} steps` : '',
     policy.identifies ? ', identifies its pendulum' : '',
+    policy.seeksAnyPose ? ', observes the pose to reach' : '',
     randomized ? ', trained on random pendulums' : '',
     '.',
   ].join('');
@@ -265,7 +284,7 @@ export class Agents {
   private async fetchAgent(entry: Entry): Promise<Agent> {
     const policy = new Policy(await fetchPolicy(entry.file));
     const { id, command, curve } = entry;
-    const what = plainly(policy, id === entry.agent ? id : OWN);
+    const what = plainly(policy, id === kindOf(entry) ? id : OWN);
     return this.add({
       ...{ id, title: titleOf(entry), what, text: describe(policy) },
       ...{ command, curve, policy },

@@ -8,7 +8,7 @@ export class Badge {
 
   /// Shows the state. True when the pendulum has just become balanced.
   draw(world: World, paused: boolean, scene: HTMLElement): boolean {
-    const { state, text } = situation(world);
+    const { state, text, said } = situation(world);
     const badge = element('badge');
     const moving = state === 'swinging' || state === 'free';
     write(badge, !paused ? text : moving ? 'paused' : `paused, ${text}`);
@@ -16,9 +16,8 @@ export class Badge {
     if (state === this.announced) return false;
     // Announced when the state changes, not at each tenth of a second.
     this.announced = state;
-    const words = state === 'balanced' ? 'balanced' : text;
-    element('live').textContent = words;
-    scene.ariaLabel = `The pendulum: ${words}`;
+    element('live').textContent = said;
+    scene.ariaLabel = `The pendulum: ${said}`;
     return state === 'balanced';
   }
 }

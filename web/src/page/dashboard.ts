@@ -1,5 +1,13 @@
 import type { History } from '../history';
-import { energy, energyTarget, rewardTerms, tipHeight } from '../pendulum';
+import {
+  energy,
+  inverted,
+  normalizedEnergy,
+  relativeHeight,
+  restIn,
+  rewardTerms,
+  tipHeight,
+} from '../pendulum';
 import type { State } from '../pendulum';
 import type { Decision } from '../decision';
 import { PhasePortrait, SECONDS_SHOWN, signed, Strip } from '../view/charts';
@@ -42,11 +50,12 @@ export class Dashboard {
     if (turn % (5 * FRAMES) === 0) this.showNumbers(world);
   }
 
-  private drawWay(moments: readonly Moment[], { time: now }: World): void {
+  private drawWay(moments: readonly Moment[], { time: now, plant, target }: World): void {
+    const goal = restIn(target);
     this.energy.draw(moments, now, {
       low: -0.1,
       high: 1.6,
-      target: 1,
+      target: normalizedEnergy(plant, goal),
       labels: [
         [0, 'hang'],
         [1, 'up'],
@@ -55,7 +64,7 @@ export class Dashboard {
     this.height.draw(moments, now, {
       low: -1.1,
       high: 1.1,
-      target: 1,
+      target: relativeHeight(plant, goal),
       labels: [
         [-1, 'hang'],
         [0, 'pivot'],
@@ -85,17 +94,17 @@ export class Dashboard {
 
   /// A few times a second, so that the numbers can be read.
   private showNumbers(world: World): void {
-    const { plant, policy, decision, state } = world;
-    const target = energyTarget(plant);
-    const reach = plant.length1 + plant.length2;
-    tell('energy', `${fixed(energy(plant, state))} J of ${fixed(target)} J`);
-    tell('height', `${fixed(tipHeight(plant, state))} m of ${fixed(reach)} m`);
+    const { plant, policy, decision, state, target } = world;
+    const goal = restIn(target);
+    const of = target ? ', goal' : ' of';
+    tell('energy', `${fixed(energy(plant, state))} J${of} ${fixed(energy(plant, goal))} J`);
+    tell('height', `${fixed(tipHeight(plant, state))} m${of} ${fixed(tipHeight(plant, goal))} m`);
     tell('torque', `${fixed(world.torque)} N·m`);
     const name = decision ? NAMES[decision.kind] : 'Policy';
     write(element('q-name'), name);
     element('q').dataset.name = name;
     tell('q', policy && decision ? decisionText(decision, policy.rewardScale) : '');
-    write(element('reward'), rewardText(rewardTerms(plant, state, world.torque)));
+    write(element('reward'), rewardText(rewardTerms(plant, state, world.torque, target)));
   }
 }
 
@@ -146,9 +155,22 @@ export function decisionText(decision: Decision, rewardScale: number): string {
 const SPIN = 3; // rad/s
 const BALANCED = 1; // s upright, after which it is more than a swing through the top
 
-/// The pendulum's state in words.
-export function situation(world: World): { state: string; text: string } {
-  const upright = world.uprightFor;
+/// The pendulum's state in words. `said`: the text without numbers.
+export function situation(world: World): { state: string; text: string; said: string } {
+  const { state, text } = world.agentOn && world.target ? onItsWay(world) : upOrNot(world);
+  return { state, text, said: text.replace(/ for [\d.]+ s$/, '') };
+}
+
+/// The state of a pendulum whose goal the visitor chose.
+function onItsWay({ uprightFor: held, state }: World): { state: string; text: string } {
+  if (held !== null && held >= BALANCED)
+    return { state: 'balanced', text: `in the pose for ${held.toFixed(1)} s` };
+  if (held !== null && isSlow(state)) return { state: 'upright', text: 'in the pose' };
+  return { state: 'swinging', text: 'on its way' };
+}
+
+function upOrNot(world: World): { state: string; text: string } {
+  const upright = inverted(world.state) ? world.uprightFor : null;
   if (upright !== null && upright >= BALANCED)
     return { state: 'balanced', text: `balanced for ${upright.toFixed(1)} s` };
   if (upright !== null && isSlow(world.state)) return { state: 'upright', text: 'upright' };

@@ -120,11 +120,15 @@ export class MapPanel {
   /// Computes, unless the map belongs to the present state already.
   private work(world: World): void {
     const { map } = this;
-    const { plant } = world;
+    const { plant, target } = world;
     this.busy = true;
     const keyOf = (state: State) => {
       const rest = map.atRest ? { w1: 0, w2: 0 } : {};
-      return JSON.stringify([{ ...state, ...rest, [map.x.name]: 0, [map.y.name]: 0 }, plant]);
+      return JSON.stringify([
+        { ...state, ...rest, [map.x.name]: 0, [map.y.name]: 0 },
+        plant,
+        target,
+      ]);
     };
     if (map.cells && keyOf(world.state) === this.key) {
       this.busy = false;

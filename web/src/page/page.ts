@@ -1,7 +1,8 @@
 import { core } from '../core';
 import { History } from '../history';
 import { LearnPanel } from '../learn/panel';
-import type { State } from '../pendulum';
+import { GOALS } from '../pendulum';
+import type { GoalName, State } from '../pendulum';
 import type { Mujoco } from '../mujoco';
 import { Scene, TRAIL_SECONDS } from '../view/scene';
 import { quoted } from '../text';
@@ -16,6 +17,7 @@ import { Dashboard } from './dashboard';
 import { listenToFilms } from './film';
 import { button, element } from './dom';
 import { Frames } from './frames';
+import { GoalButtons } from './goals';
 import { Hand } from './hand';
 import { listenToKeys } from './keys';
 import { explain, listenToExamples, placeCharts } from './layout';
@@ -49,6 +51,7 @@ export class Page {
   private readonly settings: Settings;
   private readonly pose: Pose;
   private readonly badge = new Badge();
+  private readonly goals = new GoalButtons((name) => this.setGoal(name));
   private readonly dashboard = new Dashboard();
   private readonly map = new MapPanel((where) => this.start(where));
   private readonly ring = new Ring(document.querySelectorAll('.scale.of-ring'));
@@ -335,6 +338,12 @@ export class Page {
     this.changed();
   }
 
+  /// Sets the pose to reach, also during a motion.
+  private setGoal(name: GoalName): void {
+    this.world.goal = GOALS[name];
+    this.changed();
+  }
+
   private setPaused(paused: boolean): void {
     this.paused = paused;
     this.world.drag = null;
@@ -387,14 +396,15 @@ export class Page {
 
   /// Resets plant, sensors and motor to their initial settings.
   private resetSettings(): void {
-    const { agentOn: on } = this.world;
-    this.apply({ ...BEGINNING, on, speed: this.clock.speed });
+    const { agentOn: on, goal } = this.world;
+    this.apply({ ...BEGINNING, on, goal: goal.name, speed: this.clock.speed });
   }
 
   private apply(shared: Shared): void {
     this.settings.setPlant(shared.plant);
     this.settings.setDisturbance(disturbanceOf(shared));
     this.setSpeed(shared.speed);
+    this.setGoal(shared.goal);
     this.setAgentOn(shared.on);
   }
 
@@ -422,6 +432,7 @@ export class Page {
       agent: forOthers && this.agent?.id === OWN ? null : (this.agent?.id ?? null),
       twin: this.twin.id === OWN ? null : this.twin.id,
       on: this.world.agentOn,
+      goal: (this.world.target ?? this.world.twin?.target ?? GOALS['up-up']).name,
       speed: this.clock.speed,
       plant: this.world.plant,
       ...this.world.disturbance,
@@ -451,6 +462,7 @@ export class Page {
     this.learn.follow();
     if (this.learning && !prefersStill()) this.scene.ghosts = this.learn.ghosts;
     if (this.paused) this.pose.follow(world.state);
+    this.goals.follow(world);
     this.dashboard.draw(world, this.history);
     this.map.draw(world, this.history);
     const caught = this.badge.draw(world, this.paused, this.scene.canvas.element);

@@ -13,6 +13,7 @@ export class Ring {
   private readonly scales: readonly Scale[];
   private version: object | null = null; // of the ring in progress, or of the last one
   private plant: World['plant'] | null = null;
+  private goal: World['target'] = null;
   private complete = false;
   private painted: readonly [Float32Array | null, number, number] = [null, NaN, NaN];
   shown = false;
@@ -33,14 +34,14 @@ export class Ring {
   /// Call at each frame. `range`: values at the ends of the colours; null: the ring's own. Computes
   /// again when `version` changes, and keeps the colours before until the new ones are complete.
   follow(world: World, range: readonly [number, number] | null, version: object | null): void {
-    const { policy, plant } = world;
+    const { policy, plant, target } = world;
     if (!this.shown || !policy?.isQuick) {
       this.version = null;
       this.complete = true;
       return this.paint([NaN, NaN], 1);
     }
-    if (version !== this.version || plant !== this.plant) {
-      [this.version, this.plant, this.complete] = [version, plant, false];
+    if (version !== this.version || plant !== this.plant || target !== this.goal) {
+      [this.version, this.plant, this.goal, this.complete] = [version, plant, target, false];
       this.map.clear();
     }
     this.complete ||= this.map.work(world, MILLISECONDS) !== null;

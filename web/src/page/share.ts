@@ -1,7 +1,7 @@
 import { PERFECT } from '../disturbance';
 import type { Disturbance } from '../disturbance';
-import { NOMINAL } from '../pendulum';
-import type { Parameter, Plant, Range } from '../pendulum';
+import { GOALS, NOMINAL } from '../pendulum';
+import type { GoalName, Parameter, Plant, Range } from '../pendulum';
 import { quoted } from '../text';
 
 /// Stands for a visitor's own policy, which no link can contain.
@@ -14,6 +14,7 @@ export interface Shared extends Disturbance {
   agent: string | null;
   twin: string | null; // the second pendulum's agent
   on: boolean;
+  goal: GoalName; // of an agent for any pose
   speed: number;
   plant: Plant;
 }
@@ -23,6 +24,7 @@ export const BEGINNING: Readonly<Shared> = {
   agent: null,
   twin: null,
   on: false,
+  goal: 'up-up',
   speed: 1,
   plant: NOMINAL,
   ...PERFECT,
@@ -46,6 +48,7 @@ export function encode(shared: Shared): string {
   if (shared.agent) fields.set('agent', shared.agent);
   if (shared.twin) fields.set('twin', shared.twin);
   if (shared.on) fields.set('on', '1');
+  if (shared.goal !== BEGINNING.goal) fields.set('goal', shared.goal);
   const beginning = numbersOf(BEGINNING);
   for (const [name, value] of Object.entries(numbersOf(shared))) {
     if (value !== beginning[name]) fields.set(name, String(value));
@@ -70,6 +73,9 @@ export function decode(
       else problems.push(text === OWN ? NOT_IN_IT : `unknown agent ${quoted(text)}`);
     } else if (name === 'on') {
       shared.on = text === '1';
+    } else if (name === 'goal') {
+      if (Object.hasOwn(GOALS, text)) shared.goal = text as GoalName;
+      else problems.push(`goal: expected ${Object.keys(GOALS).join(', ')}, got ${quoted(text)}`);
     } else if (name === 'everything' || name === 'learn') {
       // names the view, without a value
     } else if (!range) {

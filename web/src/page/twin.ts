@@ -72,6 +72,7 @@ export class Twin {
     const absent = this.world.policy === null;
     this.first.twin = absent ? null : this.world;
     this.world.plant = this.first.plant;
+    this.world.goal = this.first.goal;
     this.world.reset(this.first.state);
     this.restarted();
     element('twin-box').hidden = absent;
@@ -93,10 +94,10 @@ export class Twin {
     if (!state) return;
     const { world, history, scene } = this;
     scene.draw(world, state, still ? [] : history.from(world.time - TRAIL_SECONDS));
-    const { state: what, text } = situation(world);
+    const { state: what, text, said } = situation(world);
     const badge = element('twin-badge');
     write(badge, text);
     badge.dataset.state = what;
-    scene.canvas.element.ariaLabel = `The other pendulum: ${what === 'balanced' ? what : text}`;
+    scene.canvas.element.ariaLabel = `The other pendulum: ${said}`;
   }
 }

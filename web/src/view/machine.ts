@@ -26,8 +26,8 @@ function faded(color: string, alpha: number): string {
   return `rgb(${r} ${g} ${b} / ${alpha})`;
 }
 
-/// The light from the motor to the goal, and the circle within the tip's reach. `strength`: 0 to 1.
-export function drawLight(canvas: Canvas, [x, y]: Place, reach: number, strength: number): void {
+/// The circle within the tip's reach.
+export function drawReach(canvas: Canvas, [x, y]: Place, reach: number): void {
   const { context } = canvas;
   context.beginPath();
   context.arc(x, y, reach, 0, 2 * Math.PI);
@@ -36,19 +36,35 @@ export function drawLight(canvas: Canvas, [x, y]: Place, reach: number, strength
   context.globalAlpha = 0.35;
   context.stroke();
   context.globalAlpha = 1;
+}
+
+/// The light from a joint to the goal, upwards or downwards. `strength`: 0 to 1.
+export function drawLight(
+  canvas: Canvas,
+  [x, y]: Place,
+  reach: number,
+  strength: number,
+  up: boolean,
+): void {
+  const { context } = canvas;
+  const middle = up ? -Math.PI / 2 : Math.PI / 2;
   const color = canvas.color('cone-edge');
   if (forcedColors.matches) {
     context.beginPath();
-    context.arc(x, y, reach, -Math.PI / 2 - UPRIGHT, -Math.PI / 2 + UPRIGHT);
+    context.arc(x, y, reach, middle - UPRIGHT, middle + UPRIGHT);
     context.strokeStyle = color;
     context.lineWidth = 4;
     return context.stroke();
   }
   context.globalAlpha = strength;
   const beam = beamOf(canvas, color, Math.ceil(FAR * reach));
-  context.drawImage(beam, x - beam.width / 2, y - beam.height / 2);
+  context.save();
+  context.translate(x, y);
+  if (!up) context.rotate(Math.PI);
+  context.drawImage(beam, -beam.width / 2, -beam.height / 2);
+  context.restore();
   context.beginPath();
-  context.arc(x, y, reach, -Math.PI / 2 - UPRIGHT, -Math.PI / 2 + UPRIGHT);
+  context.arc(x, y, reach, middle - UPRIGHT, middle + UPRIGHT);
   context.strokeStyle = color;
   context.lineWidth = 3;
   context.stroke();

@@ -1,3 +1,4 @@
+import { GOALS, restIn } from '../pendulum';
 import type { Plant, State } from '../pendulum';
 import type { Push, Vec } from '../simulator';
 import { pointOn } from '../world';
@@ -10,6 +11,7 @@ import {
   drawHub,
   drawJoint,
   drawLight,
+  drawReach,
   drawRing,
   drawRod,
   drawTrace,
@@ -25,7 +27,7 @@ const LARGEST_ARC = (150 / 180) * Math.PI; // at the torque limit
 /// The parts of a world that a scene draws.
 export type Shown = Pick<
   World,
-  'plant' | 'time' | 'torque' | 'uprightFor' | 'push' | 'drag' | 'shoved'
+  'plant' | 'time' | 'torque' | 'uprightFor' | 'target' | 'push' | 'drag' | 'shoved'
 >;
 
 /// The pendulum in its plane, seen so that positive angles and torques are clockwise.
@@ -88,7 +90,8 @@ export class Scene {
     this.fit(Math.max(1, reach));
     if (!(this.scale > 0)) return; // hidden
     canvas.clear();
-    drawLight(canvas, this.at(PIVOT), this.scale * reach, this.glow('goal', world));
+    drawReach(canvas, this.at(PIVOT), this.scale * reach);
+    this.drawGoal(world);
     drawRing(canvas, this.at(PIVOT), this.scale * reach, this.ring);
     this.drawGhosts(plant);
     const tipOf = (s: State) => this.at(pointOn(plant, s, 2, plant.length2).position);
@@ -129,18 +132,41 @@ export class Scene {
     return this.lit === thing ? 1 : uprightFor !== null ? 0.8 : 0.4;
   }
 
+  /// Light where each link counts as in the goal. A chosen goal has a ghost.
+  private drawGoal(world: Shown): void {
+    const { plant, target } = world;
+    const { up1, up2 } = target ?? GOALS['up-up'];
+    const { length1, length2 } = plant;
+    const glow = this.glow('goal', world);
+    const light = (from: Vec, length: number, up: boolean) =>
+      drawLight(this.canvas, this.at(from), this.scale * length, glow, up);
+    if (up1 === up2) {
+      light(PIVOT, length1 + length2, up1);
+    } else {
+      const longer = Math.max(length1, length2);
+      light(PIVOT, longer, up1);
+      light({ x: 0, z: up1 ? length1 : -length1 }, longer, up2);
+    }
+    if (target) this.drawGhost(plant, restIn(target), 0.35);
+  }
+
   private drawGhosts(plant: Plant): void {
-    const { context } = this.canvas;
-    context.globalAlpha = this.ghosts.length > 2 ? 0.13 : 0.35;
-    context.lineCap = 'round';
-    const width = Math.max(3, 0.02 * this.scale);
+    const alpha = this.ghosts.length > 2 ? 0.13 : 0.35;
     for (let i = 0; i + 1 < this.ghosts.length; i += 2) {
       const state = { q1: this.ghosts[i]!, q2: this.ghosts[i + 1]!, w1: 0, w2: 0 };
-      const elbow = this.at(pointOn(plant, state, 1, plant.length1).position);
-      const tip = this.at(pointOn(plant, state, 2, plant.length2).position);
-      this.canvas.line([this.at(PIVOT), elbow], 'link1', width);
-      this.canvas.line([elbow, tip], 'link2', width);
+      this.drawGhost(plant, state, alpha);
     }
+  }
+
+  private drawGhost(plant: Plant, state: State, alpha: number): void {
+    const { context } = this.canvas;
+    context.globalAlpha = alpha;
+    context.lineCap = 'round';
+    const width = Math.max(3, 0.02 * this.scale);
+    const elbow = this.at(pointOn(plant, state, 1, plant.length1).position);
+    const tip = this.at(pointOn(plant, state, 2, plant.length2).position);
+    this.canvas.line([this.at(PIVOT), elbow], 'link1', width);
+    this.canvas.line([elbow, tip], 'link2', width);
     context.lineCap = 'butt';
     context.globalAlpha = 1;
   }
