@@ -47,9 +47,9 @@ class InfoTest(ProgramTest):
         self.assertEqual((run["step"], run["solved"], run["policy"]["agent"]), (4000, False, "d3qn-small"))
 
     def test_shipped_policy(self):
-        self.assert_says(self.succeed("info"), "policies    d3qn, d3qn-adaptive, ", "sac (shipped)")
+        self.assert_says(self.succeed("info"), "policies    any-pose, d3qn, ", "sac (shipped)")
         self.assert_says(self.succeed("info", "sac"), "sac\n", "agent sac", "self-check  passed")
-        self.refuse(["info", "sax"], "a shipped policy or a controller (d3qn, ", "did you mean sac?")
+        self.refuse(["info", "sax"], "a shipped policy or a controller (any-pose, ", "did you mean sac?")
         self.refuse(["compare", "sac"], "sac: expected a run or a folder of runs, got a policy")
         (self.folder / "sac").mkdir()  # a folder here comes first
         self.refuse(["info", "sac"], "sac: expected a run with a policy.safetensors, got another folder")
