@@ -157,11 +157,13 @@ const BALANCED = 1; // s upright, after which it is more than a swing through th
 
 /// The pendulum's state in words. `said`: the text without numbers.
 export function situation(world: World): { state: string; text: string; said: string } {
-  const { state, text } = world.agentOn && world.target ? onItsWay(world) : upOrNot(world);
+  const { agentOn, target } = world;
+  const isUp = target === null || target.name === 'up-up';
+  const { state, text } = agentOn && !isUp ? onItsWay(world) : upOrNot(world);
   return { state, text, said: text.replace(/ for [\d.]+ s$/, '') };
 }
 
-/// The state of a pendulum whose goal the visitor chose.
+/// The state of a pendulum with another goal than upright.
 function onItsWay({ uprightFor: held, state }: World): { state: string; text: string } {
   if (held !== null && held >= BALANCED)
     return { state: 'balanced', text: `in the pose for ${held.toFixed(1)} s` };
