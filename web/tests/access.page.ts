@@ -73,6 +73,8 @@ test('axe finds no problem in any step of the tour or in everything, in any them
   await expect(page.locator('#write-problem')).not.toBeEmpty();
   await expectNone(page, 'write');
   await page.getByRole('link', { name: 'Everything', exact: true }).click();
+  await page.locator('#agent').selectOption('any-pose'); // with buttons for its goal
+  await expect(page.locator('#goals')).toBeVisible();
   await page.evaluate(async () => {
     for (const details of document.querySelectorAll('details')) details.open = true;
     await globalThis.drawn(); // then formulas that are too wide can be focused

@@ -27,7 +27,7 @@ const openDetails = (page: Page) =>
 /// Opens the page at a size with all explanations open.
 async function openAt(page: Page, size: { width: number; height: number }): Promise<void> {
   await page.setViewportSize(size);
-  await open(page);
+  await open(page, '#agent=any-pose'); // which has a row of buttons more
   await openDetails(page);
 }
 
