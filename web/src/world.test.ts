@@ -1,7 +1,12 @@
 import loadMujoco from '@mujoco/mujoco';
 import type { MainModule } from '@mujoco/mujoco';
+import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
 import { beforeAll, beforeEach, expect, test } from 'vitest';
 import { policyPath, readPolicy, simulate } from '../tests/program';
+import { core } from './core';
+import { Learner } from './learn/learner';
 import { goalNumbers, GOALS, HANGING, NOMINAL, restIn } from './pendulum';
 import { Policy } from './policy';
 import { Mujoco } from './mujoco';
@@ -64,6 +69,25 @@ test.each(Object.values(GOALS))('any-pose goes to $name as in `upswing simulate`
   world.goal = goal;
   const flags = ['--goal', goal.name, '--seconds', '5'];
   expectTrajectory(run(5), simulate(policyPath('any-pose'), ...flags), 1e-3, 1e-2);
+});
+
+test('a goal between an identified plant and a memory, as in `upswing simulate`', () => {
+  const settings = { any_pose: 'true', identify: 'true', memory: '3' };
+  const learner = new Learner(core(), 'fast', 1, settings);
+  learner.run(20);
+  const file = learner.policy();
+  learner.close();
+  const folder = mkdtempSync(join(tmpdir(), 'upswing-'));
+  const path = join(folder, 'policy.safetensors');
+  writeFileSync(path, new Uint8Array(file));
+  world.policy = new Policy(file);
+  world.goal = GOALS['up-down'];
+  world.agentOn = true;
+  const rows = simulate(path, '--goal', 'up-down', '--seconds', '5');
+  rmSync(folder, { recursive: true });
+  expectTrajectory(run(5), rows, 1e-6);
+  expect(world.seen.length).toBe(8 + 13 + 2 + 3 * 3);
+  expect([...world.seen.subarray(21, 23)]).toEqual([1, -1]);
 });
 
 test('a new goal counts from the next control step on, also for the twin', () => {
