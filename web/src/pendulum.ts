@@ -137,11 +137,6 @@ export function energy(plant: Plant, s: State): number {
   return at(plant, s)[8]!;
 }
 
-/// Energy at rest upright (J); hanging at rest it is the negative of this.
-export function energyTarget(plant: Plant): number {
-  return at(plant, HANGING)[9]!;
-}
-
 /// Energy mapped so that hanging at rest is 0 and upright at rest is 1.
 export function normalizedEnergy(plant: Plant, s: State): number {
   return at(plant, s)[10]!;

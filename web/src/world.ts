@@ -113,6 +113,7 @@ export class World {
   set goal(goal: Goal) {
     this._goal = goal;
     if (this.twin) this.twin.goal = goal;
+    if (!this.target) return;
     this.judge();
     this.look();
   }
