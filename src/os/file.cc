@@ -14,8 +14,6 @@
 #include <tuple>
 #include <utility>
 
-#include "base/error.h"
-#include "base/text.h"
 #include "os/host.h"
 
 namespace upswing {
@@ -40,12 +38,6 @@ bool IsOfPath(int error_number) {
                                ENODEV, ENOENT, ENOTDIR, ENXIO,      EPERM,  ENOTEMPTY,
                                EROFS,  EBUSY,  EXDEV,   EOPNOTSUPP, ENOLCK, ENOSYS};
   return std::ranges::find(kOfPath, error_number) != kOfPath.end();
-}
-
-std::string TextOf(std::span<const std::byte> bytes) {
-  std::string text(bytes.size(), '\0');
-  if (!bytes.empty()) std::memcpy(text.data(), bytes.data(), bytes.size());
-  return text;
 }
 
 /// A lock of a whole file. It is one of a byte range, which a process on the NFS server respects,
@@ -100,7 +92,8 @@ bool IsOwnFile(const fs::path& path) {
 }
 
 std::string ReadOwnFile(const fs::path& path, size_t most_bytes) {
-  return TextOf(ReadOwnBytes(path, most_bytes));
+  const std::vector<std::byte> bytes = ReadOwnBytes(path, most_bytes);
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 std::vector<std::byte> ReadOwnBytes(const fs::path& path, size_t most_bytes) {

@@ -30,15 +30,18 @@ std::optional<std::string> ReadEntry(const char* path, std::string_view key) {
   return std::nullopt;
 }
 
-/// The number at the beginning of a file or of an entry such as `1024 kB`.
-std::optional<int64_t> LeadingInteger(const std::string& text) {
-  return ParseInteger(Split(text, ' ').front());
+/// The bytes of an entry such as `1024 kB`.
+std::optional<int64_t> ReadBytes(const char* path, std::string_view key) {
+  constexpr int64_t kKilobyte = 1024;
+  const auto entry = ReadEntry(path, key);
+  const auto number = entry ? ParseInteger(Split(*entry, ' ').front()) : std::nullopt;
+  return number ? std::optional(kKilobyte * *number) : std::nullopt;
 }
 
 std::optional<int64_t> ReadInteger(const char* path) {
   std::ifstream file(path);
   std::string line;
-  return std::getline(file, line) ? LeadingInteger(line) : std::nullopt;
+  return std::getline(file, line) ? ParseInteger(line) : std::nullopt;
 }
 
 /// More threads hardly help, because work is cut into only a few slices, and idle threads cost
@@ -96,20 +99,16 @@ int64_t AvailableMemory() {
   const auto limit_to = [&](std::optional<int64_t> limit) {
     if (limit) bytes = std::min(bytes, std::max<int64_t>(0, *limit));
   };
-  constexpr int64_t kKilobyte = 1024;
-  if (const auto free = ReadEntry("/proc/meminfo", "MemAvailable")) {
-    const auto swap = ReadEntry("/proc/meminfo", "SwapFree");
-    const int64_t in_swap = swap ? LeadingInteger(*swap).value_or(0) : 0;
-    limit_to(kKilobyte * (LeadingInteger(*free).value_or(bytes / kKilobyte / 2) + in_swap));
+  if (const auto free = ReadBytes("/proc/meminfo", "MemAvailable")) {
+    limit_to(*free + ReadBytes("/proc/meminfo", "SwapFree").value_or(0));
   }
   // Limit of a control group, version 2. Do not subtract its usage, which includes the file cache
   // that the system can free.
   limit_to(ReadInteger("/sys/fs/cgroup/memory.max"));
   rlimit address_space{};
   if (getrlimit(RLIMIT_AS, &address_space) == 0 && address_space.rlim_cur != RLIM_INFINITY) {
-    const auto used = ReadEntry("/proc/self/status", "VmSize");
     limit_to(static_cast<int64_t>(address_space.rlim_cur) -
-             kKilobyte * (used ? LeadingInteger(*used).value_or(0) : 0));
+             ReadBytes("/proc/self/status", "VmSize").value_or(0));
   }
   return bytes;
 }
