@@ -64,11 +64,7 @@ const Terminal kPng{"pngcairo", kFontSize * 0.75, 14, 1, ""};
 class PanelScript {
  public:
   PanelScript(const Panel& panel, const Box& box, const Figure& figure, const Terminal& terminal)
-      : panel_(panel),
-        box_(box),
-        width_(figure.width),
-        height_(figure.height),
-        terminal_(terminal) {
+      : panel_(panel), box_(box), figure_(figure), terminal_(terminal) {
     Data();
     Axes();
     ColorScale();
@@ -82,8 +78,8 @@ class PanelScript {
   void Say(const Parts&... parts) {
     text_ += Concat(parts...) + '\n';
   }
-  std::string ScreenX(double pixel) const { return "screen " + Number(pixel / width_); }
-  std::string ScreenY(double pixel) const { return "screen " + Number(pixel / height_); }
+  std::string ScreenX(double pixel) const { return "screen " + Number(pixel / figure_.width); }
+  std::string ScreenY(double pixel) const { return "screen " + Number(pixel / figure_.height); }
 
   /// Writes the data blocks $L0, $L1, … for the lines and $H for the heat map.
   void Data() {
@@ -219,8 +215,6 @@ class PanelScript {
   void AddLine(size_t i, std::vector<std::string>& layers) const {
     const Line& line = panel_.lines[i];
     if (line.x.empty()) return;
-    const std::string data = Concat("$L", i, " using 1:2 with ");
-    const std::string type = Concat(" pt ", PointType(line.marker), " ps ");
     const std::string title = line.name.empty() ? " notitle" : " title " + Quoted(line.name);
     const std::string color = Concat(" lc rgb '", Color(i), "'");
     if (!line.points) {
@@ -236,21 +230,16 @@ class PanelScript {
       layers.push_back(Concat("$L", i, " using ($1>=", end, "?$1:NaN):2", style, 3, " notitle"));
       return;
     }
+    const bool is_cross = line.marker == Marker::kCross;
+    const int type = line.marker == Marker::kSquare ? 5 : is_cross ? 2 : 7;
+    const auto add = [&](double size, const std::string& look) {
+      layers.push_back(Concat("$L", i, " using 1:2 with points pt ", type, " ps ",
+                              size * terminal_.marker, look));
+    };
     // Give markers on a heat map a white rim, which separates them from every colour.
-    if (panel_.heat_map)
-      layers.push_back(Concat(data, "points", type, Size(1.5), " lc rgb 'white' notitle"));
-    layers.push_back(Concat(data, "points", type,
-                            Size(panel_.heat_map                 ? 1.0
-                                 : line.marker == Marker::kCross ? 1.6
-                                                                 : 0.8),
-                            " lw 2", color, title));
+    if (panel_.heat_map) add(1.5, " lc rgb 'white' notitle");
+    add(panel_.heat_map ? 1.0 : is_cross ? 1.6 : 0.8, Concat(" lw 2", color, title));
   }
-
-  static int PointType(Marker marker) {
-    return marker == Marker::kSquare ? 5 : marker == Marker::kCross ? 2 : 7;
-  }
-
-  double Size(double marker) const { return marker * terminal_.marker; }
 
   /// Colour of line i. On a heat map, red-orange comes first, because viridis does not contain it.
   std::string Color(size_t i) const {
@@ -259,7 +248,7 @@ class PanelScript {
 
   const Panel& panel_;
   Box box_;
-  double width_, height_;
+  const Figure& figure_;
   Terminal terminal_;
   bool has_numbers_ = false, has_cells_ = false;
   std::optional<std::pair<double, double>> x_range_, y_range_;  // ranges of the heat map
