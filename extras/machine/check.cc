@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 #include <set>
 #include <system_error>
@@ -128,14 +127,16 @@ double CentralDifference(const MachineLog& log, int k, int joint) {
   return seconds > 0 ? (log.angle[k + 1][joint] - log.angle[k - 1][joint]) / seconds : 0;
 }
 
-double AngleRange(Pieces pieces, int joint) {
-  double low = pieces.front().angle.front()[joint], high = low;
+std::vector<double> ValuesOf(Pieces pieces, std::vector<Joints> MachineLog::*quantity, int joint) {
+  std::vector<double> values;
   for (const MachineLog& piece : pieces) {
-    for (const Joints& q : piece.angle) {
-      low = std::min(low, q[joint]);
-      high = std::max(high, q[joint]);
-    }
+    for (const Joints& pair : piece.*quantity) values.push_back(pair[joint]);
   }
+  return values;
+}
+
+double AngleRange(Pieces pieces, int joint) {
+  const auto [low, high] = std::ranges::minmax(ValuesOf(pieces, &MachineLog::angle, joint));
   return high - low;
 }
 

@@ -117,6 +117,9 @@ double UsualCycle(Pieces pieces);
 /// still.
 double CentralDifference(const MachineLog& log, int k, int joint);
 
+/// The values of a quantity at a joint (0 or 1) in all pieces; empty if the log lacks it.
+std::vector<double> ValuesOf(Pieces pieces, std::vector<Joints> MachineLog::*quantity, int joint);
+
 /// Range of a joint's angle over all pieces: largest minus smallest, rad.
 double AngleRange(Pieces pieces, int joint);
 

@@ -65,20 +65,16 @@ bool IsSudden(const Repeat& repeat, double quantum) {
 
 /// Finds repeats within motion: at the end of the range the encoder saturates, elsewhere it sticks.
 void CheckRepeats(Pieces pieces, int joint, double quantum, const Reporter& report) {
-  double low = 0, high = 0;
-  for (const MachineLog& piece : pieces) {
-    for (const Joints& q : piece.angle) {
-      low = std::min(low, q[joint]);
-      high = std::max(high, q[joint]);
-    }
-  }
+  const auto [low, high] = std::ranges::minmax(ValuesOf(pieces, &MachineLog::angle, joint));
+  constexpr double kPi = std::numbers::pi;
   const Repeat* longest[2] = {};  // saturated, stuck
   int count[2] = {};
   const std::vector<Repeat> repeats = RepeatsOf(pieces, joint);
   for (const Repeat& repeat : repeats) {
     if (!IsSudden(repeat, quantum)) continue;
     const double q = repeat.piece->angle[repeat.first][joint];
-    const int stuck = std::abs(q) > std::numbers::pi && (q == low || q == high) ? 0 : 1;
+    const bool at_end = (q < -kPi && q == low) || (q > kPi && q == high);
+    const int stuck = at_end ? 0 : 1;
     if (stuck && !repeat.catches_up) continue;  // dry friction holds the joint
     ++count[stuck];
     const Repeat*& best = longest[stuck];
@@ -197,10 +193,7 @@ void CheckSpeeds(Pieces pieces, int joint, const Reporter& report) {
 }  // namespace
 
 std::optional<double> QuantumOf(Pieces pieces, int joint) {
-  std::vector<double> values;
-  for (const MachineLog& piece : pieces) {
-    for (const Joints& q : piece.angle) values.push_back(q[joint]);
-  }
+  std::vector<double> values = ValuesOf(pieces, &MachineLog::angle, joint);
   std::ranges::sort(values);
   constexpr double kRounding = 1e-9;  // rad
   std::vector<double> steps;

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "extras/machine/check.h"
+#include "pendulum/plant.h"
 
 namespace upswing::machine {
 namespace {
@@ -76,11 +77,6 @@ void CheckGrowth(const MachineLog& piece, const Reporter& report) {
          {{"speed_before", before.speed}, {"speed_after", after.speed}});
 }
 
-/// Distance between two angles on the circle, rad.
-double Distance(double angle, double from) {
-  return std::abs(std::remainder(angle - from, 2 * std::numbers::pi));
-}
-
 /// Rows of a piece at rest without torque, after which a torque moves it or the piece ends. (A hand
 /// may hold a pendulum that is released to swing.) Empty if they are shorter than 0.3 s.
 Rows RestOf(const MachineLog& piece) {
@@ -109,10 +105,10 @@ bool CheckRest(const MachineLog& piece, const Reporter& report) {
   if (rest.last < rest.first) return false;
   const auto [q1, q2] = piece.angle[rest.first];
   const double links[] = {q1, q1 + q2};
-  const auto hangs = [](double link) { return Distance(link, 0) < kHeld; };
+  const auto hangs = [](double link) { return std::abs(Wrapped(link)) < kHeld; };
   if (std::ranges::all_of(links, hangs)) return false;
   const bool upright = std::ranges::all_of(links, [&](double link) {
-    return hangs(link) || Distance(link, std::numbers::pi) < kUpright;
+    return hangs(link) || std::abs(Wrapped(link - std::numbers::pi)) < kUpright;
   });
   const bool known = !piece.commanded.empty();
   report(

@@ -6,7 +6,6 @@
 #include <tuple>
 
 #include "base/format.h"
-#include "base/text.h"
 #include "extras/machine/check.h"
 
 namespace upswing::machine {
@@ -89,12 +88,10 @@ bool CheckTorqueGain(const Response& best, const Reporter& report) {
 
 /// Root mean square of a joint's measured torque, N·m.
 double RmsMeasured(Pieces pieces, int joint) {
-  double squares = 0, n = 0;
-  for (const MachineLog& piece : pieces) {
-    for (const Joints& torque : piece.measured) squares += torque[joint] * torque[joint];
-    n += static_cast<double>(piece.measured.size());
-  }
-  return n > 0 ? std::sqrt(squares / n) : 0;
+  double squares = 0;
+  const std::vector<double> torques = ValuesOf(pieces, &MachineLog::measured, joint);
+  for (const double torque : torques) squares += torque * torque;
+  return torques.empty() ? 0 : std::sqrt(squares / static_cast<double>(torques.size()));
 }
 
 void CheckTorque(Pieces pieces, int joint, const Reporter& report) {
@@ -161,12 +158,10 @@ void CheckTorqueSize(Pieces pieces, int joint, const Reporter& report) {
   if (known) return;
   double largest = 0;
   int ones = 0;
-  for (const MachineLog& piece : pieces) {
-    for (const auto* torques : {&piece.commanded, &piece.measured}) {
-      for (const Joints& u : *torques) {
-        largest = std::max(largest, std::abs(u[joint]));
-        ones += torques == &piece.commanded && std::abs(u[joint]) == 1 ? 1 : 0;
-      }
+  for (const auto quantity : {&MachineLog::commanded, &MachineLog::measured}) {
+    for (const double u : ValuesOf(pieces, quantity, joint)) {
+      largest = std::max(largest, std::abs(u));
+      ones += quantity == &MachineLog::commanded && std::abs(u) == 1 ? 1 : 0;
     }
   }
   constexpr double kLarge = 100;  // N·m

@@ -75,8 +75,8 @@ std::string DifferenceOf(Pieces pieces, int joint) {
 /// Finds the largest velocity where the angle moves faster.
 void CheckVelocityLimit(Pieces pieces, int joint, const Reporter& report) {
   double limit = 0;
-  for (const MachineLog& piece : pieces) {
-    for (const Joints& v : piece.velocity) limit = std::max(limit, std::abs(v[joint]));
+  for (const double v : ValuesOf(pieces, &MachineLog::velocity, joint)) {
+    limit = std::max(limit, std::abs(v));
   }
   constexpr int kRows = 5;
   std::optional<LogRows> longest;
