@@ -1,7 +1,6 @@
 #include "extras/machine/supervisor.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
@@ -78,12 +77,12 @@ Supervisor::Supervisor(const SupervisorConfig& config) : config_(config) {
   reason_.reserve(kLongestReason);
 }
 
-LoopState Supervisor::Fault(const char* text, double first, double second) {
-  if (!reason_.empty()) return LoopState::kFault;  // the first reason stays
+bool Supervisor::Report(const char* text, double first, double second) {
+  if (!reason_.empty()) return false;  // the first reason stays
   std::array<char, 150> line{};
   std::snprintf(line.data(), line.size(), text, first, second);
   reason_ = line.data();
-  return LoopState::kFault;
+  return false;
 }
 
 void Supervisor::Brake(const CycleFacts& facts) {
@@ -137,11 +136,10 @@ bool Supervisor::CheckMotion(const CycleFacts& facts) {
     joint.rate = facts.read_at > last_read_at_ ? change / (facts.read_at - last_read_at_) : 0;
     const auto number = static_cast<double>(j + 1);
     if (!CheckVelocity(joint, change, shortest, longest + kOldest)) {
-      Fault("joint %.0f: the angle jumps by %.4g rad, which no motion explains", number, change);
-      good = false;
+      good = Report("joint %.0f: the angle jumps by %.4g rad, which no motion explains", number,
+                    change);
     } else if (IsStuck(joint, change, longest, facts)) {
-      Fault("joint %.0f: the encoder sticks while the joint moves", number);
-      good = false;
+      good = Report("joint %.0f: the encoder sticks while the joint moves", number);
     }
   }
   has_reading_ = true;
@@ -155,17 +153,14 @@ bool Supervisor::CheckReading(const CycleFacts& facts) {
   for (size_t j = 0; j < 2; ++j) {
     const auto joint = static_cast<double>(j + 1);
     if (!Within(facts.angle[j], kLargestReading) || !Within(facts.torque[j], kLargestReading)) {
-      Fault("joint %.0f: expected a finite reading, got another number", joint);
-      return false;
+      return Report("joint %.0f: expected a finite reading, got another number", joint);
     }
     if (std::abs(facts.angle[j]) >= config_.angle_range) {
-      Fault("joint %.0f: the encoder saturates at %.4g rad", joint, facts.angle[j]);
-      return false;
+      return Report("joint %.0f: the encoder saturates at %.4g rad", joint, facts.angle[j]);
     }
   }
   if (facts.locked && driving) {
-    Fault("the machine's watchdog has switched its motors off");
-    return false;
+    return Report("the machine's watchdog has switched its motors off");
   }
   return CheckMotion(facts);
 }
@@ -173,16 +168,14 @@ bool Supervisor::CheckReading(const CycleFacts& facts) {
 bool Supervisor::CheckEstimate(const CycleFacts& facts) {
   const auto& [q1, q2, w1, w2] = facts.state;
   if (!std::isfinite(q1 + q2 + w1 + w2 + facts.energy)) {
-    Fault("the estimate of the state is not finite");
-    return false;
+    return Report("the estimate of the state is not finite");
   }
   const Joints q{q1, q2}, w{w1, w2};
   for (size_t j = 0; j < 2 && facts.fresh; ++j) {
     const double error = facts.angle[j] - facts.zero[j] - q[j];
     if (Within(error, kLargestError + std::abs(w[j]) * (facts.age + config_.period))) continue;
-    Fault("joint %.0f: the estimate is %.4g rad from the reading", static_cast<double>(j + 1),
-          error);
-    return false;
+    return Report("joint %.0f: the estimate is %.4g rad from the reading",
+                  static_cast<double>(j + 1), error);
   }
   return true;
 }
@@ -193,13 +186,13 @@ bool Supervisor::WithinLimits(const CycleFacts& facts) {
   const double angle = std::max(std::abs(q1), std::abs(q2));
   const double velocity = std::max(std::abs(w1), std::abs(w2));
   if (!Within(angle, limits.angle)) {
-    Fault("angle: %.4g rad is beyond the limit %.4g rad", angle, limits.angle);
-  } else if (!Within(velocity, limits.velocity)) {
-    Fault("velocity: %.4g rad/s is beyond the limit %.4g rad/s", velocity, limits.velocity);
-  } else if (!Within(facts.energy, limits.energy)) {
-    Fault("energy: %.4g is beyond the limit %.4g", facts.energy, limits.energy);
+    return Report("angle: %.4g rad is beyond the limit %.4g rad", angle, limits.angle);
   }
-  return reason_.empty();
+  if (!Within(velocity, limits.velocity)) {
+    return Report("velocity: %.4g rad/s is beyond the limit %.4g rad/s", velocity, limits.velocity);
+  }
+  return Within(facts.energy, limits.energy) ||
+         Report("energy: %.4g is beyond the limit %.4g", facts.energy, limits.energy);
 }
 
 LoopState Supervisor::GoOnBraking(const CycleFacts& facts) {
@@ -210,7 +203,8 @@ LoopState Supervisor::GoOnBraking(const CycleFacts& facts) {
   if (!Within(velocity, kBrakeShare * config_.limits.velocity) ||
       !Within(facts.energy, kBrakeShare * config_.limits.energy) ||
       energy_ > kEnergyShare * least_energy_ + kEnergyRise) {
-    return Fault("braking does not slow the links: %.4g rad/s", velocity);
+    Report("braking does not slow the links: %.4g rad/s", velocity);
+    return LoopState::kFault;
   }
   if (!AtRest(facts.state)) slow_since_ = facts.time;
   if (facts.time - slow_since_ < kSlowSeconds &&
@@ -235,10 +229,11 @@ void Supervisor::Wait(const CycleFacts& facts) {
     ended_ = true;
     state_ = LoopState::kIdle;
   } else if (facts.time - since_ > config_.limits.patience) {
-    state_ = Fault(state_ == LoopState::kIdle
-                       ? "no readings within %.4g s"
-                       : "the machine did not come to rest in its start state within %.4g s",
-                   config_.limits.patience);
+    Report(state_ == LoopState::kIdle
+               ? "no readings within %.4g s"
+               : "the machine did not come to rest in its start state within %.4g s",
+           config_.limits.patience);
+    state_ = LoopState::kFault;
   } else if (state_ == LoopState::kIdle && readings_ >= kArmReadings) {
     state_ = LoopState::kArmed;
     since_ = facts.time;
@@ -253,9 +248,8 @@ void Supervisor::Wait(const CycleFacts& facts) {
 
 bool Supervisor::CheckAge(double age) {
   if (state_ == LoopState::kIdle || Within(age, config_.limits.age)) return true;
-  state_ =
-      Fault("the last reading is %.4g s old, beyond the limit %.4g s", age, config_.limits.age);
-  return false;
+  state_ = LoopState::kFault;
+  return Report("the last reading is %.4g s old, beyond the limit %.4g s", age, config_.limits.age);
 }
 
 LoopState Supervisor::Step(const CycleFacts& facts) {
@@ -295,7 +289,8 @@ Joints Supervisor::Torque(const Joints& controller, const CycleFacts& facts) {
   if (state_ == LoopState::kRunning) torque = controller;
   if (state_ == LoopState::kBraking) torque = BrakeTorque(facts);
   if (!std::isfinite(torque[0]) || !std::isfinite(torque[1])) {
-    state_ = Fault("the controller's torque is not a finite number");
+    Report("the controller's torque is not a finite number");
+    state_ = LoopState::kFault;
     return {};
   }
   bool clipped = false;

@@ -90,8 +90,8 @@ class Supervisor {
   static constexpr int kArmReadings = 5;  // readings in a row before the motors are armed
 
  private:
-  /// Sets the reason from a format of two numbers, unless there is one, and returns kFault.
-  LoopState Fault(const char* text, double first = 0, double second = 0);
+  /// Sets the reason from a format of two numbers, unless there is one, and returns false.
+  bool Report(const char* text, double first = 0, double second = 0);
   void Brake(const CycleFacts& facts);
   bool CheckReading(const CycleFacts& facts);
   bool CheckMotion(const CycleFacts& facts);
