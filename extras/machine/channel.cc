@@ -143,33 +143,30 @@ LinkAddress ParseLink(const std::string& text, bool listens) {
 
 Channel Channel::Connect(const LinkAddress& address) {
   if (address.kind == LinkAddress::Kind::kUdp) {
-    Channel channel(OpenUdp(address, /*binds=*/false), true);
-    channel.name_ = Concat("udp:", address.place, ":", address.number);
-    return channel;
+    return {OpenUdp(address, /*binds=*/false), true,
+            Concat("udp:", address.place, ":", address.number)};
   }
+  const std::string name = "serial:" + address.place;
   Descriptor fd(open(address.place.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
   if (fd.get() < 0) {
     const char* what = errno == EACCES  ? "cannot open; `sudo usermod -aG dialout $USER` and a new "
                                           "login permit it"
                        : errno == EBUSY ? "another program uses it"
                                         : "cannot open";
-    throw LinkError("serial:" + address.place, what, errno);
+    throw LinkError(name, what, errno);
   }
-  MakeRaw(fd.get(), address.number, "serial:" + address.place);
+  MakeRaw(fd.get(), address.number, name);
   ioctl(fd.get(), TIOCEXCL);  // no second program may write to the motors
-  Channel channel(std::move(fd), false);
-  channel.name_ = "serial:" + address.place;
-  return channel;
+  return {std::move(fd), false, name};
 }
 
 Channel Channel::Listen(const LinkAddress& address) {
   if (address.kind == LinkAddress::Kind::kUdp) {
-    Channel channel(OpenUdp(address, /*binds=*/true), true);
+    Descriptor fd = OpenUdp(address, /*binds=*/true);
     sockaddr_storage own{};
     socklen_t size = sizeof own;
-    getsockname(channel.fd_.get(), reinterpret_cast<sockaddr*>(&own), &size);
-    channel.name_ = UdpName(own, size);
-    return channel;
+    getsockname(fd.get(), reinterpret_cast<sockaddr*>(&own), &size);
+    return {std::move(fd), true, UdpName(own, size)};
   }
   Descriptor fd(posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
   if (fd.get() < 0 || grantpt(fd.get()) != 0 || unlockpt(fd.get()) != 0) {
@@ -179,8 +176,7 @@ Channel Channel::Listen(const LinkAddress& address) {
   if (ptsname_r(fd.get(), name.data(), name.size()) != 0) {
     throw LinkError("pty", "cannot name the pseudo-terminal", errno);
   }
-  Channel channel(std::move(fd), false);
-  channel.name_ = name.data();
+  Channel channel(std::move(fd), false, name.data());
   channel.other_end_ = Descriptor(open(name.data(), O_RDWR | O_NOCTTY | O_CLOEXEC));
   MakeRaw(channel.other_end_.get(), 4000000, channel.name_);
   return channel;

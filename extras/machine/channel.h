@@ -51,7 +51,8 @@ class Channel {
   const std::string& name() const { return name_; }
 
  private:
-  Channel(Descriptor fd, bool datagrams) : fd_(std::move(fd)), datagrams_(datagrams) {}
+  Channel(Descriptor fd, bool datagrams, std::string name)
+      : fd_(std::move(fd)), datagrams_(datagrams), name_(std::move(name)) {}
 
   Descriptor fd_;
   bool datagrams_;
