@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/stopwatch.h"
+
 namespace upswing::machine {
 namespace {
 
@@ -61,8 +63,7 @@ CycleFacts ControlLoop::FactsOf(double now, const std::optional<LinkReading>& re
 
 Joints ControlLoop::ControllerTorque() {
   Joints torque = estimator_.CompensationTorque(config_.compensation);
-  torque[static_cast<size_t>(config_.actuated_joint - 1)] +=
-      controller_(cycle_ - running_cycle_, estimator_.ahead());
+  torque[config_.actuated_joint - 1] += controller_(cycle_ - running_cycle_, estimator_.ahead());
   return torque;
 }
 
@@ -96,10 +97,9 @@ bool ControlLoop::Cycle() {
     if (!Inverted(facts.state)) upright_since_ = -1;
     if (Inverted(facts.state) && upright_since_ < 0) upright_since_ = now;
     summary_.upright = upright_since_ < 0 ? 0 : now - upright_since_;
-    const int64_t begin = MonotonicNanoseconds();
+    const Stopwatch watch;
     wanted = ControllerTorque();
-    const double took = static_cast<double>(MonotonicNanoseconds() - begin) * 1e-9;
-    summary_.longest_act = std::max(summary_.longest_act, took);
+    summary_.longest_act = std::max(summary_.longest_act, watch.seconds());
   }
   torque_ = supervisor_.Torque(wanted, facts);
   const LoopState after = supervisor_.state();

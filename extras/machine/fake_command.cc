@@ -82,9 +82,7 @@ void AddFake(CommandLine& line) {
       "--start", a.start, "STATE",
       "state at the beginning: hanging, upright or q1,q2,w1,w2 [rad, rad/s] (default hanging)");
   line.Text("--stuck", a.stuck, "JOINT@SECONDS", "encoder that sticks from a time on");
-  Options own;
-  a.config.Describe(own);
-  line.Arguments(own);
+  line.Arguments(OptionsOf(a.config));
   AddSeed(line, a.seed, "the line's faults and of --draw");
   line.Flag("--draw", a.draw, "play a machine drawn from the twin's covariance");
   line.Flag("--quiet", a.quiet, "print no line per second");

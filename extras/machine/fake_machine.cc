@@ -94,7 +94,7 @@ MachineReading FakeMachine::Measure(double now) {
   const double since = now - enabled_since_;  // negative infinity before
   for (double& angle : reading.angle) angle = std::clamp(angle, -faults.saturate, faults.saturate);
   if (faults.stuck_joint > 0 && since >= faults.stuck_after) {
-    double& angle = reading.angle[static_cast<size_t>(faults.stuck_joint - 1)];
+    double& angle = reading.angle[faults.stuck_joint - 1];
     if (!stuck_) stuck_ = angle;
     angle = *stuck_;
   }
@@ -117,9 +117,7 @@ std::optional<Frame> FakeMachine::Answer(const Frame& command, double now) {
   const bool enabled = asked && !locked_;
   if (enabled && enabled_since_ == MachineFaults::kNever) enabled_since_ = now;
   Joints torque{};
-  for (size_t j = 0; enabled && j < 2; ++j) {
-    torque[j] = std::clamp(command.torque[j], -limit_, limit_);
-  }
+  for (int j = 0; enabled && j < 2; ++j) torque[j] = std::clamp(command.torque[j], -limit_, limit_);
   Apply(torque);
   const MachineReading reading = Measure(now);
   ++sequence_;

@@ -68,12 +68,6 @@ struct Shot {
   int session;  // index
 };
 
-/// A window's part of the normal equations of the constants, without its start state.
-struct Reduced {
-  ConstantsMatrix H;
-  Constants g;
-};
-
 /// A window's part of the normal equations: start state x and constants c.
 struct Block {
   Matrix4d Hxx;
@@ -82,8 +76,8 @@ struct Block {
   ConstantsMatrix Hcc;
   Constants gc;
 
-  /// Eliminates the start state, damped.
-  Reduced Eliminate(double damping) const {
+  /// The parts H and g of the constants, after the elimination of the damped start state.
+  std::pair<ConstantsMatrix, Constants> Eliminate(double damping) const {
     const Eigen::Matrix<double, kConstants, 4> half = Hxc.transpose() * Inverse(damping);
     return {Hcc - half * Hxc, gc - half * gx};
   }
@@ -427,9 +421,9 @@ class Problem {
     constexpr int kInARow = 6;
     VectorXd score = VectorXd::Zero(size());
     for (int w = 0; w < windows(); ++w) {
-      const Reduced r = blocks[w].Eliminate(damping);
-      H[shots_[w].session] += r.H;
-      score += slopes[shots_[w].session].transpose() * r.g;
+      const auto [of_H, of_g] = blocks[w].Eliminate(damping);
+      H[shots_[w].session] += of_H;
+      score += slopes[shots_[w].session].transpose() * of_g;
       if (w + 1 == windows() || shots_[w + 1].window.log != shots_[w].window.log ||
           (w + 1) % kInARow == 0) {
         e.g += score;

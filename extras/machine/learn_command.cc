@@ -103,9 +103,7 @@ void AddLearn(CommandLine& line) {
   line.Text("--out", a.out, "FOLDER", "new folder to write: logs, twin.toml, report.txt");
   line.Text("--robot", a.robot, "ROBOT",
             "pendubot (motor at joint 1) or acrobot (joint 2) (default pendubot)");
-  Options own;
-  a.config.Describe(own);
-  line.Arguments(own);
+  line.Arguments(OptionsOf(a.config));
   AddSeed(line, a.seed, "the excitations and of simulated tries");
   AddThreads(line, a.threads);
   line.Footer(

@@ -60,9 +60,7 @@ void Drive::Forget(double time) {
   const auto after = std::ranges::upper_bound(times_, time - delay_);
   const auto n = std::max<std::ptrdiff_t>(after - times_.begin() - 1, 0);
   times_.erase(times_.begin(), times_.begin() + n);
-  commands_.erase(commands_.begin(), commands_.begin() + n);
-  starts_.erase(starts_.begin(), starts_.begin() + n);
-  slopes_.erase(slopes_.begin(), slopes_.begin() + n);
+  for (auto* list : {&commands_, &starts_, &slopes_}) list->erase(list->begin(), list->begin() + n);
 }
 
 Drive Drive::Commanded(const MachineLog& log, const Twin& twin) {

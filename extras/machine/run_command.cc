@@ -75,7 +75,7 @@ int Drive(const RunArguments& a, const MachinePolicy& policy, const std::optiona
                             : Estimator(twin ? twin->sensors : a.sensors, period);
 
   Joints motor{a.passive_torque, a.passive_torque};
-  motor[static_cast<size_t>(joint - 1)] = twin ? twin->plant.torque_limit : a.limits.torque;
+  motor[joint - 1] = twin ? twin->plant.torque_limit : a.limits.torque;
   const MachineSensors sensors = twin ? twin->sensors : a.sensors;
   Supervisor supervisor({.limits = a.limits,
                          .start = start,

@@ -62,8 +62,7 @@ bool KeepsRules(const MachineLog& log, int first, int last, const WindowRules& r
 
 double Median(std::vector<double> values) {
   if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  std::ranges::sort(values);
-  return Quantile(values, 0.5);
+  return QuartilesOf(std::move(values)).median;
 }
 
 double PooledMedian(std::span<const std::vector<double>> lists) {
