@@ -19,8 +19,7 @@ Line LineOf(const std::string& name, Pieces pieces, const Value& value) {
   int rows = 0;
   for (const MachineLog& piece : pieces) rows += piece.rows();
   const int step = std::max(1, rows / kMostPoints);
-  Line line;
-  line.name = name;
+  Line line{.name = name};
   for (const MachineLog& piece : pieces) {
     for (int k = 1; k < piece.rows(); k += step) {
       line.x.push_back(piece.time[k]);
@@ -37,10 +36,9 @@ template <typename Value>
 void Mark(Panel& panel, const LogCheck& check, Pieces pieces, std::initializer_list<Aspect> aspects,
           const Value& value) {
   for (const Severity severity : {Severity::kWarning, Severity::kFault}) {
-    Line marks;
-    marks.name = NameOf(severity);
-    marks.points = true;
-    marks.marker = severity == Severity::kFault ? Marker::kCross : Marker::kSquare;
+    Line marks{.name = NameOf(severity),
+               .points = true,
+               .marker = severity == Severity::kFault ? Marker::kCross : Marker::kSquare};
     for (const Finding& finding : check.findings) {
       if (finding.severity != severity || !finding.rows) continue;
       if (std::ranges::count(aspects, finding.aspect) == 0) continue;
@@ -66,10 +64,7 @@ struct Quantity {
 /// A panel with those of the quantities that the log has.
 Panel PanelOf(const char* title, const char* label, Pieces pieces,
               std::initializer_list<Quantity> quantities) {
-  Panel panel;
-  panel.title = title;
-  panel.x_label = "time (s)";
-  panel.y_label = label;
+  Panel panel{.title = title, .x_label = "time (s)", .y_label = label};
   for (const Quantity& q : quantities) {
     if ((pieces.front().*q.values).empty()) continue;
     for (const int joint : {0, 1}) {
@@ -95,10 +90,7 @@ std::string CaptionOf(const LogCheck& check) {
 }  // namespace
 
 void DrawCheck(const LogCheck& check, Pieces pieces, const std::filesystem::path& file) {
-  Figure figure;
-  figure.title = check.name;
-  figure.caption = CaptionOf(check);
-  figure.width = 1100;
+  Figure figure{.title = check.name, .width = 1100, .caption = CaptionOf(check)};
   const auto add = [&](Panel panel, std::initializer_list<Aspect> marked,
                        std::vector<Joints> MachineLog::*values) {
     if (panel.lines.empty()) return;
@@ -116,10 +108,7 @@ void DrawCheck(const LogCheck& check, Pieces pieces, const std::filesystem::path
   const auto cycle = [](const MachineLog& log, int k) {
     return 1e3 * (log.time[k] - log.time[k - 1]);
   };
-  Panel cycles;
-  cycles.title = "cycles";
-  cycles.x_label = "time (s)";
-  cycles.y_label = "ms";
+  Panel cycles = PanelOf("cycles", "ms", pieces, {});
   cycles.lines.push_back(LineOf("", pieces, cycle));
   double longest = 0;
   for (const double ms : cycles.lines.back().y) longest = std::fmax(longest, ms);

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <limits>
 #include <map>
 
@@ -21,8 +22,7 @@ using RunErrors = std::vector<std::vector<double>>;
 double MedianOf(const RunErrors& runs, std::span<const double> chosen) {
   std::vector<double> all;
   for (const double run : chosen) {
-    const auto& errors = runs[static_cast<size_t>(run)];
-    all.insert(all.end(), errors.begin(), errors.end());
+    std::ranges::copy(runs[static_cast<size_t>(run)], std::back_inserter(all));
   }
   return Median(all);
 }
@@ -98,9 +98,7 @@ std::vector<RunErrors> ErrorsOf(std::span<const MachineLog> logs,
 Panel ErrorsPanel(std::span<const MachineLog> logs, std::span<const Predictor> predictors,
                   ThreadPool* pool) {
   constexpr std::array kLengths{0.1, 0.2, 0.35, 0.5, 0.75, 1.0};  // s
-  Panel errors;
-  errors.x_label = "length of the prediction, s";
-  errors.y_label = "median error, rad";
+  Panel errors{.x_label = "length of the prediction, s", .y_label = "median error, rad"};
   for (const Predictor& p : predictors) errors.lines.emplace_back().name = p.name;
   for (const double length : kLengths) {
     const std::vector<RunErrors> runs = ErrorsOf(logs, predictors, length, false, pool);
@@ -135,13 +133,9 @@ Panel AnglesPanel(std::span<const MachineLog> logs, std::span<const Predictor> p
                   std::span<const LogWindow> windows) {
   const MachineLog& log = logs[i];
   const LogWindow& w = MedianWindow(log, predictors.front().twins[i], windows);
-  Panel angles;
-  angles.title = Printable(log.name);
-  angles.x_label = "time, s";
-  angles.y_label = "angle, rad";
+  Panel angles{.title = Printable(log.name), .x_label = "time, s", .y_label = "angle, rad"};
   const auto add = [&](int joint, const std::string& name, const auto& angle_at) -> Line& {
-    Line& line = angles.lines.emplace_back();
-    line.name = Concat("joint ", joint + 1, ", ", name);
+    Line& line = angles.lines.emplace_back(Line{.name = Concat("joint ", joint + 1, ", ", name)});
     for (int k = w.first; k < w.last; ++k) {
       line.x.push_back(log.time[k]);
       line.y.push_back(angle_at(k)[joint]);
@@ -251,10 +245,9 @@ std::string MotionCsv(std::span<const MachineLog> logs, std::span<const Predicto
 
 void DrawErrors(std::span<const MachineLog> logs, std::span<const Predictor> predictors,
                 const std::filesystem::path& file, ThreadPool* pool) {
-  Figure figure;
-  figure.title = "Prediction of measured motion";
-  figure.height = 900;
-  figure.panels.push_back(ErrorsPanel(logs, predictors, pool));
+  Figure figure{.title = "Prediction of measured motion",
+                .panels = {ErrorsPanel(logs, predictors, pool)},
+                .height = 900};
   for (size_t i = 0; i < logs.size(); ++i) {
     const auto windows = WindowsOf(logs[i], predictors.front().twins[i], 1);
     if (windows.empty()) continue;

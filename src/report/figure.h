@@ -12,10 +12,10 @@ enum class Marker { kDot, kSquare, kCross };
 
 /// One curve of a panel. Numbers that are not finite leave a gap.
 struct Line {
-  std::string name;               // name in the legend; empty: no entry
-  std::vector<double> x, y;       // (n)
-  std::vector<double> low, high;  // (n) band around the line; empty: none
-  bool points = false;            // whether to draw markers in place of a line
+  std::string name = {};                    // name in the legend; empty: no entry
+  std::vector<double> x = {}, y = {};       // (n)
+  std::vector<double> low = {}, high = {};  // (n) band around the line; empty: none
+  bool points = false;                      // whether to draw markers in place of a line
   Marker marker = Marker::kDot;
   std::optional<double> dotted_from = {};  // x from which the line is dotted
 };
@@ -31,17 +31,17 @@ struct HeatMap {
 
 /// One pair of axes. Lines lie above the heat map.
 struct Panel {
-  std::string title, x_label, y_label;
-  std::vector<Line> lines;
-  std::optional<HeatMap> heat_map;
-  std::optional<std::pair<double, double>> x_range, y_range;  // nothing: range of the data
+  std::string title = {}, x_label = {}, y_label = {};
+  std::vector<Line> lines = {};
+  std::optional<HeatMap> heat_map = {};
+  std::optional<std::pair<double, double>> x_range = {}, y_range = {};  // nothing: of the data
   double y_tick = 0;  // distance between ticks; 0: chosen by gnuplot
 };
 
 /// Panels with aligned axes, row by row, with `columns` panels per row.
 struct Figure {
-  std::string title;  // one line; a title that is too long shows only its end
-  std::vector<Panel> panels;
+  std::string title = {};  // one line; a title that is too long shows only its end
+  std::vector<Panel> panels = {};
   int columns = 1;
   int width = 900, height = 600;  // pixels
   std::string caption = {};       // text below the title, wrapped into lines

@@ -59,10 +59,7 @@ struct Axes {
 };
 
 Panel CurvesPanel(const std::vector<RunGroup>& groups, const Axes& axes, double end, bool legend) {
-  Panel panel;
-  panel.x_label = axes.x_label;
-  panel.y_label = axes.y_label;
-  panel.x_range = {0, end};
+  Panel panel{.x_label = axes.x_label, .y_label = axes.y_label, .x_range = {{0, end}}};
   for (const RunGroup& group : groups) {
     std::vector<double> grid = CurveGrid(group, axes.x, end);
     const double first_end = FirstEnd(group, axes.x);
@@ -95,9 +92,7 @@ std::pair<double, double> RangeFromZero(const std::vector<const Panel*>& panels)
 
 Line LearningCurve(const RunGroup& group, const CurveAxis& x, const CurveAxis& y,
                    const std::vector<double>& grid) {
-  Line line;
-  line.name = group.label;
-  line.x = grid;
+  Line line{.name = group.label, .x = grid};
   for (const double place : grid) {
     std::vector<double> values;
     for (const RunRecord& run : group.runs) values.push_back(At(run, x, y, place));
@@ -122,13 +117,12 @@ std::vector<double> CurveGrid(const RunGroup& group, const CurveAxis& x, double 
 
 Figure LearningCurves(const std::vector<RunGroup>& groups) {
   const auto parts = Parts(groups);
-  Figure figure;
-  figure.columns = 2;
-  figure.width = 1200;
-  figure.height = 40 + 760 * static_cast<int>(parts.size());
-  figure.caption =
-      "Interquartile mean over the n runs of each agent, with the pointwise 95% bootstrap interval "
-      "as a band (none for n = 1).";
+  Figure figure{.columns = 2,
+                .width = 1200,
+                .height = 40 + 760 * static_cast<int>(parts.size()),
+                .caption =
+                    "Interquartile mean over the n runs of each agent, with the pointwise "
+                    "95% bootstrap interval as a band (none for n = 1)."};
   constexpr const char *kSteps = "steps", *kSeconds = "training time (s), evaluations excluded";
   constexpr const char *kSuccess = "success (%)", *kReturn = "return over 10 s";
   const Axes axes[] = {{kSteps, kSuccess, Steps, SuccessPercent},
