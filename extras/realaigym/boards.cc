@@ -49,10 +49,8 @@ BoardReport ScoreOnBoard(const MachinePolicy& policy, uint64_t seed, ThreadPool&
   BoardReport report{policy, OutcomeOf(NominalLog(policy)), {}};
   const ControllerMaker make = ControllersOf(policy);
   const std::vector<RobustnessCase> cases = RobustnessCases(seed);
-  std::vector<PendulumState> ends(cases.size());
-  RunAll(static_cast<int>(cases.size()), &pool, progress, [&](int i) {
-    const auto k = static_cast<size_t>(i);
-    ends[k] = EndOf(RobotOf(*policy), cases[k].episode, make());
+  const auto ends = RunAll(static_cast<int>(cases.size()), &pool, progress, [&](int i) {
+    return EndOf(RobotOf(*policy), cases[i].episode, make());
   });
   report.robustness = JudgeRobustness(cases, ends);
   return report;
@@ -93,12 +91,8 @@ MachineLog UptimeLog(const MachinePolicy& policy, uint64_t seed) {
 
 std::vector<UptimeRun> ScoreUptime(const MachinePolicy& policy, uint64_t seed, int count,
                                    ThreadPool& pool, const Progress& progress) {
-  std::vector<UptimeRun> runs(static_cast<size_t>(count));
-  RunAll(count, &pool, progress, [&](int i) {
-    const auto k = static_cast<size_t>(i);
-    runs[k] = UptimeOf(UptimeLog(policy, seed + k));
-  });
-  return runs;
+  return RunAll(count, &pool, progress,
+                [&](int i) { return UptimeOf(UptimeLog(policy, seed + i)); });
 }
 
 std::string UptimeJson(const UptimeReport& report) {

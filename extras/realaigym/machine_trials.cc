@@ -4,9 +4,9 @@
 #include <array>
 #include <memory>
 #include <numbers>
-#include <utility>
 
 #include "base/rng.h"
+#include "base/text.h"
 #include "extras/machine/estimator.h"
 
 namespace upswing::realaigym {
@@ -70,30 +70,26 @@ TrialController OnMachine(const ControllerMaker& make, const Twin& twin, Robot r
 
 HardwareReport RunTrials(const Twin& twin, Robot robot, const TrialController& make,
                          const TrialRules& rules, ThreadPool* pool, const Progress& progress) {
-  std::vector<HardwareRun> runs(static_cast<size_t>(rules.count));
   const LoopRun run{.seconds = kBoardSeconds,
                     .largest_velocity = rules.largest_velocity,
                     .actuated_joint = static_cast<int>(robot)};
-  RunAll(rules.count, pool, progress, [&](int i) {
+  const auto score = [&](int i) {
     const MachineLog log = RunTrial(twin, i, run, rules, rules.pushes, make);
-    HardwareRun& own = runs[static_cast<size_t>(i)];
-    own = ScoreHardware(std::span(&log, 1), robot).runs.front();
-    own.name = "draw " + std::to_string(i + 1);
-  });
-  return {robot, rules.pushes, std::move(runs)};
+    HardwareRun own = ScoreHardware(std::span(&log, 1), robot).runs.front();
+    own.name = Concat("draw ", i + 1);
+    return own;
+  };
+  return {robot, rules.pushes, RunAll(rules.count, pool, progress, score)};
 }
 
 std::vector<UptimeRun> RunUptimeTrials(const Twin& twin, const TrialController& make,
                                        const TrialRules& rules, ThreadPool* pool,
                                        const Progress& progress) {
-  std::vector<UptimeRun> runs(static_cast<size_t>(rules.count));
   // Both motors may make a reset. These are the machine's safety limits.
   const LoopRun run{
       .seconds = kUptimeSeconds, .largest_angle = 4 * std::numbers::pi, .largest_velocity = 25};
-  RunAll(rules.count, pool, progress, [&](int i) {
-    runs[static_cast<size_t>(i)] = UptimeOf(RunTrial(twin, i, run, rules, false, make));
-  });
-  return runs;
+  return RunAll(rules.count, pool, progress,
+                [&](int i) { return UptimeOf(RunTrial(twin, i, run, rules, false, make)); });
 }
 
 }  // namespace upswing::realaigym

@@ -1,6 +1,5 @@
 #include "extras/realaigym/rules.h"
 
-#include <cmath>
 #include <numbers>
 #include <numeric>
 
@@ -24,7 +23,7 @@ std::array<BoardPush, 3> RandomPushes(Rng& rng) {
     push.amplitude = rng.Uniform(0.5, 5) * (rng.Uniform() < 0.5 ? -1 : 1);
   }
   std::array<BoardPush, 3> ours;
-  for (size_t k = 0; k < 3; ++k) ours[k] = all[static_cast<size_t>(order[k])];
+  for (size_t k = 0; k < 3; ++k) ours[k] = all[order[k]];
   return ours;
 }
 
@@ -72,7 +71,7 @@ std::vector<RobustnessCase> RobustnessCases(uint64_t seed) {
     }
   };
   for (int parameter = 0; parameter < static_cast<int>(kBoardVariations.size()); ++parameter) {
-    const BoardVariation& varied = kBoardVariations.at(static_cast<size_t>(parameter));
+    const BoardVariation& varied = kBoardVariations.at(parameter);
     add_levels(kModel, parameter, 1, [&](BoardEpisode& e, double level) {
       const double value = varied.low + (varied.high - varied.low) * level;
       double& number = e.plant.*varied.parameter;
@@ -110,7 +109,7 @@ Robustness JudgeRobustness(const std::vector<RobustnessCase>& cases,
   for (size_t i = 0; i < cases.size(); ++i) {
     const auto& [row, parameter, value, episode] = cases[i];
     const char* name = row == RobustnessRow::kModel
-                           ? kBoardVariations.at(static_cast<size_t>(parameter)).name
+                           ? kBoardVariations.at(parameter).name
                            : kRobustnessRowNames.at(static_cast<size_t>(row));
     if (curves.empty() || curves.back().name != name) curves.push_back({row, name, {}, {}});
     RobustnessCurve& curve = curves.back();

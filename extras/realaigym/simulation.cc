@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <mutex>
 
 #include "base/rng.h"
 #include "pendulum/runge_kutta.h"
@@ -66,18 +65,6 @@ PendulumState EndOf(Robot robot, const BoardEpisode& episode, const CycleControl
       SimulateEpisode(robot, episode, controller, kBoardSeconds + kBoardTimestep);
   const Joints &q = log.angle.back(), &w = log.velocity.back();
   return {q[0], q[1], w[0], w[1]};
-}
-
-void RunAll(int count, ThreadPool* pool, const Progress& progress,
-            const std::function<void(int)>& run) {
-  std::mutex mutex;
-  double done = 0;
-  ParallelFor(pool, count, [&](int i) {
-    run(i);
-    if (!progress) return;
-    const std::lock_guard lock(mutex);
-    progress(++done, count);
-  });
 }
 
 CycleController WithResets(const ControllerMaker& make, const ResetRules& rules, uint64_t seed) {

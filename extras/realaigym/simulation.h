@@ -1,6 +1,8 @@
 #pragma once
 
 #include <functional>
+#include <mutex>
+#include <vector>
 
 #include "base/progress.h"
 #include "base/thread_pool.h"
@@ -22,9 +24,20 @@ MachineLog SimulateEpisode(Robot robot, const BoardEpisode& episode,
 /// The state after an episode's 10 s.
 PendulumState EndOf(Robot robot, const BoardEpisode& episode, const CycleController& controller);
 
-/// Calls `run` for 0 to `count` - 1 on the pool's threads, and counts the calls.
-void RunAll(int count, ThreadPool* pool, const Progress& progress,
-            const std::function<void(int)>& run);
+/// The results of `run` for 0 to `count` - 1, computed on the pool's threads. Counts the calls.
+template <typename Run>
+auto RunAll(int count, ThreadPool* pool, const Progress& progress, const Run& run) {
+  std::vector<decltype(run(0))> results(count);
+  std::mutex mutex;
+  double done = 0;
+  ParallelFor(pool, count, [&](int i) {
+    results[i] = run(i);
+    if (!progress) return;
+    const std::lock_guard lock(mutex);
+    progress(++done, count);
+  });
+  return results;
+}
 
 /// A controller that resets interrupt. After each reset, a controller that `make` makes begins. A
 /// reset controls both motors without friction compensation.
