@@ -48,7 +48,7 @@ class MuJoCoPhysics : public Physics {
     mjtNum *qpos, *qvel, *ctrl, *push;  // in row 0 of the state table
   };
   Slice MakeSlice(const mjModel& model, int first, int count) const;
-  const Slice& SliceOf(int env) const { return slices_[static_cast<size_t>(env / slice_size_)]; }
+  const Slice& SliceOf(int env) const { return slices_[env / slice_size_]; }
   /// The part of an environment's state that starts at `first` in row 0 of its slice.
   mjtNum* Component(mjtNum* first, int env) const {
     return first + env % slice_size_ * state_size_;
@@ -79,7 +79,7 @@ MuJoCoPhysics::MuJoCoPhysics(const PhysicsConfig& config)
     slices_.push_back(MakeSlice(*model, first, std::min(slice_size_, config_.num_envs - first)));
   }
   state_size_ = mjb_nstate(slices_.front().batch.get());
-  previous_angle_.resize(static_cast<size_t>(config_.num_envs));
+  previous_angle_.resize(config_.num_envs);
 }
 
 MuJoCoPhysics::Slice MuJoCoPhysics::MakeSlice(const mjModel& model, int first, int count) const {
@@ -121,8 +121,8 @@ void MuJoCoPhysics::SetState(int env, const PendulumState& s) {
 
 void MuJoCoPhysics::SetPlant(int env, const Plant& plant) {
   // From here on, each environment has its own plant.
-  config_.plants.resize(static_cast<size_t>(config_.num_envs), config_.plants.front());
-  config_.plants[static_cast<size_t>(env)] = plant;
+  config_.plants.resize(config_.num_envs, config_.plants.front());
+  config_.plants[env] = plant;
   const Slice& slice = SliceOf(env);
   const int row = env - slice.first;
   WritePlant(plant, FieldsOf(slice.batch.get(), row));
@@ -144,22 +144,21 @@ bool MuJoCoPhysics::BlewUp(int env) const {
 }
 
 void MuJoCoPhysics::Judge(int env, double torque, StepResult& result) const {
-  const auto i = static_cast<size_t>(env);
   const size_t obs_size = result.next_obs.size() / result.reward.size();
   const PendulumState s = state(env);
   const Plant& plant = config_.plant(env);
   const double tau = std::clamp(torque, -plant.torque_limit, plant.torque_limit);
-  std::ranges::copy(Observe(plant, s), std::span(result.next_obs).subspan(i * obs_size).begin());
-  const auto terms = std::span(result.reward_terms).subspan(i * kRewardTerms, kRewardTerms);
+  std::ranges::copy(Observe(plant, s), std::span(result.next_obs).subspan(env * obs_size).begin());
+  const auto terms = std::span(result.reward_terms).subspan(env * kRewardTerms, kRewardTerms);
   std::ranges::copy(RewardTerms(plant, s, tau), terms.begin());
-  result.reward[i] = 0;
+  result.reward[env] = 0;
   for (size_t k = 0; k < kRewardTerms; ++k) {
     terms[k] *= config_.reward.weight[k];
-    result.reward[i] += terms[k];
+    result.reward[env] += terms[k];
   }
-  result.at_goal[i] = Inverted(s) ? 1 : 0;
-  result.torque[i] = tau;
-  result.work[i] = std::abs(tau * (MotorAngle(plant, s) - previous_angle_[i]));
+  result.at_goal[env] = Inverted(s) ? 1 : 0;
+  result.torque[env] = tau;
+  result.work[env] = std::abs(tau * (MotorAngle(plant, s) - previous_angle_[env]));
 }
 
 void MuJoCoPhysics::Step(std::span<const double> torque, StepResult& result) {
@@ -168,23 +167,21 @@ void MuJoCoPhysics::Step(std::span<const double> torque, StepResult& result) {
     std::span<const double> torque;
     StepResult& result;
   } step{torque, result};
-  ParallelFor(config_.pool, static_cast<int>(slices_.size()), [this, &step](int slice) {
-    StepSlice(slices_[static_cast<size_t>(slice)], step.torque, step.result);
-  });
+  ParallelFor(config_.pool, static_cast<int>(slices_.size()),
+              [this, &step](int slice) { StepSlice(slices_[slice], step.torque, step.result); });
 }
 
 void MuJoCoPhysics::StepSlice(const Slice& slice, std::span<const double> torque,
                               StepResult& result) {
   const int end = slice.first + slice.count;
   for (int env = slice.first; env < end; ++env) {
-    previous_angle_[static_cast<size_t>(env)] = MotorAngle(config_.plant(env), state(env));
-    Component(slice.ctrl, env)[0] = torque[static_cast<size_t>(env)];
+    previous_angle_[env] = MotorAngle(config_.plant(env), state(env));
+    Component(slice.ctrl, env)[0] = torque[env];
   }
   mjb_step(slice.batch.get(), nullptr, 0, kPhysicsSteps, mjSTAGE_NONE);
   for (int env = slice.first; env < end; ++env) {
-    const auto i = static_cast<size_t>(env);
-    result.terminated[i] = BlewUp(env) ? 1 : 0;
-    if (!result.terminated[i]) Judge(env, torque[i], result);
+    result.terminated[env] = BlewUp(env) ? 1 : 0;
+    if (!result.terminated[env]) Judge(env, torque[env], result);
   }
 }
 
