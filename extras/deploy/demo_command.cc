@@ -66,8 +66,7 @@ void CopyContent(const fs::path& from, const fs::path& to) {
 /// plays; empty without policies.
 std::string AddAgents(const DemoArguments& a, const fs::path& folder) {
   if (a.policies.empty()) return "";
-  const std::vector<fs::path> paths(a.policies.begin(), a.policies.end());
-  const fs::path first = ExportToPage(paths, "", 0, folder).front();
+  const fs::path first = ExportToPage(a.policies, "", 0, folder).front();
   return Concat("#agent=", first.stem().string(), "&on=1");  // an ID has letters, digits and -
 }
 

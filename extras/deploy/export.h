@@ -17,9 +17,8 @@ namespace upswing::deploy {
 /// in the page, from the untrained one to itself (0: only itself). Reads and checks everything
 /// before it writes anything. Returns the names of the files. Throws BadInput; Failure if the
 /// folder cannot be written.
-std::vector<std::string> ExportToPage(const std::vector<std::filesystem::path>& paths,
-                                      const std::string& id, int64_t checkpoints,
-                                      const std::filesystem::path& folder);
+std::vector<std::string> ExportToPage(const std::vector<std::string>& paths, const std::string& id,
+                                      int64_t checkpoints, const std::filesystem::path& folder);
 
 /// Parses a page's agents.json: {"agents": [{"id": …}, …]}. Throws BadInput that begins with
 /// `where`.

@@ -69,8 +69,7 @@ int ExportC(const ExportArguments& a) {
 
 int ExportPage(const ExportArguments& a) {
   if (a.policies.empty()) throw BadInput("--page: expected policies or run folders, got none");
-  const std::vector<fs::path> paths(a.policies.begin(), a.policies.end());
-  for (const std::string& name : ExportToPage(paths, a.id, a.checkpoints, a.page)) {
+  for (const std::string& name : ExportToPage(a.policies, a.id, a.checkpoints, a.page)) {
     fmt::print("{}\n", Printable((fs::path(a.page) / name).string()));
   }
   return 0;

@@ -35,7 +35,7 @@ struct Checkpoint {
 /// A policy to be added to the page.
 struct PageAgent {
   std::string id;
-  fs::path from;
+  std::string from;              // path of the policy or its run
   std::vector<std::byte> bytes;  // the policy file
   ordered_json entry;            // for agents.json
   std::vector<Checkpoint> checkpoints;
@@ -157,7 +157,7 @@ void AddCheckpoints(PageAgent& agent, const LoadedPolicy& loaded, int64_t count)
   list.push_back({{"step", agent.entry["step"]}, {"file", agent.entry["file"]}});
 }
 
-PageAgent ReadAgent(const fs::path& path, const std::string& given_id, int64_t checkpoints) {
+PageAgent ReadAgent(const std::string& path, const std::string& given_id, int64_t checkpoints) {
   const LoadedPolicy loaded = LoadPolicy(path);
   const std::string where = loaded.path;
   ExpectPendulum(loaded);
@@ -191,7 +191,7 @@ PageAgent ReadAgent(const fs::path& path, const std::string& given_id, int64_t c
   return agent;
 }
 
-std::vector<PageAgent> ReadAgents(const std::vector<fs::path>& paths, const std::string& id,
+std::vector<PageAgent> ReadAgents(const std::vector<std::string>& paths, const std::string& id,
                                   int64_t checkpoints) {
   if (!id.empty() && paths.size() > 1) {
     throw BadInput(Concat("--id: expected a single policy, got ", paths.size()));
@@ -201,12 +201,12 @@ std::vector<PageAgent> ReadAgents(const std::vector<fs::path>& paths, const std:
         Concat("--id: expected lower-case letters, digits and - between them, got \"", id, "\""));
   }
   std::vector<PageAgent> agents;
-  for (const fs::path& path : paths) {
+  for (const std::string& path : paths) {
     PageAgent agent = ReadAgent(path, id, checkpoints);
     const auto same = std::ranges::find(agents, agent.id, &PageAgent::id);
     if (same != agents.end()) {
-      throw BadInput(Concat(path.string(), ": expected a different ID than ", same->from.string(),
-                            ", got \"", agent.id, "\" for both; --id sets one"));
+      throw BadInput(Concat(path, ": expected a different ID than ", same->from, ", got \"",
+                            agent.id, "\" for both; --id sets one"));
     }
     agents.push_back(std::move(agent));
   }
@@ -246,7 +246,7 @@ ordered_json ParsePageIndex(std::string_view text, const std::string& where) {
   }
 }
 
-std::vector<std::string> ExportToPage(const std::vector<fs::path>& paths, const std::string& id,
+std::vector<std::string> ExportToPage(const std::vector<std::string>& paths, const std::string& id,
                                       int64_t checkpoints, const fs::path& folder) {
   const std::vector<PageAgent> agents = ReadAgents(paths, id, checkpoints);
   if (fs::exists(folder) && !fs::is_directory(folder)) {

@@ -6,7 +6,6 @@
 #include "base/text.h"
 #include "cli/say.h"
 #include "report/figure.h"
-#include "runs/find_policy.h"
 #include "runs/plant_file.h"
 
 namespace upswing {

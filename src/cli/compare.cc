@@ -8,20 +8,17 @@ namespace upswing {
 namespace {
 
 struct CompareArguments {
-  std::vector<std::string> names;
-  CompareRequest runs;  // without its paths
+  CompareRequest runs;
   std::string out;
   bool as_json = false;
 };
 
 int RunCompare(const CompareArguments& arguments) {
-  CompareRequest request = arguments.runs;
-  request.paths.assign(arguments.names.begin(), arguments.names.end());
   if (!arguments.out.empty()) {
     CheckFree(arguments.out);
     SayIfNoFigures();
   }
-  const Comparison comparison = Compare(request);
+  const Comparison comparison = Compare(arguments.runs);
   if (arguments.as_json) {
     fmt::print("{}\n", ComparisonJson(comparison));
   } else {
@@ -38,7 +35,7 @@ int RunCompare(const CompareArguments& arguments) {
 
 void AddCompare(CommandLine& line) {
   CompareArguments& a = line.Runs(RunCompare);
-  line.Texts("runs", a.names, "RUN|FOLDER", "runs or folders of runs");
+  line.Texts("runs", a.runs.paths, "RUN|FOLDER", "runs or folders of runs");
   line.Require("runs");
   for (const char* flag : {"--made-for", "--threads"}) {
     line.Removed(flag, "compare takes runs only, and `upswing eval` judges a policy or controller");

@@ -14,6 +14,7 @@
 #include "agents/config_checks.h"
 #include "base/error.h"
 #include "base/format.h"
+#include "base/stopwatch.h"
 #include "base/text.h"
 #include "cli/progress.h"
 #include "cli/say.h"
@@ -112,8 +113,7 @@ class ManyRunsView {
     }
     const double all = standing.steps + standing.left;
     standing.share = all > 0 ? standing.steps / all : 1;
-    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin_;
-    standing.steps_per_second = (standing.steps - steps_before_) / std::max(1e-3, elapsed.count());
+    standing.steps_per_second = (standing.steps - steps_before_) / std::max(1e-3, watch_.seconds());
     const bool may_end_early = std::ranges::any_of(
         runs_, [](const SeedRun& run) { return run.variant->config.train.stop_when_solved; });
     standing.time_left = fmt::format("{} {} left", may_end_early ? "at most" : "about",
@@ -126,9 +126,10 @@ class ManyRunsView {
   void Announce() const {
     const size_t variants = many_.plan.variants.size();
     Say("Training {} in {}\n", Printable(many_.what), Printable(many_.plan.folder.string()));
-    Say("  {}seed{} {}: {}{}\n", variants == 1 ? "" : fmt::format("{} variants, ", variants),
+    Say("  {}seed{} {}: {}, {} at a time\n",
+        variants == 1 ? "" : fmt::format("{} variants, ", variants),
         many_.plan.seeds.size() == 1 ? "" : "s", SeedsText(many_.plan.seeds),
-        Counted(std::ssize(runs_), "run"), fmt::format(", {} at a time", many_.jobs));
+        Counted(std::ssize(runs_), "run"), many_.jobs);
     for (const Variant& variant : many_.plan.variants) {
       for (const std::string& warning : Warnings(variant.config)) {
         Say("  Warning: {}{}{}\n", Printable(variant.name), variant.name.empty() ? "" : ": ",
@@ -159,7 +160,7 @@ class ManyRunsView {
   const std::vector<SeedRun>& runs_;
   std::vector<SeedRun*> running_;
   double steps_before_ = 0;  // made before this process began
-  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+  Stopwatch watch_;
 };
 
 /// The last line of a log file that is not empty.
@@ -328,7 +329,7 @@ Comparison CompareRuns(const StudyPlan& plan) {
   CompareRequest request;
   request.root = plan.folder;
   request.different_tasks = true;
-  for (const SeedRun& run : RunsOf(plan)) request.paths.push_back(run.path);
+  for (const SeedRun& run : RunsOf(plan)) request.paths.push_back(run.path.string());
   return Compare(request);
 }
 

@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
 
 #include "agents/config_checks.h"
 #include "base/format.h"
+#include "base/stopwatch.h"
 #include "base/text.h"
 #include "cli/eval_table.h"
 #include "cli/progress.h"
@@ -193,14 +193,11 @@ class TrainView : public TrainObserver {
   }
 
   /// Time by the clock. Earlier sessions of a resumed run count without their evaluations.
-  std::string Elapsed() const {
-    const std::chrono::duration<double> session = std::chrono::steady_clock::now() - begin_;
-    return FormatDuration(seconds_before_ + session.count());
-  }
+  std::string Elapsed() const { return FormatDuration(seconds_before_ + session_.seconds()); }
 
   const Training& training_;
   ProgressLine line_;
-  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+  Stopwatch session_;
   double seconds_before_;                     // training time before this view
   int64_t begin_step_;                        // of the training in this view
   Metrics metrics_;                           // last reported

@@ -11,7 +11,7 @@ namespace upswing {
 
 /// Which runs to compare.
 struct CompareRequest {
-  std::vector<std::filesystem::path> paths;  // runs or folders of runs, at any depth
+  std::vector<std::string> paths;   // runs or folders of runs, at any depth
   std::filesystem::path root = {};  // base folder of variants' names; empty: each of `paths`
   bool unfinished = false;          // include runs that are not finished
   bool different_tasks = false;     // also compare groups evaluated on different tasks

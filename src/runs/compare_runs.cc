@@ -67,9 +67,8 @@ void AddRuns(const fs::path& folder, Found& found, std::vector<fs::path>& paths)
 
 /// Throws BadInput if a path is the name or the file of a policy or controller.
 void ExpectNoPolicy(const fs::path& path) {
-  std::error_code error;
   const bool is_name = IsController(path.string()) && !Exists(path);
-  const bool is_file = path.extension() == ".safetensors" && fs::is_regular_file(path, error);
+  const bool is_file = path.extension() == ".safetensors" && IsFile(path);
   if (!is_name && !is_file && ShippedPolicy(path).empty()) return;
   throw BadInput(Concat(path.string(), ": expected a run or a folder of runs, got a policy or ",
                         "controller, which `upswing eval ", path.string(), "` judges"));
@@ -176,7 +175,7 @@ Found ReadRuns(const CompareRequest& request) {
   Found found;
   RunReader reader(request, found);
   std::set<fs::path> seen;
-  for (const fs::path& argument : request.paths) {
+  for (const std::string& argument : request.paths) {
     for (const fs::path& path : RunsIn(argument, found)) {
       if (!seen.insert(fs::weakly_canonical(path)).second) {
         throw BadInput(Concat(path.string(), ": expected each run once, got it twice"));

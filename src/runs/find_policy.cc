@@ -1,7 +1,6 @@
 #include "runs/find_policy.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <set>
 
 #include "agents/controllers.h"

@@ -3,8 +3,6 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
-#include <array>
-
 #include "base/archive.h"
 #include "base/error.h"
 #include "base/text.h"
