@@ -421,9 +421,9 @@ class Problem {
     constexpr int kInARow = 6;
     VectorXd score = VectorXd::Zero(size());
     for (int w = 0; w < windows(); ++w) {
-      const auto [of_H, of_g] = blocks[w].Eliminate(damping);
-      H[shots_[w].session] += of_H;
-      score += slopes[shots_[w].session].transpose() * of_g;
+      const auto [H_w, g_w] = blocks[w].Eliminate(damping);
+      H[shots_[w].session] += H_w;
+      score += slopes[shots_[w].session].transpose() * g_w;
       if (w + 1 == windows() || shots_[w + 1].window.log != shots_[w].window.log ||
           (w + 1) % kInARow == 0) {
         e.g += score;
