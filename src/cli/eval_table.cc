@@ -95,9 +95,8 @@ void PrintEvalTable(const EvalReport& report) {
   fmt::print("  success        {} of {} = {:.1f}%   (95% interval {:.1f}% to {:.1f}%)\n",
              e.successes, e.episodes, 100 * e.success_rate(), 100 * e.success_interval.low,
              100 * e.success_interval.high);
-  for (const Transition& t : TransitionsOf(report)) {
-    fmt::print("    {:<9} to {:<9} {} of {}\n", PoseName(t.from), PoseName(t.to), t.successes,
-               t.episodes);
+  for (const auto& [name, t] : TransitionsOf(report)) {
+    fmt::print("    {:<22} {} of {}\n", name, t.successes, t.episodes);
   }
   PrintSuccesses(e);
   fmt::print("  return         {}   in the first {} s\n", MomentsText(e.reward_sum),

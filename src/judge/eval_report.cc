@@ -174,17 +174,14 @@ EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& tria
   return report;
 }
 
-std::vector<Transition> TransitionsOf(const EvalReport& report) {
-  std::vector<Transition> transitions;
-  for (const Pose& from : kPoses) {
-    for (const Pose& to : kPoses) {
-      Transition t{from, to};
-      for (const JudgedEpisode& episode : report.episodes) {
-        if (episode.goal != to || !Inverted(SeenFrom(from, episode.start))) continue;
-        ++t.episodes;
-        t.successes += episode.result.success ? 1 : 0;
-      }
-      if (t.episodes > 0) transitions.push_back(t);
+std::map<std::string, Transition> TransitionsOf(const EvalReport& report) {
+  std::map<std::string, Transition> transitions;
+  for (const JudgedEpisode& episode : report.episodes) {
+    for (const Pose& from : kPoses) {
+      if (!episode.goal || !Inverted(SeenFrom(from, episode.start))) continue;
+      Transition& t = transitions[Concat(PoseName(from), " to ", PoseName(*episode.goal))];
+      ++t.episodes;
+      t.successes += episode.result.success ? 1 : 0;
     }
   }
   return transitions;
@@ -210,11 +207,8 @@ std::string EvalJson(const EvalReport& report) {
     j[option.section][option.name] = JsonOf(option);
   }
   AddFigures(report, j);
-  for (const Transition& t : TransitionsOf(report)) {
-    j["transitions"].push_back({{"from", PoseName(t.from)},
-                                {"to", PoseName(t.to)},
-                                {"episodes", t.episodes},
-                                {"successes", t.successes}});
+  for (const auto& [name, t] : TransitionsOf(report)) {
+    j["transitions"][name] = {{"episodes", t.episodes}, {"successes", t.successes}};
   }
   return PrintableJson(j);
 }

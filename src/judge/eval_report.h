@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -39,14 +40,13 @@ struct EvalReport {
 EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& trial, int64_t episodes,
                           ThreadPool& pool, const Progress& progress);
 
-/// The episodes of a policy for any pose that begin near one pose and ask for another.
+/// The episodes that begin near one pose and ask for another.
 struct Transition {
-  Pose from, to;
   int64_t episodes = 0, successes = 0;
 };
 
-/// The transitions with at least one episode.
-std::vector<Transition> TransitionsOf(const EvalReport& report);
+/// The transitions of a policy for any pose, by name, such as "up-up to up-down".
+std::map<std::string, Transition> TransitionsOf(const EvalReport& report);
 
 /// Number of episodes with a controller designed for their plant.
 int64_t NumDesigned(const EvalReport& report);

@@ -149,13 +149,7 @@ void MuJoCoPhysics::Judge(int env, double torque, StepResult& result) const {
   const Plant& plant = config_.plant(env);
   const double tau = std::clamp(torque, -plant.torque_limit, plant.torque_limit);
   std::ranges::copy(Observe(plant, s), std::span(result.next_obs).subspan(env * obs_size).begin());
-  const auto terms = std::span(result.reward_terms).subspan(env * kRewardTerms, kRewardTerms);
-  std::ranges::copy(RewardTerms(plant, s, tau), terms.begin());
-  result.reward[env] = 0;
-  for (size_t k = 0; k < kRewardTerms; ++k) {
-    terms[k] *= config_.reward.weight[k];
-    result.reward[env] += terms[k];
-  }
+  config_.reward.Weigh(env, RewardTerms(plant, s, tau), result);
   result.at_goal[env] = Inverted(s) ? 1 : 0;
   result.torque[env] = tau;
   result.work[env] = std::abs(tau * (MotorAngle(plant, s) - previous_angle_[env]));

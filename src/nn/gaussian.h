@@ -58,29 +58,12 @@ T LogDensity(T epsilon, T log_std) {
   return -epsilon * epsilon / 2 - log_std - kHalfLogTwoPi;
 }
 
-/// ln(1 - tanh²(u)), the logarithm of the slope of tanh, from size = |u| and e = exp(-2 |u|). This
-/// is the stable form 2 (ln 2 - u - softplus(-2u)). It is exact for any u, because by symmetry |u|
-/// can replace u.
-template <typename T>
-T LogTanhSlope(T size, T e) {
-  return 2 * (std::numbers::ln2_v<T> - size - std::log1p(e));
-}
-
-/// A sample of a squashed policy.
+/// A sample of a squashed policy; SquashSamples of linear.h makes many.
 template <typename T>
 struct Squashed {
   T epsilon = 0, action = 0;  // ε, a = tanh(u)
   T log_prob = 0;             // ln π(a) = ln N(u) - ln(1 - a²)
 };
-
-/// Makes the sample of ε. SquashSamples of linear.h does the same for many samples at once.
-template <typename T>
-Squashed<T> Squash(const Gaussian<T>& policy, T epsilon) {
-  // One e = exp(-2 |u|) serves tanh(|u|) = (1 - e) / (1 + e) and ln(1 - a²).
-  const T u = policy.mean + policy.std * epsilon, size = std::abs(u), e = std::exp(-2 * size);
-  return {epsilon, std::copysign((1 - e) / (1 + e), u),
-          LogDensity(epsilon, policy.log_std) - LogTanhSlope(size, e)};
-}
 
 /// Gradient with respect to μ and ln σ.
 template <typename T>

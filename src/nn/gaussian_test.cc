@@ -4,6 +4,8 @@
 
 #include <array>
 
+#include "nn/testing.h"
+
 namespace upswing {
 namespace {
 

@@ -12,7 +12,7 @@
 #include "base/aligned.h"
 #include "base/rng.h"
 #include "base/simd.h"
-#include "nn/gaussian.h"
+#include "nn/testing.h"
 
 namespace upswing {
 namespace {

@@ -189,18 +189,13 @@ void PendulumEnv::RestoreHeld(StepResult& result) {
 
 void PendulumEnv::JudgeByGoal(StepResult& result) const {
   if (!config_.any_pose) return;
-  const auto weight = PhysicsOf(config_).reward.weight;
+  const RewardConfig built_in;  // its weights, of which an expression makes its own reward
   for (int env = 0; env < config_.num_envs; ++env) {
     const auto i = static_cast<size_t>(env);
-    const PendulumState s = state(env);
-    const auto terms = std::span(result.reward_terms).subspan(i * kRewardTerms, kRewardTerms);
-    std::ranges::copy(RewardTerms(plant(env), s, result.torque[i], *goal(env)), terms.begin());
-    result.reward[i] = 0;
-    for (size_t k = 0; k < kRewardTerms; ++k) {
-      terms[k] *= weight[k];
-      result.reward[i] += terms[k];
-    }
-    result.at_goal[i] = Inverted(SeenFrom(*goal(env), s)) ? 1 : 0;
+    const Pose goal = *this->goal(env);
+    const auto terms = RewardTerms(plant(env), state(env), result.torque[i], goal);
+    (reward_ ? built_in : config_.reward).Weigh(env, terms, result);
+    result.at_goal[i] = Inverted(SeenFrom(goal, state(env))) ? 1 : 0;
   }
 }
 

@@ -2,6 +2,16 @@
 
 namespace upswing {
 
+void RewardConfig::Weigh(int env, const std::array<double, kRewardTerms>& terms,
+                         StepResult& result) const {
+  const auto i = static_cast<size_t>(env);
+  result.reward[i] = 0;
+  for (size_t k = 0; k < kRewardTerms; ++k) {
+    result.reward_terms[i * kRewardTerms + k] = terms[k] * weight[k];
+    result.reward[i] += terms[k] * weight[k];
+  }
+}
+
 void RewardConfig::Describe(Options& o) {
   constexpr Range kWeight{0, 1000};
   auto& [energy, height, balance, velocity, torque] = weight;

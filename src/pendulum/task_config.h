@@ -3,6 +3,7 @@
 #include <array>
 #include <string>
 
+#include "base/env.h"
 #include "base/options.h"
 #include "pendulum/task.h"
 
@@ -13,6 +14,9 @@ namespace upswing {
 struct RewardConfig {
   std::array<double, kRewardTerms> weight{1, 1, 1, 1, 1};
   std::string expression;  // empty: the built-in terms
+
+  /// Writes the terms of an environment, weighted, and their sum.
+  void Weigh(int env, const std::array<double, kRewardTerms>& terms, StepResult& result) const;
 
   /// Declares each setting in `options`: name, range, unit, help.
   void Describe(Options& options);
