@@ -51,7 +51,7 @@ ALLOWED_FILES = {
     "nanobind": re.compile(r"python/"),
     "muParser.h": re.compile(r"src/pendulum/own_reward\.cc$"),
     "hwy": re.compile(r"src/(base/simd(_test)?|nn/(linear|product|registers-inl)|"
-                      r"pendulum/(closed_form|sine_cosine-inl))\.(h|cc)$"),
+                      r"pendulum/(closed_form|sine_cosine(-inl|_test)))\.(h|cc)$"),
     "Eigen": re.compile(r"src/(control/|nn/[^/]*_test\.cc$)|extras/(machine|realaigym)/"),
 }
 

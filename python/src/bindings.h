@@ -7,6 +7,7 @@
 #include <chrono>
 #include <functional>
 #include <initializer_list>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <numeric>
@@ -81,7 +82,8 @@ nanobind::ndarray<nanobind::numpy, T> NewArray(std::initializer_list<size_t> sha
 /// A plant's values by name.
 nanobind::dict PlantDict(const Plant& plant);
 
-/// A policy with a pool of memories, one for each concurrent call.
+/// A policy with its memories, one for each number of environments. Concurrent calls wait for each
+/// other.
 class PolicyHandle {
  public:
   explicit PolicyHandle(LoadedPolicy loaded) : loaded_(std::move(loaded)) {}
@@ -92,23 +94,18 @@ class PolicyHandle {
   /// Calls `work` with a memory for `n` environments.
   template <typename Work>
   void WithMemory(int n, const Work& work) {
-    SizedMemory memory = Take(n);
-    work(*memory.memory);
-    Keep(std::move(memory));
+    const std::lock_guard lock(mutex_);
+    constexpr size_t kMost = 8;
+    if (memories_.size() > kMost) memories_.clear();
+    std::unique_ptr<Policy::Memory>& memory = memories_[n];
+    if (!memory) memory = policy().Start(n);
+    work(*memory);
   }
 
  private:
-  struct SizedMemory {
-    int num_envs;
-    std::unique_ptr<Policy::Memory> memory;
-  };
-  SizedMemory Take(int n);
-  /// Stores a memory for later calls, unless there are many already.
-  void Keep(SizedMemory memory);
-
   LoadedPolicy loaded_;
   std::mutex mutex_;
-  std::vector<SizedMemory> free_;  // in order of last use, oldest first
+  std::map<int, std::unique_ptr<Policy::Memory>> memories_;
 };
 
 /// A policy of the double pendulum that calls a Python function: observations (N × D, float32) →

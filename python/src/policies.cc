@@ -106,26 +106,6 @@ std::shared_ptr<PolicyHandle> Load(const std::string& name, const SettingTexts& 
 
 }  // namespace
 
-PolicyHandle::SizedMemory PolicyHandle::Take(int n) {
-  {
-    const std::lock_guard lock(mutex_);
-    const auto found = std::ranges::find(free_, n, &SizedMemory::num_envs);
-    if (found != free_.end()) {
-      SizedMemory memory = std::move(*found);
-      free_.erase(found);
-      return memory;
-    }
-  }
-  return {n, policy().Start(n)};
-}
-
-void PolicyHandle::Keep(SizedMemory memory) {
-  constexpr size_t kMost = 8;
-  const std::lock_guard lock(mutex_);
-  free_.push_back(std::move(memory));
-  if (free_.size() > kMost) free_.erase(free_.begin());
-}
-
 void BindPolicies(nb::module_& m) {
   nb::class_<PolicyHandle> c(m, "PolicyHandle");
   c.def("act", &Act, nb::arg("obs"), nb::arg("out"))

@@ -81,10 +81,11 @@ void AddTrialOptions(CommandLine& line, TrialArguments& a, const std::string& se
   line.Removed("--model", kInsteadOfModel);
   AddPhysics(line, a.physics);
   AddUnknownPlant(line, a.unknown_plant);
-  line.Text(
-      "--goal", a.goal, "POSE",
-      "pose that a policy for any pose is to reach: up-up, up-down, down-up or down-down, link 1 "
-      "first (default up-up; in `eval`, each episode draws its own)");
+  Options own;
+  own.AddChoice(&a.goal, "goal", {"up-up", "up-down", "down-up", "down-down"},
+                "pose that a policy for any pose is to reach, link 1 first")
+      .usual = "up-up; in `eval` each episode draws its own";
+  line.Arguments(own);
   const TrialConditions defaults;
   line.Settings(OptionsOf(defaults), a.flags);
   // Mistakes on the command line are reported before any file is read.

@@ -71,7 +71,7 @@ PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy*
     if (a.unknown_plant) env.assumed_plant = loaded->plant;
     env.any_pose = loaded->seeks_any_pose();
   }
-  env.goal = a.goal.empty() ? Pose() : ParsePose(a.goal, "--goal");
+  env.goal = a.goal.empty() ? Pose() : *std::ranges::find(kPoses, a.goal, PoseName);
   // A controller balances only upright, also one whose swing-up is a policy for any pose.
   const bool is_learned = loaded != nullptr && !loaded->design_for;
   if (!(env.any_pose && is_learned) && env.goal != Pose()) {

@@ -69,37 +69,6 @@ double Cancellation(const ClosedFormBatch& batch, size_t i) {
   return M11 * M22 / (M11 * M22 - M12 * M12);
 }
 
-TEST(ClosedForm, SineAndCosineAreWithinTwoUlp) {
-  std::vector<double> x(1000000);
-  Rng rng(1, "angles");
-  for (size_t i = 0; i < x.size(); ++i) {
-    const double most = i % 2 == 0 ? 1e4 : 1e6;
-    x[i] = rng.Uniform(-most, most);
-  }
-  for (int i = 0; i < 100000; ++i) x.push_back(std::ldexp(rng.Uniform(-1, 1), -i % 60));
-  // Every multiple of π/2 up to 1e4, then every 101st up to 1e6.
-  for (int n = -636619; n <= 636619; n += std::abs(n) <= 6366 ? 1 : 101) {
-    double near = n * (kPi / 2);  // and its floating-point neighbours
-    for (int i = 0; i < 3; ++i) near = std::nextafter(near, -1e9);
-    for (int i = 0; i < 7; ++i, near = std::nextafter(near, 1e9)) x.push_back(near);
-  }
-  std::vector<double> sine(x.size()), cosine(x.size());
-  const auto error = [](double got, long double exact) {
-    const double size = static_cast<double>(std::abs(exact));
-    const double ulp = std::nextafter(size, 2.0) - size;
-    return static_cast<double>(std::abs(got - exact)) / ulp;
-  };
-  OnEachPath([&](const std::string&) {
-    SineCosine(x, sine, cosine);
-    double worst = 0;
-    for (size_t i = 0; i < x.size(); ++i) {
-      const long double exact = x[i];
-      worst = std::max({worst, error(sine[i], std::sin(exact)), error(cosine[i], std::cos(exact))});
-    }
-    EXPECT_LE(worst, 2);
-  });
-}
-
 TEST(ClosedForm, StepsLikeMuJoCoOverTheWholeRangeOfPlants) {
   constexpr size_t kTrials = 500;
   ClosedFormBatch start(kTrials);

@@ -320,20 +320,6 @@ void JudgeRange(const ClosedFormBatch& batch, const RewardConfig& weights, size_
   }
 }
 
-void SineCosineRange(std::span<const double> x, std::span<double> sine, std::span<double> cosine) {
-  const size_t lanes = hn::Lanes(kDoubles);
-  for (size_t i = 0; i < x.size(); i += lanes) {
-    const size_t count = std::min(lanes, x.size() - i);
-    alignas(64) std::array<double, kWidest> in{}, s, c;
-    std::copy_n(x.data() + i, count, in.data());
-    const Angle result = SineCosineOf(hn::Load(kDoubles, in.data()));
-    hn::Store(result.s, kDoubles, s.data());
-    hn::Store(result.c, kDoubles, c.data());
-    std::copy_n(s.data(), count, sine.data() + i);
-    std::copy_n(c.data(), count, cosine.data() + i);
-  }
-}
-
 }  // namespace
 }  // namespace upswing::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
@@ -343,7 +329,6 @@ namespace upswing {
 
 HWY_EXPORT(AdvanceRange);
 HWY_EXPORT(JudgeRange);
-HWY_EXPORT(SineCosineRange);
 
 ClosedFormBatch::ClosedFormBatch(size_t num_envs) {
   constexpr size_t kWidest = HWY_NAMESPACE::kWidest;
@@ -403,10 +388,6 @@ void Advance(ClosedFormBatch& batch, int steps, size_t first, size_t last, doubl
 void Judge(const ClosedFormBatch& batch, const RewardConfig& weights, size_t first, size_t last,
            StepResult& result) {
   HWY_DYNAMIC_DISPATCH(JudgeRange)(batch, weights, first, last, result);
-}
-
-void SineCosine(std::span<const double> x, std::span<double> sine, std::span<double> cosine) {
-  HWY_DYNAMIC_DISPATCH(SineCosineRange)(x, sine, cosine);
 }
 
 }  // namespace upswing

@@ -69,7 +69,4 @@ void Advance(ClosedFormBatch& batch, int steps, size_t first, size_t last,
 void Judge(const ClosedFormBatch& batch, const RewardConfig& weights, size_t first, size_t last,
            StepResult& result);
 
-/// Sine and cosine of x (n), rad, within 2 ulp for |x| ≤ 1e6. Source: fdlibm's k_sin.c and k_cos.c.
-void SineCosine(std::span<const double> x, std::span<double> sine, std::span<double> cosine);
-
 }  // namespace upswing

@@ -48,8 +48,8 @@ HWY_INLINE V ReduceByHalfPi(V x, V n) {
 #endif
 }
 
-/// Sine and cosine: x = n π/2 + r with |r| ≤ π/4, fdlibm's polynomials in r (error below 2^-57),
-/// then the quadrant n mod 4.
+/// Sine and cosine of x (rad), within 2 ulp for |x| ≤ 1e6: x = n π/2 + r with |r| ≤ π/4, fdlibm's
+/// polynomials in r (error below 2^-57), then the quadrant n mod 4.
 HWY_INLINE Angle SineCosineOf(V x) {
   const hn::RebindToSigned<D> integers;
   // Adding 1.5·2^52 rounds x to an integer, held in the last bits of the sum.

@@ -5,9 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <vector>
 
-#include "base/error.h"
 #include "base/text.h"
 
 namespace upswing {
@@ -72,16 +70,6 @@ bool Inverted(const PendulumState& s) {
 
 std::string PoseName(const Pose& pose) {
   return Concat(pose.up1 ? "up-" : "down-", pose.up2 ? "up" : "down");
-}
-
-Pose ParsePose(std::string_view name, const std::string& where) {
-  std::vector<std::string> names;
-  for (const Pose& pose : kPoses) {
-    names.push_back(PoseName(pose));
-    if (names.back() == name) return pose;
-  }
-  throw BadInput(
-      Concat(where, ": expected ", Join(names, ", "), ", got \"", Printable(name), "\""));
 }
 
 PendulumState SeenFrom(const Pose& pose, const PendulumState& s) {

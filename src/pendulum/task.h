@@ -2,7 +2,6 @@
 
 #include <array>
 #include <string>
-#include <string_view>
 
 #include "pendulum/plant.h"
 
@@ -53,8 +52,6 @@ inline constexpr std::array<Pose, 4> kPoses{Pose{true, true}, Pose{true, false},
 
 /// The name of a pose, such as "up-down": link 1 up, link 2 down.
 std::string PoseName(const Pose& pose);
-/// The pose of this name. Throws BadInput, with a message that begins with `where`.
-Pose ParsePose(std::string_view name, const std::string& where);
 
 /// The state with its angles measured from `pose` in place of upright: rest in the pose becomes
 /// rest upright.
