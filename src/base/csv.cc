@@ -5,7 +5,6 @@
 #include <optional>
 
 #include "base/error.h"
-#include "base/text.h"
 
 namespace upswing {
 namespace {

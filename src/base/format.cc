@@ -1,7 +1,6 @@
 #include "base/format.h"
 
 #include <cmath>
-#include <cstdint>
 
 #include "base/text.h"
 

@@ -1,7 +1,5 @@
 #include "control/linearize.h"
 
-#include "pendulum/equations.h"
-
 namespace upswing {
 
 LinearModel LinearizeUpright(const Manipulator& plant, int actuated_joint) {

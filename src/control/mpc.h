@@ -1,7 +1,6 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 
 #include "control/lqr.h"
 #include "control/settings.h"

@@ -9,7 +9,6 @@
 #include "base/error.h"
 #include "base/format.h"
 #include "base/json.h"
-#include "base/text.h"
 #include "os/file.h"
 #include "report/figure.h"
 #include "rl/evaluate.h"

@@ -7,8 +7,6 @@
 #include <cmath>
 #include <numeric>
 
-#include "pendulum/closed_form.h"
-
 namespace upswing {
 namespace {
 

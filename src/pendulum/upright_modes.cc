@@ -93,7 +93,6 @@ Falling FallingOf(const Manipulator& plant, const Plant& motor, const PendulumSt
   // The gain that moves both poles to their mirror images: Anderson, Moore, section 4.3.
   const auto [fast, slow] = rates;
   falling.torque = -2 * (fast + slow) / (fast - slow) * (falling.zeta[0] - falling.zeta[1]);
-
   return falling;
 }
 
