@@ -171,8 +171,8 @@ class Environments {
     const bool fits = action.size() == n && action.ndim() == (torques ? 2 : 1) &&
                       (!torques || action.shape(0) == n);
     if (fits) return;
-    std::vector<std::string> shape;
-    for (size_t k = 0; k < action.ndim(); ++k) shape.push_back(std::to_string(action.shape(k)));
+    std::vector<size_t> shape;
+    for (size_t k = 0; k < action.ndim(); ++k) shape.push_back(action.shape(k));
     throw BadInput(Concat("action: expected an array of shape (", n, torques ? ", 1" : ",",
                           "), got (", Join(shape, ", "), action.ndim() == 1 ? ",)" : ")"));
   }

@@ -120,15 +120,8 @@ Tensors Training::Checkpoint() {
 }
 
 void Training::Load(const Tensors& checkpoint) {
-  const auto expect = [&](const std::string& key, std::string_view expected) {
-    const std::string& got = checkpoint.Metadata(key);
-    if (got != expected) {
-      throw BadInput(Concat(checkpoint.where(), ": ", key, ": expected \"", expected, "\", got \"",
-                            got, "\""));
-    }
-  };
-  expect("format", kCheckpointFormat);
-  expect("upswing_version", UPSWING_VERSION);
+  checkpoint.ExpectMetadata("format", kCheckpointFormat);
+  checkpoint.ExpectMetadata("upswing_version", UPSWING_VERSION);
   const Config old_config = ConfigIn(checkpoint.Metadata("config"), checkpoint.where());
   ExpectSameSettings(old_config, config_, checkpoint.where(),
                      [](const Option& option) { return option.identity(); });

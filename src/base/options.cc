@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <stdexcept>
 
 #include "base/error.h"
@@ -27,13 +26,6 @@ std::string Quote(std::string_view text) {
   }
   quoted += '"';
   return quoted;
-}
-
-std::string ListText(const std::vector<int64_t>& values) {
-  std::vector<std::string> texts;
-  texts.reserve(values.size());
-  for (const int64_t value : values) texts.push_back(std::to_string(value));
-  return Concat("[", Join(texts, ", "), "]");
 }
 
 std::string RangeText(Range range) {
@@ -103,20 +95,17 @@ std::string FlagOf(std::string name) {
   return Concat("--", name);
 }
 
-std::string Option::flag() const { return FlagOf(name); }
-
-std::string Options::AliasEntry::flag() const { return FlagOf(name); }
-
 std::string Option::text() const {
-  return std::visit(Overloaded{
-                        [](const bool* value) -> std::string { return *value ? "true" : "false"; },
-                        [](const int64_t* value) { return std::to_string(*value); },
-                        // The sum turns -0 into 0, which is what TOML reads in "-0".
-                        [](const double* value) { return FormatNumber(*value + 0.0); },
-                        [](const std::string* value) { return Quote(*value); },
-                        [](const std::vector<int64_t>* value) { return ListText(*value); },
-                    },
-                    target);
+  return std::visit(
+      Overloaded{
+          [](const bool* value) -> std::string { return *value ? "true" : "false"; },
+          [](const int64_t* value) { return std::to_string(*value); },
+          // The sum turns -0 into 0, which is what TOML reads in "-0".
+          [](const double* value) { return FormatNumber(*value + 0.0); },
+          [](const std::string* value) { return Quote(*value); },
+          [](const std::vector<int64_t>* value) { return Concat("[", Join(*value, ", "), "]"); },
+      },
+      target);
 }
 
 std::string Option::plain_text() const {
@@ -231,8 +220,8 @@ void Options::AddMissing(const Options& others) {
     if (Get(option.name) == nullptr) options_.push_back(option);
   }
   for (const AliasEntry& alias : others.aliases_) {
-    const auto same = [&](const AliasEntry& own) { return own.name == alias.name; };
-    if (std::ranges::none_of(aliases_, same)) aliases_.push_back(alias);
+    const auto own = std::ranges::find(aliases_, alias.name, &AliasEntry::name);
+    if (own == aliases_.end()) aliases_.push_back(alias);
   }
   missing_.insert(others.missing_.begin(), others.missing_.end());
 }
@@ -247,8 +236,7 @@ std::string Options::WhyMissing(std::string_view name) const {
 }
 
 const Option* Options::Get(std::string_view name) const {
-  const auto found =
-      std::ranges::find_if(options_, [&](const Option& option) { return option.name == name; });
+  const auto found = std::ranges::find(options_, name, &Option::name);
   return found == options_.end() ? nullptr : &*found;
 }
 

@@ -57,7 +57,7 @@ struct Option {
   /// Whether another value makes a different run, which cannot resume this one.
   bool identity() const { return decides == Decides::kTraining || decides == Decides::kSeed; }
   /// The flag, such as `--eval-every`.
-  std::string flag() const;
+  std::string flag() const { return FlagOf(name); }
   /// The value of a setting that is a double.
   double number() const { return *std::get<double*>(target); }
   /// The value in TOML syntax.
@@ -132,8 +132,6 @@ class Options {
     std::string section, name;
     std::vector<std::string> members;
     std::string help;
-
-    std::string flag() const;
   };
   const std::vector<AliasEntry>& aliases() const { return aliases_; }
 

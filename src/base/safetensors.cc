@@ -115,8 +115,7 @@ void VerifyChecksum(std::string header, const std::map<std::string, Tensor>& ten
   // of each tensor.
   std::vector<const Tensor*> order;
   for (const auto& [name, tensor] : tensors) order.push_back(&tensor);
-  std::sort(order.begin(), order.end(),
-            [](const Tensor* a, const Tensor* b) { return a->bytes.data() < b->bytes.data(); });
+  std::ranges::sort(order, {}, [](const Tensor* tensor) { return tensor->bytes.data(); });
   for (const Tensor* tensor : order) checksum.Update(tensor->bytes);
   if (checksum.Hex() == expected) return;
   throw BadInput(

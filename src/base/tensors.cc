@@ -22,8 +22,7 @@ constexpr std::array kDtypes{
 };
 
 const DtypeFacts& FactsOf(Dtype dtype) {
-  return *std::find_if(kDtypes.begin(), kDtypes.end(),
-                       [&](const DtypeFacts& facts) { return facts.dtype == dtype; });
+  return *std::ranges::find(kDtypes, dtype, &DtypeFacts::dtype);
 }
 
 /// The numbers of a tensor. Its bytes need not be aligned.
@@ -51,16 +50,18 @@ std::optional<Dtype> DtypeCalled(std::string_view name) {
   return facts->dtype;
 }
 
-std::string Tensor::Describe() const {
-  std::vector<std::string> extents;
-  for (const int64_t extent : shape) extents.push_back(std::to_string(extent));
-  return Concat(NameOf(dtype), " [", Join(extents, ", "), "]");
-}
+std::string Tensor::Describe() const { return Concat(NameOf(dtype), " [", Join(shape, ", "), "]"); }
 
 const std::string& Tensors::Metadata(const std::string& key) const {
   const auto found = metadata.find(key);
   if (found == metadata.end()) throw BadInput(Concat(where_, ": no metadata \"", key, "\""));
   return found->second;
+}
+
+void Tensors::ExpectMetadata(const std::string& key, std::string_view expected) const {
+  const std::string& got = Metadata(key);
+  if (got == expected) return;
+  throw BadInput(Concat(where_, ": ", key, ": expected \"", expected, "\", got \"", got, "\""));
 }
 
 void Tensors::Narrow() {

@@ -120,6 +120,8 @@ class Tensors {
 
   /// The metadata under a key. Throws BadInput if the key is missing.
   const std::string& Metadata(const std::string& key) const;
+  /// Throws BadInput unless the metadata under a key is this text.
+  void ExpectMetadata(const std::string& key, std::string_view expected) const;
 
   /// Whether the source had a checksum, which was then correct.
   bool has_checksum = false;

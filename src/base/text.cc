@@ -170,15 +170,6 @@ std::string_view TakeLine(std::string_view& rest) {
   return line;
 }
 
-std::string Join(const std::vector<std::string>& parts, std::string_view separator) {
-  std::string joined;
-  for (const std::string& part : parts) {
-    if (!joined.empty()) joined += separator;
-    joined += part;
-  }
-  return joined;
-}
-
 std::string Replaced(std::string_view text, std::string_view from, std::string_view to) {
   std::string replaced;  // in place, each replacement would move the rest of the text
   size_t begin = 0;

@@ -49,8 +49,16 @@ std::vector<std::string> Words(std::string_view text);
 /// Takes the first line off the rest of a text. Returns it trimmed.
 std::string_view TakeLine(std::string_view& rest);
 
-/// Joins `parts` with `separator` between them.
-std::string Join(const std::vector<std::string>& parts, std::string_view separator);
+/// Joins `parts`, texts or numbers, with `separator` between them.
+template <typename Parts = std::vector<std::string>>
+std::string Join(const Parts& parts, std::string_view separator) {
+  std::string joined;
+  for (const auto& part : parts) {
+    if (!joined.empty()) joined += separator;
+    AddTo(joined, part);
+  }
+  return joined;
+}
 
 /// The member `name` of each row of a table.
 template <typename Rows>

@@ -389,7 +389,7 @@ void CommandLine::Settings(const Options& options, std::vector<FlagValue>& flags
     Option as_one = *options.Find(alias.name, alias.name).front();
     as_one.help = alias.help;
     app_.add_option_function<std::string>(
-            alias.flag(),
+            FlagOf(alias.name),
             [&flags, name = alias.name](const std::string& text) {
               flags.push_back({name, text});
             },

@@ -22,11 +22,9 @@ NetworkShape Checked(NetworkShape shape) {
       (!shape.dueling() || valid(shape.streams))) {
     return shape;
   }
-  std::vector<std::string> widths;
-  for (const int64_t width : shape.hidden) widths.push_back(std::to_string(width));
   throw BadInput(Concat("network: expected 1 to ", NetworkShape::kMaxLayers, " layers of 1 to ",
                         kMax, " units, got inputs ", shape.inputs, ", outputs ", shape.outputs,
-                        ", ", shape.hidden.size(), " hidden layers (", Join(widths, ", "),
+                        ", ", shape.hidden.size(), " hidden layers (", Join(shape.hidden, ", "),
                         "), head ", shape.streams));
 }
 

@@ -43,7 +43,7 @@ NetworkPolicyParts Checked(NetworkPolicyParts parts) {
   }
   if (static_cast<size_t>(parts.shape.outputs) != outputs) {
     throw BadInput(Concat("policy: expected a network of ", outputs,
-                          " outputs, one for each torque ", "or two for each limit, got ",
+                          " outputs, one for each torque or two for each limit, got ",
                           parts.shape.outputs));
   }
   const int D = parts.shape.inputs, with_action = D + parts.action_size();

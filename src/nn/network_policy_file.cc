@@ -219,20 +219,13 @@ bool MayChoose(std::span<const double> torques, double torque, std::span<const f
 
 /// Reads the rule of a policy file. Throws BadInput unless the file has this format.
 ActionRule RuleOf(const Tensors& file) {
-  const auto expect = [&](const std::string& key, std::string_view expected) {
-    if (file.Metadata(key) != expected) {
-      throw BadInput(Concat(file.where(), ": ", key, ": expected \"", expected, "\", got \"",
-                            file.Metadata(key), "\""));
-    }
-  };
-  expect("format", kFormat);
-  expect("format_version", kFormatVersion);
+  file.ExpectMetadata("format", kFormat);
+  file.ExpectMetadata("format_version", kFormatVersion);
   const std::string& output = file.Metadata("output");
   const auto name = std::ranges::find(kRuleNames, output);
   if (name != kRuleNames.end()) return static_cast<ActionRule>(name - kRuleNames.begin());
-  throw BadInput(Concat(file.where(), ": output: expected one of ",
-                        Join({kRuleNames.begin(), kRuleNames.end()}, ", "), ", got \"", output,
-                        "\""));
+  throw BadInput(Concat(file.where(), ": output: expected one of ", Join(kRuleNames, ", "),
+                        ", got \"", output, "\""));
 }
 
 /// Reads the networks, torques and limits of a policy file. Throws BadInput, about a network's

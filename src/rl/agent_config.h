@@ -52,9 +52,6 @@ struct AgentConfig {
   virtual bool HasSoftValues() const { return false; }
 };
 
-/// Widths of layers as text, such as `64-64`.
-std::string WidthsText(const std::vector<int64_t>& widths);
-
 /// Adds a warning if both ends of the learning-rate schedule are 0.
 void WarnOfNoRate(double begin, double end, std::vector<std::string>& warnings);
 

@@ -49,7 +49,7 @@ AgentSize DqnConfig::Size(const EnvSpec& spec) const {
 
 std::string DqnConfig::Text() const {
   return Concat(double_q ? "double, " : "", dueling ? "dueling" : "plain", " network ",
-                WidthsText(hidden), dueling ? Concat(" with heads of ", head) : "");
+                Join(hidden, "-"), dueling ? Concat(" with heads of ", head) : "");
 }
 
 std::vector<std::string> DqnConfig::Warnings(int64_t steps, int64_t /*num_envs*/) const {

@@ -39,8 +39,7 @@ void OffPolicyConfig::Describe(Options& o) {
 void OffPolicyConfig::Check() const {
   if (batch > replay) {
     throw BadInput(Concat("batch: expected at most ", replay,
-                          " transitions, the capacity of the replay ", "memory (replay), got ",
-                          batch));
+                          " transitions, the capacity of the replay memory (replay), got ", batch));
   }
   if (learning_starts > replay) {
     throw BadInput(Concat("learning_starts: expected at most ", replay,

@@ -5,7 +5,6 @@
 #include "base/error.h"
 #include "base/format.h"
 #include "base/text.h"
-#include "nn/network.h"
 #include "rl/ppo.h"
 
 namespace upswing {
@@ -114,7 +113,7 @@ AgentSize PpoConfig::Size(const EnvSpec& spec) const {
 std::string PpoConfig::Text() const {
   return Concat("proximal policy optimisation, ",
                 discrete() ? Concat(levels, " torques") : "any torque", ", networks of ",
-                WidthsText(hidden));
+                Join(hidden, "-"));
 }
 
 std::vector<std::string> PpoConfig::Warnings(int64_t steps, int64_t num_envs) const {

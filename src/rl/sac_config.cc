@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "base/text.h"
-#include "nn/network.h"
 #include "rl/sac.h"
 
 namespace upswing {
@@ -60,7 +59,7 @@ AgentSize SacConfig::Size(const EnvSpec& spec) const {
 
 std::string SacConfig::Text() const {
   return Concat("soft actor-critic, ", twin ? "networks" : "one critic, networks", " of ",
-                WidthsText(hidden));
+                Join(hidden, "-"));
 }
 
 std::vector<std::string> SacConfig::Warnings(int64_t steps, int64_t /*num_envs*/) const {

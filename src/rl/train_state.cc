@@ -1,9 +1,9 @@
 #include "rl/train_state.h"
 
 #include <algorithm>
-#include <numeric>
 #include <span>
 
+#include "base/sample.h"
 #include "base/solved.h"
 #include "base/steps.h"
 #include "base/text.h"
@@ -22,11 +22,7 @@ TrainState::TrainState(int num_envs, int num_terms)
       episode_terms(static_cast<size_t>(num_envs) * static_cast<size_t>(num_terms)),
       episode_length(static_cast<size_t>(num_envs)) {}
 
-double TrainState::mean_return() const {
-  if (recent_returns.empty()) return 0;
-  return std::accumulate(recent_returns.begin(), recent_returns.end(), 0.0) /
-         static_cast<double>(recent_returns.size());
-}
+double TrainState::mean_return() const { return MomentsOf(recent_returns).mean; }
 
 bool TrainState::Finished(const TrainConfig& config) const {
   return IsFinished(steps, config.steps, solved, config.stop_when_solved);
