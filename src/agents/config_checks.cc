@@ -16,8 +16,6 @@ std::string Gigabytes(double bytes) {
   return Concat(tenths / 10, ".", tenths % 10, " GB");
 }
 
-AgentSize SizeOfLearner(const Config& config) { return config.learner().Size(config.Spec()); }
-
 /// Throws BadInput if a setting of the double pendulum differs from its default in another
 /// environment.
 void CheckForeign(Config& config, const std::string& where) {
@@ -66,7 +64,7 @@ std::vector<std::string> Warnings(const Config& config) {
 
 TrainingSize SizeOf(const Config& config) {
   constexpr double kFloat = sizeof(float);
-  const AgentSize l = SizeOfLearner(config);
+  const AgentSize l = config.learner().Size(config.Spec());
   const double replay = kFloat * l.transition * l.capacity;
   const double saved = kFloat * l.saved_arrays * l.parameters;
   // The first checkpoint, without a replay memory, is in memory at the same time as the training.
@@ -78,7 +76,7 @@ TrainingSize SizeOf(const Config& config) {
 void CheckMemory(const Config& config, int64_t available, int64_t runs) {
   const double needed = static_cast<double>(runs) * SizeOf(config).memory;
   if (needed <= static_cast<double>(available)) return;
-  const AgentSize learner = SizeOfLearner(config);
+  const AgentSize learner = config.learner().Size(config.Spec());
   throw BadInput(Concat("train: expected at most ", Gigabytes(static_cast<double>(available)),
                         " of free memory, got ", Gigabytes(needed), " for ",
                         runs > 1 ? Concat(runs, " runs at a time, each with a ") : "a ",

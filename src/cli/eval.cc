@@ -42,12 +42,10 @@ int RunEval(const EvalArguments& a) {
   if (to_output) return 0;  // only the rows, for another program
   if (a.as_json) {
     fmt::print("{}\n", EvalJson(report));
-  } else {
-    PrintEvalTable(report);
+    return 0;
   }
-  if (!a.episodes_csv.empty() && !a.as_json) {
-    fmt::print("  written        {}\n", Printable(a.episodes_csv));
-  }
+  PrintEvalTable(report);
+  if (!a.episodes_csv.empty()) fmt::print("  written        {}\n", Printable(a.episodes_csv));
   return 0;
 }
 

@@ -163,11 +163,7 @@ ordered_json RunJson(const fs::path& path) {
 }
 
 void PrintRun(const fs::path& path, bool has_policy) {
-  const RunFacts run(path);
-  const Tensors& checkpoint = run.checkpoint;
-  const Config& config = run.config;
-  const EnvSpec& spec = run.spec;
-  const TrainState& state = run.state;
+  const auto [checkpoint, config, spec, state] = RunFacts(path);
   fmt::print("{}\n", Printable(path.string()));
   fmt::print("  agent       {}, seed {}, upswing {}\n", config.agent, config.train.seed,
              Printable(checkpoint.Metadata("upswing_version")));

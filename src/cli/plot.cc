@@ -41,13 +41,10 @@ double UprightSince(const std::vector<RolloutRow>& rows) {
 /// The caption below the title: the episode, and how it differs from the training.
 std::string Caption(const PlotArguments& a, const RolloutConfig& config, const Rollout& rollout,
                     const LoadedPolicy& loaded) {
-  std::vector<std::string> parts;
-  if (a.trial.is_of_eval()) parts.push_back(Concat("episode ", a.trial.episode, " of eval"));
-  if (!a.trial.is_of_eval()) {
-    parts.push_back(Concat("start ", a.trial.start.empty() ? "0,0,0,0" : a.trial.start));
-  }
-  parts.push_back(Concat("seed ", a.trial.seed));
-  parts.push_back(a.trial.physics);
+  std::vector<std::string> parts{
+      a.trial.is_of_eval() ? Concat("episode ", a.trial.episode, " of eval")
+                           : Concat("start ", a.trial.start.empty() ? "0,0,0,0" : a.trial.start),
+      Concat("seed ", a.trial.seed), a.trial.physics};
   for (const auto& [now, before] : Differences(OptionsOf(rollout.plant), OptionsOf(loaded.plant))) {
     parts.push_back(fmt::format("{} {:.4g} {} ({}: {:.4g})", now.name, now.number(), now.unit,
                                 loaded.origin(), before->number()));

@@ -31,9 +31,6 @@ void Record(int signal) {
   errno = interrupted_errno;
 }
 
-/// Records the first of these signals; a second one ends the program at once.
-void StopAt(int number) { Handle(number, Record, SA_RESETHAND | SA_RESTART); }
-
 /// Switches the motors off and ends the program. SA_RESETHAND has restored the signal's default.
 void EndNow(int signal) {
   g_switch_off();
@@ -56,8 +53,7 @@ void ListenToSignals() {
 
 void InstallSignalHandlers(std::string_view notice) {
   g_notice = isatty(STDERR_FILENO) == 1 ? notice : "";
-  StopAt(SIGINT);
-  StopAt(SIGTERM);
+  for (const int number : {SIGINT, SIGTERM}) Handle(number, Record, SA_RESETHAND | SA_RESTART);
 }
 
 void GuardMotors(void (*switch_off)()) {

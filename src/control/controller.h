@@ -79,13 +79,4 @@ Options OptionsOfAll(const First& first, const Others&... others) {
   return options;
 }
 
-/// Memory of a controller that stores a Past for each environment.
-template <typename Past>
-struct MemoryOf : Policy::Memory {
-  explicit MemoryOf(int num_envs, const Past& beginning)
-      : past(static_cast<size_t>(num_envs), beginning) {}
-
-  std::vector<Past> past;  // (N)
-};
-
 }  // namespace upswing

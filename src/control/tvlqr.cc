@@ -110,7 +110,9 @@ std::string TvlqrPolicy::description() const {
 }
 
 std::unique_ptr<Policy::Memory> TvlqrPolicy::Start(int num_envs) const {
-  return std::make_unique<MemoryOf<Place>>(num_envs, Place());
+  auto places = std::make_unique<Places>();
+  places->of_env.resize(static_cast<size_t>(num_envs));
+  return places;
 }
 
 StateVector TvlqrPolicy::OffPlan(const StateVector& deviation, const Place& place) const {
@@ -119,7 +121,7 @@ StateVector TvlqrPolicy::OffPlan(const StateVector& deviation, const Place& plac
 }
 
 double TvlqrPolicy::Torque(const StateVector& deviation, size_t env, Memory& memory) const {
-  Place& place = static_cast<MemoryOf<Place>&>(memory).past[env];
+  Place& place = static_cast<Places&>(memory).of_env[env];
   const int T = plan_.trajectory.steps();
   if (upright_.Holds(deviation)) {
     place = {T, 1};

@@ -40,6 +40,9 @@ class TvlqrPolicy : public PendulumController {
     int step = -1;    // of the plan; T: upright; -1: not started
     double sign = 1;  // -1: on its mirror image
   };
+  struct Places : Memory {
+    std::vector<Place> of_env;  // (N)
+  };
 
   double Torque(const StateVector& deviation, size_t env, Memory& memory) const override;
   /// The deviation from upright, relative to a place of the plan.

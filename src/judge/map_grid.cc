@@ -24,9 +24,9 @@ using EpisodeResult = std::optional<double>;
 
 /// The common value of the settings; none if they differ.
 std::optional<double> CommonValue(const std::vector<const Option*>& members) {
-  const double first = *std::get<double*>(members.front()->target);
+  const double first = members.front()->number();
   for (const Option* member : members) {
-    if (*std::get<double*>(member->target) != first) return std::nullopt;
+    if (member->number() != first) return std::nullopt;
   }
   return first;
 }

@@ -5,7 +5,6 @@
 #include <numbers>
 
 #include "base/text.h"
-#include "pendulum/observation.h"
 
 namespace upswing {
 namespace {
@@ -163,7 +162,7 @@ void PendulumEnv::Hold(int env) {
 
 void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
   if (reward_) reward_->SwapTerms(result);
-  physics_->Step(Actuate(torque), result);
+  physics_->Step(disturber_ ? disturber_->Apply(torque, step_counts_) : torque, result);
   JudgeByGoal(result);
   if (reward_) reward_->SwapTerms(result);
   RestoreHeld(result);
@@ -172,10 +171,6 @@ void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
   KeepTime(result);
   StandIn(result);
   BeginNextStep(result);
-}
-
-std::span<const double> PendulumEnv::Actuate(std::span<const double> chosen) {
-  return disturber_ ? disturber_->Apply(chosen, step_counts_) : chosen;
 }
 
 void PendulumEnv::RestoreHeld(StepResult& result) {

@@ -111,8 +111,6 @@ class PendulumEnv : public VectorEnv {
   void Randomize(int env);
 
   // The stages of a step. The torques `chosen` (N) are in N·m.
-  /// Returns the torques (N) that the motors apply now, N·m: the chosen ones, after their delay.
-  std::span<const double> Actuate(std::span<const double> chosen);
   /// Applies sensors, identification and memory to the observations of the successors.
   void ObserveSuccessors(std::span<const double> chosen, StepResult& result);
   /// Counts the steps of the episodes and truncates those whose time is up.

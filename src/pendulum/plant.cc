@@ -1,6 +1,5 @@
 #include "pendulum/plant.h"
 
-#include <cmath>
 #include <numbers>
 
 #include "base/text.h"
@@ -10,7 +9,7 @@ namespace upswing {
 namespace {
 
 constexpr Range kMass{0.01, 100}, kLength{0.1, 10}, kDamping{0, 100}, kCoulomb{0, 10};
-constexpr Range kCenter{0, 10}, kInertia{0, 10000};
+constexpr Range kCenter{0, 10}, kInertia{0, 10000}, kJoint{1, 2}, kRotor{0, 1};
 
 }  // namespace
 
@@ -23,15 +22,9 @@ const std::array<PlantParameter, 18> kPlantParameters{{
     {"damping2", &Plant::damping2, kDamping, "N·m·s/rad", "damping of joint 2"},
     {"gravity", &Plant::gravity, {0.01, 100}, "m/s²", "downward gravity"},
     {"torque_limit", &Plant::torque_limit, {0.01, 1000}, "N·m", "largest torque of the motor"},
-    {"actuated_joint",
-     &Plant::actuated_joint,
-     {1, 2},
-     "",
+    {"actuated_joint", &Plant::actuated_joint, kJoint, "",
      "joint that the motor drives; 1: pendubot, 2: acrobot"},
-    {"rotor_inertia",
-     &Plant::rotor_inertia,
-     {0, 1},
-     "kg·m²",
+    {"rotor_inertia", &Plant::rotor_inertia, kRotor, "kg·m²",
      "rotor inertia of each joint's motor"},
     {"gear_ratio", &Plant::gear_ratio, {0, 1000}, "", "gear ratio: rotor turns per joint turn"},
     {"coulomb1", &Plant::coulomb1, kCoulomb, "N·m",

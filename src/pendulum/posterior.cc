@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "base/error.h"
 #include "base/text.h"
@@ -48,9 +47,9 @@ std::optional<std::vector<double>> FactorRow(const std::vector<double>& covarian
 }
 
 bool Posterior::Knows(std::string_view name) {
-  const auto same = [&](const PlantParameter& parameter) { return parameter.name == name; };
   return name == kLatency ||
-         (std::ranges::any_of(kPlantParameters, same) && std::ranges::count(kCertain, name) == 0);
+         (std::ranges::count(kPlantParameters, name, &PlantParameter::name) > 0 &&
+          std::ranges::count(kCertain, name) == 0);
 }
 
 std::string Posterior::Text(const std::vector<std::string>& names,
