@@ -184,11 +184,9 @@ TEST(RealAiGymPublished, TvlqrHasItsPublishedScores) {
   EXPECT_NEAR(PerformanceScore(o), 0.526, 0.0006);
 
   const std::vector<RobustnessCase> cases = RobustnessCases(1);
-  std::vector<PendulumState> ends(cases.size());
   ThreadPool pool(2);
-  RunAll(static_cast<int>(cases.size()), &pool, nullptr, [&](int i) {
-    const auto k = static_cast<size_t>(i);
-    ends[k] = EndOf(Robot::kPendubot, cases[k].episode, PublishedTvlqr(plan));
+  const auto ends = RunAll(static_cast<int>(cases.size()), &pool, nullptr, [&](int i) {
+    return EndOf(Robot::kPendubot, cases[static_cast<size_t>(i)].episode, PublishedTvlqr(plan));
   });
   const Robustness judged = JudgeRobustness(cases, ends);
   // docs/results/realaigym.md has these scores.

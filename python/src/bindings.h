@@ -96,7 +96,7 @@ class PolicyHandle {
   void WithMemory(int n, const Work& work) {
     const std::lock_guard lock(mutex_);
     constexpr size_t kMost = 8;
-    if (memories_.size() > kMost) memories_.clear();
+    if (memories_.size() >= kMost) memories_.clear();
     std::unique_ptr<Policy::Memory>& memory = memories_[n];
     if (!memory) memory = policy().Start(n);
     work(*memory);

@@ -68,6 +68,7 @@ std::pair<std::string, std::string> EvaluateHandle(const PolicyHandle& policy,
   DescribeSeed(own, &trial.seed, "start states, noise and random plants");
   DescribeThreads(own, &threads);
   DescribePhysics(own, &trial.physics);
+  DescribeGoal(own, &trial.goal);
   SetArguments(own, arguments);
   SetSurroundings(FlagsOf(settings), trial);
   trial.plant = plant;

@@ -109,6 +109,20 @@ class Evaluations(BadInputTest):
             with self.assertRaisesRegex(upswing.InputError, "memory: expected 0 to 100 steps"):
                 upswing.evaluate(remembering.act, memory=memory, episodes=3)
 
+    def test_a_goal_is_drawn_or_given(self):
+        policy = upswing.load_policy(POLICY.with_name("any-pose.safetensors"))
+        arguments = {"episodes": 6, "physics": "closed-form"}
+        drawn = upswing.evaluate(policy, **arguments)
+        self.assertEqual(sum(t["episodes"] for t in drawn["transitions"].values()), 6)
+        self.assertGreater(len(set(drawn.per_episode["goal1"])), 1)
+        given = upswing.evaluate(policy, goal="up-down", **arguments)
+        self.assertEqual(given["transitions"],
+                         {"down-down to up-down": {"episodes": 6, "successes": 6}})
+        with self.assertRaisesRegex(upswing.InputError, "goal: expected one of up-up"):
+            upswing.evaluate(policy, goal="up", **arguments)
+        with self.assertRaisesRegex(upswing.InputError, "expected a policy for any pose"):
+            upswing.evaluate(POLICY, goal="up-down", **arguments)
+
     def test_an_episode_does_not_depend_on_how_many_there_are(self):
         arguments = {"physics": "closed-form", "randomize": 0.1, "sensor_noise": 0.01}
         many = upswing.evaluate("lqr", episodes=4100, **arguments).per_episode

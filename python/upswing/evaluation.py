@@ -54,6 +54,7 @@ def evaluate(
     unknown_plant: bool = False,
     threads: int = 0,
     memory: int = 0,
+    goal: str | None = None,
     progress: Callable[[float], Any] | None = None,
     **settings: Unpack[TrialSettings],
 ) -> Evaluation:
@@ -81,6 +82,8 @@ def evaluate(
         unknown_plant: scale observed energy and height by the training's plant, not the episode's
         threads: number of threads (0: one per processor, at most 8)
         memory: for a function, the number of past control steps in its observations
+        goal: pose that a policy for any pose is to reach from hanging: "up-up", "up-down",
+            "down-up" or "down-down", link 1 first; None: each episode draws start and goal
         progress: function that gets the finished share (0 to 1) from time to time
         **settings: plant, sensors, motor and random plants, such as mass2=1.2, sensor_noise=0.02,
             encoder_counts=4096, delay=0.02, randomize=0.25; by default the policy's own plant
@@ -89,10 +92,13 @@ def evaluate(
     >>> upswing.evaluate("runs/d3qn-seed1", episodes=1000, randomize=0.1)["success_rate"]
     """
     arguments = {"episodes": episodes, "seed": seed, "threads": threads, "physics": physics}
+    if goal is not None:
+        arguments["goal"] = goal
     if env is not None:
-        others = arguments | {"plant": plant, "unknown_plant": unknown_plant, "memory": memory}
+        others = arguments | {"plant": plant, "unknown_plant": unknown_plant, "memory": memory,
+                              "goal": goal}
         usual = {"threads": 0, "physics": "mujoco", "plant": None, "unknown_plant": False,
-                 "memory": 0}
+                 "memory": 0, "goal": None}
         wrong = [*settings, *(name for name, value in usual.items() if others[name] != value)]
         if wrong:
             raise _upswing.InputError(f"{wrong[0]}: expected none with env")

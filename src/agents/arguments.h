@@ -22,6 +22,14 @@ inline void DescribeThreads(Options& o, int64_t* threads) {
 }
 
 /// Argument "physics", one of EngineNames().
+/// Declares the pose that an episode asks for.
+inline void DescribeGoal(Options& o, std::string* goal) {
+  o.AddChoice(goal, "goal", {"up-up", "up-down", "down-up", "down-down"},
+              "pose that a policy for any pose is to reach, link 1 first; `eval` then starts "
+              "hanging")
+      .usual = "up-up; each episode of `eval` draws its own";
+}
+
 inline void DescribePhysics(Options& o, std::string* physics) {
   o.AddChoice(physics, "physics", EngineNames(),
               "physics engine; closed-form is faster than mujoco, with the same physics");

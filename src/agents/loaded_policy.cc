@@ -36,10 +36,13 @@ void CheckObservation(const LoadedPolicy& loaded, const std::string& where) {
            given->memory->velocity == expected.memory->velocity &&
            given->memory->torque == expected.memory->torque;
   };
-  const bool same_goal = given->goal.size() == expected.goal.size();
+  if (given->goal.size() != expected.goal.size()) {
+    throw BadInput(Concat(where, ": metadata \"observation\": goal: expected ", kGoalSize,
+                          " names, got ", given->goal.size()));
+  }
   const bool same_scale =
       !given->identified || given->identified->scale == expected.identified->scale;
-  if (given->max_velocity != expected.max_velocity || !same_scale || !same_goal || !same_memory()) {
+  if (given->max_velocity != expected.max_velocity || !same_scale || !same_memory()) {
     throw BadInput(
         Concat(where,
                ": metadata \"observation\": expected the names and scales of this version "

@@ -20,7 +20,6 @@ struct ObservationInfo {
     bool operator==(const Identified&) const = default;
   };
   std::optional<Identified> identified = {};
-
   std::vector<std::string> goal = {};  // names of the inputs with the pose to reach; empty: none
 
   /// Past steps in an observation.

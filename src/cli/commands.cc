@@ -82,9 +82,7 @@ void AddTrialOptions(CommandLine& line, TrialArguments& a, const std::string& se
   AddPhysics(line, a.physics);
   AddUnknownPlant(line, a.unknown_plant);
   Options own;
-  own.AddChoice(&a.goal, "goal", {"up-up", "up-down", "down-up", "down-down"},
-                "pose that a policy for any pose is to reach, link 1 first")
-      .usual = "up-up; in `eval` each episode draws its own";
+  DescribeGoal(own, &a.goal);
   line.Arguments(own);
   const TrialConditions defaults;
   line.Settings(OptionsOf(defaults), a.flags);

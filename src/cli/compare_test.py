@@ -266,17 +266,18 @@ class CompareTest(ProgramTest):
         self.make_group("heavy-too", [1, 2], agent="dqn", more="mass2 = 1.2\n")
         self.make_group("seldom", [1, 1], more="eval_episodes = 7\n")
         self.make_group("noisy", [1, 1], more="sensor_noise = 0.1\n")
-        folders = ["a", "b", "heavy", "heavy-too", "seldom", "noisy"]
+        self.make_group("poses", [1, 1], more="any_pose = true\n")
+        folders = ["a", "b", "heavy", "heavy-too", "seldom", "noisy", "poses"]
         answer = self.compare(*folders)
-        self.assertEqual([group["task"] for group in answer["groups"]], [1, 1, 2, 2, 3, 4])
+        self.assertEqual([group["task"] for group in answer["groups"]], [1, 1, 2, 2, 3, 4, 5])
         self.assertEqual(len(answer["pairs"]), 2)
-        self.assertIn("the groups are evaluated on 4 different tasks", " ".join(answer["notes"]))
+        self.assertIn("the groups are evaluated on 5 different tasks", " ".join(answer["notes"]))
         text = self.succeed("compare", *folders, "--out", "out")
-        self.assertRegex(text, r"(?m)^  task +1 \(eval_episodes 100, mass2 1, sensor_noise 0\)$")
-        self.assertRegex(text, r"(?m)^  task +2 \(eval_episodes 100, mass2 1.2, sensor_noise 0\)$")
+        self.assertRegex(text, r"(?m)^  task +1 \(eval_episodes 100, any_pose false, mass2 1, sensor_noise 0\)$")
+        self.assertRegex(text, r"(?m)^  task +2 \(eval_episodes 100, any_pose false, mass2 1.2, sensor_noise 0\)$")
         self.assertEqual(sorted(p.name for p in (self.folder / "out").glob("*.svg")),
-                         ["curves-2.svg", "curves-3.svg", "curves-4.svg", "curves.svg"])
-        self.assertEqual(len(self.compare(*folders, "--different-tasks")["pairs"]), 15)
+                         ["curves-2.svg", "curves-3.svg", "curves-4.svg", "curves-5.svg", "curves.svg"])
+        self.assertEqual(len(self.compare(*folders, "--different-tasks")["pairs"]), 21)
 
     def test_times_of_other_machines_are_noted(self):
         def log(run, *lines):

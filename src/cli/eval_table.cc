@@ -37,13 +37,15 @@ std::string LengthText(const Moments& seconds) {
 }
 
 /// Prints figures over successful episodes.
-void PrintSuccesses(const Evaluation& e) {
+void PrintSuccesses(const Evaluation& e, bool any_pose) {
   if (e.successes == 0) {
-    fmt::print("  swing-up time  none: no episode stays upright\n");
+    fmt::print("  swing-up time  none: no episode stays {}\n",
+               any_pose ? "at its goal" : "upright");
     return;
   }
   fmt::print("  swing-up time  {}\n", QuartilesText(e.swing_up_seconds));
-  const std::string within = fmt::format("{:.0f}° of upright", kSettledTilt * kDegrees);
+  const std::string within =
+      fmt::format("{:.0f}° of {}", kSettledTilt * kDegrees, any_pose ? "the goal" : "upright");
   if (e.settled > 0) {
     fmt::print("  settling time  {}, within {}: {} of {}\n", QuartilesText(e.settling_seconds),
                within, e.settled, e.successes);
@@ -57,16 +59,16 @@ void PrintSuccesses(const Evaluation& e) {
   fmt::print("  steady tilt    {}   in the last {} s\n", Join(tilts, ", "), kSteadyTiltSeconds);
 }
 
-void PrintTorques(const Evaluation& e) {
+void PrintTorques(const Evaluation& e, const char* reached) {
   fmt::print("  torque         peak {:.4g} N·m, rms {} N·m\n", e.peak_torque,
              MomentsText(e.rms_torque));
   fmt::print("  torque change  {} N·m/s", MomentsText(e.torque_variation));
   const bool upright = e.successes > 0;
-  if (upright) fmt::print("; {} N·m/s once upright", MomentsText(e.goal_variation));
+  if (upright) fmt::print("; {} N·m/s once {}", MomentsText(e.goal_variation), reached);
   fmt::print("\n");
   if (upright) {
-    fmt::print("  chatter        {} torque changes per second once upright\n",
-               MomentsText(e.goal_changes));
+    fmt::print("  chatter        {} torque changes per second once {}\n",
+               MomentsText(e.goal_changes), reached);
   }
 }
 
@@ -98,7 +100,7 @@ void PrintEvalTable(const EvalReport& report) {
   for (const auto& [name, t] : TransitionsOf(report)) {
     fmt::print("    {:<22} {} of {}\n", name, t.successes, t.episodes);
   }
-  PrintSuccesses(e);
+  PrintSuccesses(e, report.env.any_pose);
   fmt::print("  return         {}   in the first {} s\n", MomentsText(e.reward_sum),
              kReturnSeconds);
   for (size_t k = 0; k < e.term_means.size(); ++k) {
@@ -112,7 +114,7 @@ void PrintEvalTable(const EvalReport& report) {
     }
   }
   fmt::print("  energy used    {} J   in {}\n", MomentsText(e.work), LengthText(e.seconds));
-  PrintTorques(e);
+  PrintTorques(e, Reached(report.env));
   fmt::print("  ± is the standard deviation over the episodes\n");
 }
 

@@ -45,6 +45,7 @@ std::string Caption(const PlotArguments& a, const RolloutConfig& config, const R
       a.trial.is_of_eval() ? Concat("episode ", a.trial.episode, " of eval")
                            : Concat("start ", a.trial.start.empty() ? "0,0,0,0" : a.trial.start),
       Concat("seed ", a.trial.seed), a.trial.physics};
+  if (rollout.goal) parts.push_back(Concat("goal ", PoseName(*rollout.goal)));
   for (const auto& [now, before] : Differences(OptionsOf(rollout.plant), OptionsOf(loaded.plant))) {
     parts.push_back(fmt::format("{} {:.4g} {} ({}: {:.4g})", now.name, now.number(), now.unit,
                                 loaded.origin(), before->number()));
@@ -111,7 +112,7 @@ int RunPlot(const PlotArguments& a) {
   fmt::print("{}\n", Printable(loaded.name));
   fmt::print("  plant      {}, physics {}\n", EpisodeText(rollout), a.trial.physics);
   const double since = UprightSince(rollout.rows);
-  fmt::print("  upright    {}\n",
+  fmt::print("  {:<10} {}\n", config.env.any_pose ? "at goal" : "upright",
              since < 0 ? "not at the end" : fmt::format("from {:.2f} s to the end", since));
   fmt::print("  torque     {}\n", TorqueText(rollout));
   if (a.trial.is_of_eval()) {

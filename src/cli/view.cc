@@ -103,7 +103,7 @@ class Show {
       job["names"].push_back(Printable(episode.config().title));
       nlohmann::json& plant = job["plants"].emplace_back();
       for (const auto& [name, value] : PlantValues(episode.rollout().plant)) plant[name] = value;
-      job["goals"].push_back(GoalInputs(episode.goal()));
+      job["goals"].push_back(GoalInputs(episode.rollout().goal.value_or(Pose())));
     }
   }
 

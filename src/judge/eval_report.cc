@@ -151,7 +151,7 @@ EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& tria
   EvalReport report;
   report.policy = loaded.name;
   report.known_plant = trial.known_plant;
-  report.env = EvalEnvironments(trial, &loaded);
+  report.env = TrialEnvironments(trial, &loaded, true);
   report.env.num_envs = static_cast<int>(episodes);
   report.knows_values = loaded.policy->info().gamma.value_or(0) > 0;
   report.only_balances = OnlyBalances(loaded.policy->kind());

@@ -83,11 +83,17 @@ Panel PanelOf(const std::string& y_label, std::vector<Line> lines) {
   return panel;
 }
 
-Panel Angles(const Rows& rows) {
-  Panel panel =
-      PanelOf("angle (°)",
-              {AngleOverTime("link 1", rows, Link1), AngleOverTime("link 2, absolute", rows, Link2),
-               OverTime("upright", rows, [](const RolloutRow&) { return 180.0; })});
+Panel Angles(const Rollout& rollout) {
+  const Rows& rows = rollout.rows;
+  std::vector<Line> lines{AngleOverTime("link 1", rows, Link1),
+                          AngleOverTime("link 2, absolute", rows, Link2)};
+  const auto add_goal = [&](const char* name, bool up) {
+    lines.push_back(OverTime(name, rows, [up](const RolloutRow&) { return up ? 180.0 : 0.0; }));
+  };
+  if (!rollout.goal) add_goal("upright", true);
+  if (rollout.goal) add_goal("goal of link 1", rollout.goal->up1);
+  if (rollout.goal) add_goal("goal of link 2", rollout.goal->up2);
+  Panel panel = PanelOf("angle (°)", std::move(lines));
   panel.y_range = {kLow, kLow + 360};
   panel.y_tick = 90;
   return panel;
@@ -99,8 +105,9 @@ Panel Velocities(const Rows& rows) {
                   OverTime("joint 2", rows, [](const RolloutRow& row) { return row.state.w2; })});
 }
 
-Panel Energies(const Rows& rows, const Plant& plant) {
-  const double target = EnergyTarget(plant);
+Panel Energies(const Rollout& rollout) {
+  const auto& [rows, plant, disturbance, goal] = rollout;
+  const double target = Energy(plant, RestIn(goal.value_or(Pose())));
   const auto energy = [&](const RolloutRow& row) { return Energy(plant, row.state); };
   return PanelOf("energy (J)",
                  {OverTime("energy", rows, energy),
@@ -183,7 +190,7 @@ Figure EpisodeFigure(const Rollout& rollout, const Policy& policy) {
   const Rows& rows = rollout.rows;
   Figure figure;
   figure.width = 1000;
-  figure.panels = {Angles(rows), Velocities(rows), Energies(rows, rollout.plant), Torques(rows),
+  figure.panels = {Angles(rollout), Velocities(rows), Energies(rollout), Torques(rows),
                    Rewards(rows)};
   constexpr int kPanelHeight = 170;
   if (rows.front().spread) figure.panels.push_back(Spread(rows));

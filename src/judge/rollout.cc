@@ -9,6 +9,7 @@
 #include "base/csv.h"
 #include "base/error.h"
 #include "base/text.h"
+#include "judge/trial.h"
 #include "rl/evaluate.h"
 
 namespace upswing {
@@ -38,8 +39,9 @@ void AddEstimates(const Policy& policy, Matrix<const float> obs, Policy::Memory&
   policy.Spread(obs, {&row.spread->low, 1, 1}, {&row.spread->high, 1, 1}, memory);
 }
 
-/// Sets the reward for the state and torque of a row; no goal: upright.
-void RewardRow(const Plant& plant, const std::optional<Pose>& goal, RolloutRow& row) {
+/// Sets the reward for the state and torque of a row.
+void RewardRow(const Rollout& rollout, RolloutRow& row) {
+  const auto& [rows, plant, disturbance, goal] = rollout;
   row.terms = goal ? RewardTerms(plant, row.state, row.torque, *goal)
                    : RewardTerms(plant, row.state, row.torque);
   row.reward = 0;
@@ -64,6 +66,7 @@ Episode::Episode(RolloutConfig config)
   if (config_.policy != nullptr) memory_ = config_.policy->Start(1);
   rollout_.plant = env_->plant(0);
   rollout_.disturbance = env_->disturbance(0);
+  rollout_.goal = env_->goal(0);
 }
 
 void Episode::Step(const std::array<double, 2>& push) {
@@ -80,7 +83,7 @@ void Episode::Step(const std::array<double, 2>& push) {
   if (config_.estimates) AddEstimates(*config_.policy, env_->obs(), *memory_, row);
   env_->Step({&torque, 1}, result_);
   row.torque = result_.torque[0];
-  RewardRow(rollout_.plant, env_->goal(0), row);
+  RewardRow(rollout_, row);
   rollout_.rows.push_back(std::move(row));
   if (result_.terminated[0] == 0) return;
   throw Failure(
@@ -126,7 +129,8 @@ std::string TorqueText(const Rollout& rollout) {
   const std::string text = fmt::format("peak {:.4g} N·m, rms {:.4g} N·m, variation {:.4g} N·m/s",
                                        e.peak_torque, e.rms_torque, e.torque_variation);
   if (!tally.has_goal_steps()) return text;
-  return text + fmt::format(", once upright {:.4g} N·m/s", e.goal_variation);
+  return text + fmt::format(", once {} {:.4g} N·m/s", rollout.goal ? "at the goal" : "upright",
+                            e.goal_variation);
 }
 
 std::string RolloutCsv(const Rollout& rollout) {
@@ -156,14 +160,15 @@ std::string JudgementText(const Policy& policy, const PendulumEnvConfig& config)
   const EvaluationEpisode episode = EvaluateEpisodes(policy, env).front();
   const std::string upright =
       episode.swing_up_seconds
-          ? fmt::format("upright from {:.2f} s to the end", *episode.swing_up_seconds)
-          : "not upright at the end";
+          ? fmt::format("{} from {:.2f} s to the end", Reached(config), *episode.swing_up_seconds)
+          : Concat("not ", Reached(config), " at the end");
   return fmt::format("{}, {}, return {:.6g}", episode.success ? "success" : "failure", upright,
                      episode.reward_sum);
 }
 
 std::string EpisodeText(const Rollout& rollout) {
   std::string text = PlantText(rollout.plant);
+  if (rollout.goal) text += Concat(", goal ", PoseName(*rollout.goal));
   const Options options = OptionsOf(rollout.disturbance);
   for (const Option& option : options.all()) {
     if (option.number() > 0) text += Concat(", ", option.name, " ", FormatNumber(option.number()));

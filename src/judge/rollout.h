@@ -44,6 +44,7 @@ struct Rollout {
   // Of this episode:
   Plant plant;
   Disturbance disturbance;
+  std::optional<Pose> goal = {};  // of a policy for any pose
 };
 
 /// An episode that advances step by step, for RunRollout and `view`.
@@ -57,7 +58,6 @@ class Episode {
   void Step(const std::array<double, 2>& push = {});
 
   const RolloutConfig& config() const { return config_; }
-  Pose goal() const { return env_->goal(0).value_or(Pose()); }
   /// The rollout up to the last step.
   const Rollout& rollout() const { return rollout_; }
   int64_t steps() const { return static_cast<int64_t>(rollout_.rows.size()); }

@@ -46,7 +46,8 @@ TrialConditions ConditionsOf(const std::vector<FlagValue>& flags) {
   return conditions;
 }
 
-PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded) {
+PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded,
+                                    bool draws_goals) {
   if (loaded != nullptr) ExpectPendulum(*loaded);
   PendulumEnvConfig env;
   env.engine = &EngineCalled(a.physics);
@@ -75,19 +76,15 @@ PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy*
   // A controller balances only upright, also one whose swing-up is a policy for any pose.
   const bool is_learned = loaded != nullptr && !loaded->design_for;
   if (!(env.any_pose && is_learned) && env.goal != Pose()) {
-    throw BadInput(Concat("--goal ", a.goal, ": expected a policy for any pose (--any-pose), got ",
+    throw BadInput(Concat("--goal ", a.goal,
+                          ": expected a policy for any pose (train --any-pose), got ",
                           loaded != nullptr ? Printable(loaded->name) : "none"));
   }
+  if (draws_goals && is_learned && a.goal.empty()) env.goal.reset();
   ApplyChanges(OptionsOf(plant), a.set);
   env.plants = {plant};
   env.seed = static_cast<uint64_t>(a.seed);
   env.stream = "evaluation";
-  return env;
-}
-
-PendulumEnvConfig EvalEnvironments(const TrialArguments& a, const LoadedPolicy* loaded) {
-  PendulumEnvConfig env = TrialEnvironments(a, loaded);
-  if (loaded != nullptr && !loaded->design_for && a.goal.empty()) env.goal.reset();
   return env;
 }
 
@@ -127,7 +124,7 @@ RolloutConfig TrialEpisode(const TrialArguments& a, const LoadedPolicy* loaded) 
   }
   RolloutConfig config;
   if (loaded != nullptr) config.policy = loaded->policy.get();
-  config.env = a.is_of_eval() ? EvalEnvironments(a, loaded) : TrialEnvironments(a, loaded);
+  config.env = TrialEnvironments(a, loaded, a.is_of_eval());
   config.env.first_index = static_cast<uint64_t>(std::max<int64_t>(0, a.episode));
   if (!a.start.empty()) {
     config.start = ParseStart(a.start);

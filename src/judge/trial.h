@@ -48,13 +48,16 @@ TrialConditions ConditionsOf(const std::vector<FlagValue>& flags);
 
 /// The environments of a trial: the environments of the policy's training with the changes of the
 /// arguments; without a policy (null), environments of the built-in plant. Environment i has
-/// episode i. The goal is upright if the arguments name none. Throws BadInput, also if the policy
+/// episode i. If the arguments name no goal, it is upright; or, if `draws_goals` as in
+/// `eval`, each episode of a learned policy draws its own. Throws BadInput, also if the policy
 /// is not for the double pendulum.
-PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded);
+PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded,
+                                    bool draws_goals = false);
 
-/// The same for `eval`: if the arguments name no goal, each episode of a learned policy for any
-/// pose draws its own.
-PendulumEnvConfig EvalEnvironments(const TrialArguments& a, const LoadedPolicy* loaded);
+/// What an episode is to reach, for messages: "upright", or "at the goal" of a policy for any pose.
+inline const char* Reached(const PendulumEnvConfig& env) {
+  return env.any_pose ? "at the goal" : "upright";
+}
 
 /// An environment whose only episode is episode `index` of `config`.
 PendulumEnv OneEpisode(PendulumEnvConfig config, int index);

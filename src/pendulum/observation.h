@@ -7,9 +7,9 @@
 
 #include "base/archive.h"
 #include "base/policy_info.h"
+#include "pendulum/goal.h"
 #include "pendulum/identification.h"
 #include "pendulum/sensors.h"
-#include "pendulum/task.h"
 
 /// Observations of the double pendulum: of a state, with an identified plant and with a memory.
 namespace upswing {
@@ -53,8 +53,9 @@ class ObservationBuilder {
   ObservationBuilder(int num_envs, int memory, const std::optional<Plant>& identified_from,
                      bool any_pose);
 
-  /// The goal that the next observations have; nothing if it is always upright.
+  /// Sets the goal of the next observations, which must have one.
   void SetGoal(int env, const Pose& goal);
+  /// Nothing if observations have none: it is upright.
   std::optional<Pose> goal(int env) const;
 
   /// Writes the first observation of an episode. `plant` gives its energy and height. Its memory is

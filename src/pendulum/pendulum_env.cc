@@ -135,12 +135,14 @@ void PendulumEnv::Reset(int env) {
     s = {start.noise * rng.Normal(), start.noise * rng.Normal(), start.noise * rng.Normal(),
          start.noise * rng.Normal()};
   }
-  if (config_.any_pose) {
-    const uint64_t drawn = config_.goal ? 0 : rng.Below(is_random ? 4 : 12);
-    builder_.SetGoal(env, config_.goal.value_or(kPoses[drawn % 4]));
-    // Another pose than the goal: one of the three that follow it in kPoses.
-    const Pose from = kPoses[(drawn + 1 + drawn / 4) % 4];
-    if (!config_.goal && !is_random) s = SeenFrom({!from.up1, !from.up2}, s);
+  if (config_.any_pose && config_.goal) {
+    builder_.SetGoal(env, *config_.goal);
+  } else if (config_.any_pose && is_random) {
+    builder_.SetGoal(env, kPoses[rng.Below(4)]);
+  } else if (config_.any_pose) {
+    const uint64_t transition = rng.Below(12), goal = transition % 4;
+    builder_.SetGoal(env, kPoses[goal]);
+    s = RestIn(kPoses[(goal + 1 + transition / 4) % 4], s);  // one of the three other poses
   }
   SetState(env, s);
 }
@@ -184,7 +186,7 @@ void PendulumEnv::RestoreHeld(StepResult& result) {
 
 void PendulumEnv::JudgeByGoal(StepResult& result) const {
   if (!config_.any_pose) return;
-  const RewardConfig built_in;  // its weights, of which an expression makes its own reward
+  const RewardConfig built_in;  // an expression uses the terms with weights of 1
   for (int env = 0; env < config_.num_envs; ++env) {
     const auto i = static_cast<size_t>(env);
     const Pose goal = *this->goal(env);

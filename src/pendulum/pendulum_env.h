@@ -93,7 +93,7 @@ class PendulumEnv : public VectorEnv {
   const Plant& plant(int env) const {
     return plants_.empty() ? config_.plant(env) : plants_[static_cast<size_t>(env)];
   }
-  /// The pose that the running episode asks for; nothing without any_pose, which is upright.
+  /// The pose that the running episode asks for; nothing without any_pose: it is upright.
   std::optional<Pose> goal(int env) const { return builder_.goal(env); }
   /// The disturbance of the running episode.
   Disturbance disturbance(int env) const {

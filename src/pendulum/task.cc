@@ -6,26 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "base/text.h"
-
 namespace upswing {
-namespace {
-
-/// The reward's terms. `energy`: the first of them; `seen`: the state seen from the goal.
-std::array<double, kRewardTerms> TermsOf(double energy, const Plant& plant,
-                                         const PendulumState& seen, double tau) {
-  const bool inverted = Inverted(seen);
-  const double height = TipHeight(plant, seen) / (plant.length1 + plant.length2);
-  return {
-      energy,
-      (height + 1) / 2,                                                  // height
-      inverted ? 5.0 : 0.0,                                              // balance
-      inverted ? -0.01 * (seen.w1 * seen.w1 + seen.w2 * seen.w2) : 0.0,  // velocity
-      (inverted ? -0.05 : -0.01) * tau * tau,                            // torque
-  };
-}
-
-}  // namespace
 
 std::array<Link, 2> TaskLinksOf(const Plant& p) {
   if (p.has_own_links()) return LinksOf(p);
@@ -68,17 +49,6 @@ bool Inverted(const PendulumState& s) {
   return -std::cos(s.q1) >= kCos30 && -std::cos(s.q1 + s.q2) >= kCos30;
 }
 
-std::string PoseName(const Pose& pose) {
-  return Concat(pose.up1 ? "up-" : "down-", pose.up2 ? "up" : "down");
-}
-
-PendulumState SeenFrom(const Pose& pose, const PendulumState& s) {
-  const double turn1 = pose.up1 ? 0 : std::numbers::pi, turn12 = pose.up2 ? 0 : std::numbers::pi;
-  return {s.q1 + turn1, s.q2 + turn12 - turn1, s.w1, s.w2};
-}
-
-PendulumState RestIn(const Pose& pose) { return SeenFrom({!pose.up1, !pose.up2}, PendulumState()); }
-
 std::array<float, kObservationSize> Observe(const Plant& plant, const PendulumState& s) {
   const double height = TipHeight(plant, s) / (plant.length1 + plant.length2);
   const auto f = [](double x) { return static_cast<float>(x); };
@@ -89,13 +59,15 @@ std::array<float, kObservationSize> Observe(const Plant& plant, const PendulumSt
 
 std::array<double, kRewardTerms> RewardTerms(const Plant& plant, const PendulumState& s,
                                              double tau) {
-  return TermsOf(std::clamp(NormalizedEnergy(plant, s), 0.0, 1.5), plant, s, tau);
-}
-
-std::array<double, kRewardTerms> RewardTerms(const Plant& plant, const PendulumState& s, double tau,
-                                             const Pose& goal) {
-  const double missing = NormalizedEnergy(plant, s) - NormalizedEnergy(plant, RestIn(goal));
-  return TermsOf(std::max(0.0, 1 - std::abs(missing)), plant, SeenFrom(goal, s), tau);
+  const bool inverted = Inverted(s);
+  const double height = TipHeight(plant, s) / (plant.length1 + plant.length2);
+  return {
+      std::clamp(NormalizedEnergy(plant, s), 0.0, 1.5),      // energy
+      (height + 1) / 2,                                      // height
+      inverted ? 5.0 : 0.0,                                  // balance
+      inverted ? -0.01 * (s.w1 * s.w1 + s.w2 * s.w2) : 0.0,  // velocity
+      (inverted ? -0.05 : -0.01) * tau * tau,                // torque
+  };
 }
 
 }  // namespace upswing

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <string>
 
 #include "pendulum/plant.h"
 
@@ -41,24 +40,6 @@ double TipHeight(const Plant& plant, const PendulumState& s);
 /// Whether both links are within 30° of straight up; link 2 by its absolute angle q1 + q2.
 bool Inverted(const PendulumState& s);
 
-/// A pose in which the pendulum can rest: which of its links point up. Upright by default.
-struct Pose {
-  bool up1 = true, up2 = true;
-
-  bool operator==(const Pose&) const = default;
-};
-inline constexpr std::array<Pose, 4> kPoses{Pose{true, true}, Pose{true, false}, Pose{false, true},
-                                            Pose{false, false}};
-
-/// The name of a pose, such as "up-down": link 1 up, link 2 down.
-std::string PoseName(const Pose& pose);
-
-/// The state with its angles measured from `pose` in place of upright: rest in the pose becomes
-/// rest upright.
-PendulumState SeenFrom(const Pose& pose, const PendulumState& s);
-/// Rest in a pose.
-PendulumState RestIn(const Pose& pose);
-
 inline constexpr int kObservationSize = 8;
 /// Divisors of the velocities in observations (rad/s), so that all inputs have a similar size. They
 /// are a heuristic: a swing-up from hanging stays well within them.
@@ -77,9 +58,5 @@ inline constexpr std::array<const char*, kRewardTerms> kRewardTermNames{
 /// s is the state at the end of a control step and tau (N·m) the motor's torque during it.
 std::array<double, kRewardTerms> RewardTerms(const Plant& plant, const PendulumState& s,
                                              double tau);
-/// The terms with `goal` in place of upright: height and balance of the state seen from it; the
-/// energy term is 1 - |Ê - Ê at rest in the goal|, or 0 if that is negative.
-std::array<double, kRewardTerms> RewardTerms(const Plant& plant, const PendulumState& s, double tau,
-                                             const Pose& goal);
 
 }  // namespace upswing

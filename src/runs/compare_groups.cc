@@ -21,11 +21,12 @@ std::string LabelOf(const RunRecord& run) {
 }
 
 /// Whether a setting belongs to the task that a policy is evaluated on: plant, disturbance,
-/// randomisation, and how many episodes have to succeed. Settings of the training, and of when and
-/// in which engine it evaluates, do not belong to it.
+/// randomisation, goals, and how many episodes have to succeed. Settings of the training, and of
+/// when and in which engine it evaluates, do not belong to it.
 bool IsTask(const Option& option) {
   constexpr std::array<std::string_view, 3> kSections{"plant", "disturbance", "randomize"};
   return option.name == "eval_episodes" || option.name == "environment" ||
+         option.name == "any_pose" ||
          std::ranges::find(kSections, option.section) != kSections.end();
 }
 

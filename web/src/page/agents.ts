@@ -130,15 +130,9 @@ const NOT_LEARNED =
 
 /// An entry's title: its agent, and its ID if that differs.
 function titleOf(entry: Entry): string {
-  const { id } = entry;
-  const kind = kindOf(entry);
-  const title = TITLES.get(kind) ?? printable(kind);
-  return id === kind ? title : `${title}, ${printable(id)}`;
-}
-
-/// An entry's agent, or its ID for the policy for any pose, which has no named agent of its own.
-function kindOf({ id, agent }: Entry): string {
-  return id === ANY_POSE ? id : agent;
+  const { id, agent } = entry;
+  const title = TITLES.get(agent) ?? printable(agent);
+  return id === agent ? title : `${title}, ${printable(id)}`;
 }
 
 /// A description of any policy, in plain words.
@@ -284,7 +278,7 @@ export class Agents {
   private async fetchAgent(entry: Entry): Promise<Agent> {
     const policy = new Policy(await fetchPolicy(entry.file));
     const { id, command, curve } = entry;
-    const what = plainly(policy, id === kindOf(entry) ? id : OWN);
+    const what = plainly(policy, id === entry.agent ? id : OWN);
     return this.add({
       ...{ id, title: titleOf(entry), what, text: describe(policy) },
       ...{ command, curve, policy },
