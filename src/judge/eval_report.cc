@@ -174,12 +174,12 @@ EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& tria
   return report;
 }
 
-std::map<std::string, Transition> TransitionsOf(const EvalReport& report) {
-  std::map<std::string, Transition> transitions;
+std::map<std::string, TransitionCount> TransitionsOf(const EvalReport& report) {
+  std::map<std::string, TransitionCount> transitions;
   for (const JudgedEpisode& episode : report.episodes) {
     for (const Pose& from : kPoses) {
       if (!episode.goal || !Inverted(SeenFrom(from, episode.start))) continue;
-      Transition& t = transitions[Concat(PoseName(from), " to ", PoseName(*episode.goal))];
+      TransitionCount& t = transitions[Concat(PoseName(from), " to ", PoseName(*episode.goal))];
       ++t.episodes;
       t.successes += episode.result.success ? 1 : 0;
     }

@@ -41,12 +41,12 @@ EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& tria
                           ThreadPool& pool, const Progress& progress);
 
 /// The episodes that begin near one pose and ask for another.
-struct Transition {
+struct TransitionCount {
   int64_t episodes = 0, successes = 0;
 };
 
 /// The transitions of a policy for any pose, by name, such as "up-up to up-down".
-std::map<std::string, Transition> TransitionsOf(const EvalReport& report);
+std::map<std::string, TransitionCount> TransitionsOf(const EvalReport& report);
 
 /// Number of episodes with a controller designed for their plant.
 int64_t NumDesigned(const EvalReport& report);
