@@ -67,7 +67,8 @@ std::vector<RobustnessCase> RobustnessCases(uint64_t seed) {
   const auto add_levels = [&](RobustnessRow row, int parameter, int repeats, const auto& vary) {
     for (int i = 0; i < kBoardLevels * repeats; ++i) {
       RobustnessCase& made = add(row, parameter);
-      made.value = vary(made.episode, static_cast<double>(i / repeats) / (kBoardLevels - 1));
+      const int level = i / repeats;
+      made.value = vary(made.episode, static_cast<double>(level) / (kBoardLevels - 1));
     }
   };
   for (int parameter = 0; parameter < static_cast<int>(kBoardVariations.size()); ++parameter) {

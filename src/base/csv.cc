@@ -162,7 +162,7 @@ std::string NamesHint(const std::vector<std::string_view>& cells, std::string_vi
 
 /// A text as a cell: Printable, which keeps the row on one line, and in quotes if necessary.
 std::string CellOf(std::string_view given) {
-  const std::string text = Printable(given);
+  std::string text = Printable(given);
   if (text.find_first_of(",\"") == text.npos) return text;
   return Concat("\"", Replaced(text, "\"", "\"\""), "\"");
 }
