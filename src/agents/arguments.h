@@ -21,8 +21,7 @@ inline void DescribeThreads(Options& o, int64_t* threads) {
   o.Add(threads, "threads", {0, 256}, "", "number of threads; 0: one per processor, at most 8");
 }
 
-/// Argument "physics", one of EngineNames().
-/// Declares the pose that an episode asks for.
+/// Argument "goal": the name of a pose.
 inline void DescribeGoal(Options& o, std::string* goal) {
   o.AddChoice(goal, "goal", {"up-up", "up-down", "down-up", "down-down"},
               "pose that a policy for any pose is to reach, link 1 first; `eval` then starts "
@@ -30,6 +29,7 @@ inline void DescribeGoal(Options& o, std::string* goal) {
       .usual = "up-up; each episode of `eval` draws its own";
 }
 
+/// Argument "physics", one of EngineNames().
 inline void DescribePhysics(Options& o, std::string* physics) {
   o.AddChoice(physics, "physics", EngineNames(),
               "physics engine; closed-form is faster than mujoco, with the same physics");
