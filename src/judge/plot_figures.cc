@@ -106,12 +106,11 @@ Panel Velocities(const Rows& rows) {
 }
 
 Panel Energies(const Rollout& rollout) {
-  const auto& [rows, plant, disturbance, goal] = rollout;
-  const double target = Energy(plant, RestIn(goal.value_or(Pose())));
-  const auto energy = [&](const RolloutRow& row) { return Energy(plant, row.state); };
+  const double target = Energy(rollout.plant, RestIn(rollout.goal.value_or(Pose())));
+  const auto energy = [&](const RolloutRow& row) { return Energy(rollout.plant, row.state); };
   return PanelOf("energy (J)",
-                 {OverTime("energy", rows, energy),
-                  OverTime("target", rows, [&](const RolloutRow&) { return target; })});
+                 {OverTime("energy", rollout.rows, energy),
+                  OverTime("target", rollout.rows, [&](const RolloutRow&) { return target; })});
 }
 
 constexpr const char* kTorqueLabel = "torque (N·m)";
