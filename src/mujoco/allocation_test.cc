@@ -23,6 +23,8 @@ namespace {
 std::atomic<int64_t> g_allocations{0};
 }  // namespace
 
+// Libraries find them, also where the compiler hides what it does not know.
+#pragma GCC visibility push(default)
 extern "C" {
 void* __libc_malloc(size_t size);                      // NOLINT
 void* __libc_calloc(size_t count, size_t size);        // NOLINT
@@ -46,6 +48,7 @@ void* aligned_alloc(size_t alignment, size_t size) noexcept {
   return __libc_memalign(alignment, size);
 }
 }
+#pragma GCC visibility pop
 
 namespace upswing {
 namespace {
@@ -69,9 +72,8 @@ int64_t Allocations(const Engine* engine, int steps) {
 TEST(Allocation, IsCounted) {
   const int64_t before = g_allocations;
   const std::vector<double> numbers(1000);
-  const double* volatile used = numbers.data();  // so that clang does not leave the allocation out
   EXPECT_EQ(g_allocations - before, 1);
-  EXPECT_EQ(*used, 0);
+  EXPECT_EQ(numbers.back(), 0);
 }
 
 TEST(Allocation, AStepInMuJoCoAllocatesNothing) { EXPECT_EQ(Allocations(&kMuJoCo, 100), 0); }
