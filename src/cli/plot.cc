@@ -11,6 +11,7 @@
 #include "judge/plot_figures.h"
 #include "judge/rollout.h"
 #include "os/file.h"
+#include "os/streams.h"
 #include "report/figure.h"
 #include "runs/find_policy.h"
 #include "runs/run_folder.h"
