@@ -127,7 +127,7 @@ std::string TorqueText(const Rollout& rollout) {
   EvaluationEpisode e;
   tally.Finish(tally.has_goal_steps(), e);
   std::string text = fmt::format("peak {:.4g} N·m, rms {:.4g} N·m, variation {:.4g} N·m/s",
-                                       e.peak_torque, e.rms_torque, e.torque_variation);
+                                 e.peak_torque, e.rms_torque, e.torque_variation);
   if (!tally.has_goal_steps()) return text;
   return text + fmt::format(", once {} {:.4g} N·m/s", rollout.goal ? "at the goal" : "upright",
                             e.goal_variation);
