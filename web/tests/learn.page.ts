@@ -458,8 +458,13 @@ test("a finger holds the slider under the chart, and the numbers match the worke
   const scrub = page.locator('#learn-scrub');
   await expect(scrub).toBeEnabled();
   const { width, height } = (await scrub.boundingBox())!;
-  await scrub.hover({ position: { x: width - 2, y: height / 2 } }); // at the newest policy
-  await page.mouse.down();
+  // The first reports move the page: press until the slider is held, at the newest policy.
+  await expect(async () => {
+    await page.mouse.up();
+    await scrub.hover({ position: { x: width - 2, y: height / 2 } });
+    await page.mouse.down();
+    expect(await scrub.evaluate((slider) => slider.matches(':active'))).toBe(true);
+  }).toPass();
   const steps = async () =>
     Number((await page.locator('#learn-steps').innerText()).replaceAll(',', ''));
   const [held, before] = [await scrub.inputValue(), await steps()];
