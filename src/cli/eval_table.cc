@@ -114,7 +114,7 @@ void PrintEvalTable(const EvalReport& report) {
     }
   }
   fmt::print("  energy used    {} J   in {}\n", MomentsText(e.work), LengthText(e.seconds));
-  PrintTorques(e, Reached(report.env));
+  PrintTorques(e, Reached(report.env.any_pose));
   fmt::print("  ± is the standard deviation over the episodes\n");
 }
 

@@ -129,8 +129,8 @@ std::string TorqueText(const Rollout& rollout) {
   std::string text = fmt::format("peak {:.4g} N·m, rms {:.4g} N·m, variation {:.4g} N·m/s",
                                  e.peak_torque, e.rms_torque, e.torque_variation);
   if (!tally.has_goal_steps()) return text;
-  return text + fmt::format(", once {} {:.4g} N·m/s", rollout.goal ? "at the goal" : "upright",
-                            e.goal_variation);
+  return text +
+         fmt::format(", once {} {:.4g} N·m/s", Reached(rollout.goal.has_value()), e.goal_variation);
 }
 
 std::string RolloutCsv(const Rollout& rollout) {
@@ -158,10 +158,10 @@ std::string RolloutCsv(const Rollout& rollout) {
 std::string JudgementText(const Policy& policy, const PendulumEnvConfig& config) {
   PendulumEnv env(config);
   const EvaluationEpisode episode = EvaluateEpisodes(policy, env).front();
-  const std::string upright =
-      episode.swing_up_seconds
-          ? fmt::format("{} from {:.2f} s to the end", Reached(config), *episode.swing_up_seconds)
-          : Concat("not ", Reached(config), " at the end");
+  const std::string upright = episode.swing_up_seconds
+                                  ? fmt::format("{} from {:.2f} s to the end",
+                                                Reached(config.any_pose), *episode.swing_up_seconds)
+                                  : Concat("not ", Reached(config.any_pose), " at the end");
   return fmt::format("{}, {}, return {:.6g}", episode.success ? "success" : "failure", upright,
                      episode.reward_sum);
 }

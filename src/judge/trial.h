@@ -55,9 +55,7 @@ PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy*
                                     bool draws_goals = false);
 
 /// What an episode is to reach, for messages: "upright", or "at the goal" of a policy for any pose.
-inline const char* Reached(const PendulumEnvConfig& env) {
-  return env.any_pose ? "at the goal" : "upright";
-}
+inline const char* Reached(bool any_pose) { return any_pose ? "at the goal" : "upright"; }
 
 /// An environment whose only episode is episode `index` of `config`.
 PendulumEnv OneEpisode(PendulumEnvConfig config, int index);

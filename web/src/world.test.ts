@@ -112,7 +112,7 @@ test('a new goal counts from the next control step on, also for the twin', () =>
   expect(world.uprightFor).toBe(0);
 });
 
-// The same.
+// Their torques are continuous, and rounding differs.
 test.each([
   ['lqr', 3.13],
   ['energy', 0],
