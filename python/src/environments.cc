@@ -88,6 +88,12 @@ class Environments {
   const Config& config() const { return config_; }
   const std::vector<double>& levels() const { return levels_; }
   int threads() const { return pool_.threads(); }
+  /// Names of the goals that episodes may have; none if they are always upright.
+  std::vector<std::string> goals() const {
+    std::vector<std::string> names;
+    if (config_.any_pose) std::ranges::transform(kPoses, std::back_inserter(names), PoseName);
+    return names;
+  }
   /// Results of the last step; `next_obs` has the successors, even in ended episodes.
   const StepResult& result() const { return result_; }
   /// The observations to act on (N, D).
@@ -138,9 +144,12 @@ class Environments {
     });
   }
 
-  /// Begins an episode of an environment in a state: q1, q2, w1, w2.
-  void SetState(int env, const std::array<double, 4>& s) {
+  /// Begins an episode of an environment in a state (q1, q2, w1, w2) with a pose as the goal. Other
+  /// names of goals keep the present one.
+  void SetStart(int env, const std::array<double, 4>& s, const std::string& goal) {
     Alone([&] {
+      const auto* const pose = std::ranges::find(kPoses, goal, PoseName);
+      if (pose != kPoses.end()) env_.SetGoal(env, *pose);
       env_.SetState(env, {s[0], s[1], s[2], s[3]});
       ShowStart(env);
     });
@@ -250,6 +259,7 @@ nb::dict DescribeTask(Environments& self) {
   d["action_limit"] = spec.action_limit;
   d["step_seconds"] = spec.step_seconds;
   d["reward_terms"] = spec.term_names;
+  d["goals"] = self.goals();
   d["levels"] = self.levels();
   d["threads"] = self.threads();
   d["settings"] = ConfigToml(self.config(), false);
@@ -268,7 +278,7 @@ void BindEnvironments(nb::module_& m) {
       .def("reset", &Environments::Reset, nb::arg("seeds"), nb::arg("mask"))
       .def("spec", &DescribeTask)
       .def("get_state", &Environments::State, nb::arg("env"))
-      .def("set_state", &Environments::SetState, nb::arg("env"), nb::arg("state"))
+      .def("set_start", &Environments::SetStart, nb::arg("env"), nb::arg("state"), nb::arg("goal"))
       .def("goal", &Environments::Goal, nb::arg("env"))
       .def(
           "plant", [](Environments& self, int env) { return PlantDict(self.PlantOf(env)); },

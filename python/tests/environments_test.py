@@ -353,6 +353,12 @@ class BadInput(BadInputTest):
         self.refuse("state: expected q1, q2, w1, w2",
                     lambda: env.reset(options={"state": [1, 2, 3]}))
         self.refuse("state: expected finite", lambda: env.reset(options={"state": [np.nan] * 4}))
+        self.refuse("goal: expected an environment with any_pose",
+                    lambda: env.reset(options={"goal": "up-down"}))
+        env = upswing.DoublePendulumEnv(any_pose=True)
+        for goal in ("up", "", 3, ["up-up", "up-up"], [["up-up"]]):
+            self.refuse("goal: expected up-up, up-down, down-up, down-down, or a list of 1",
+                        lambda goal=goal: env.reset(options={"goal": goal}))
 
 
 if __name__ == "__main__":

@@ -64,6 +64,14 @@ class Policies(unittest.TestCase):
                 self.assertEqual(tuple(obs[8:]), goal)
             self.assertTrue(info["at_goal"])
         self.assertEqual(goals, {(1, 1), (1, -1), (-1, 1), (-1, -1)})
+        start = [np.pi, 0, 0, 0]
+        obs, _ = env.reset(options={"state": start, "goal": "up-down"})
+        np.testing.assert_array_equal(env.unwrapped.state, start)
+        for _ in range(300):
+            obs, _, _, _, info = env.step(policy.act(obs))
+            self.assertEqual(tuple(obs[8:]), (1, -1))
+        self.assertTrue(info["at_goal"])
+        self.assertGreater(np.cos(env.unwrapped.state[:2].sum()), np.cos(0.5))
 
     def test_one_and_many_observations(self):
         obs = np.random.default_rng(0).normal(size=(70, 8)).astype(np.float32)

@@ -158,6 +158,10 @@ class Vector(unittest.TestCase):
         envs.reset(options={"state": np.arange(12).reshape(3, 4), "reset_mask": mask})
         np.testing.assert_array_equal(envs.states[[0, 2]], [[0, 1, 2, 3], [8, 9, 10, 11]])
         np.testing.assert_array_equal(envs.states[1], [3, 0, 1, 0])
+        envs = make(any_pose=True)
+        goals = envs.reset(seed=0)[0][:, 8:].copy()
+        obs, _ = envs.reset(options={"goal": ["up-up", "up-down", "down-up"], "reset_mask": mask})
+        np.testing.assert_array_equal(obs[:, 8:], [[1, 1], goals[1], [-1, 1]])
         for bad in ([True] * 2, np.array([1, 0, 1]), np.zeros(3, bool)):
             with self.assertRaises(upswing.InputError):
                 envs.reset(options={"reset_mask": bad})

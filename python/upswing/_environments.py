@@ -30,6 +30,7 @@ class Core:
         self.num_envs: int = spec["num_envs"]
         self.step_seconds: float = spec["step_seconds"]
         self.reward_terms: list[str] = spec["reward_terms"]
+        self.goals: list[str] = spec["goals"]
         self.levels = np.array(spec["levels"])
         self.settings: str = spec["settings"]
         self.threads: int = spec["threads"]
@@ -89,9 +90,10 @@ class Core:
         options = dict(options or {})
         mask = options.pop("reset_mask", None)
         states = options.pop("state", None)
+        goals = options.pop("goal", None)
         if options:
-            raise _upswing.InputError(
-                f"options: expected state or reset_mask, got {', '.join(map(repr, options))}")
+            raise _upswing.InputError("options: expected state, goal or reset_mask, "
+                                      f"got {', '.join(map(repr, options))}")
         n = self.num_envs
         if mask is None:
             mask = np.ones(n, np.bool_)
@@ -116,11 +118,24 @@ class Core:
                     f"({size},) or ({n}, {size}), got shape {np.shape(states)}") from None
             if not np.isfinite(states[mask]).all():
                 raise _upswing.InputError("state: expected finite numbers, got others")
+        names = [""] * n if goals is None else self.goals_of(goals)
         self.env.reset(seeds, mask.astype(np.uint8).tolist())
-        if states is not None:
-            for i in np.flatnonzero(mask):
-                self.env.set_state(int(i), states[i].tolist())
+        if states is not None or goals is not None:
+            for i in np.flatnonzero(mask).tolist():
+                state = self.env.get_state(i) if states is None else states[i].tolist()
+                self.env.set_start(i, state, names[i])
         self.is_reset = True
+
+    def goals_of(self, goals: Any) -> list[str]:
+        """The name of a pose for each environment."""
+        if not self.goals:
+            raise _upswing.InputError("goal: expected an environment with any_pose=True")
+        names = [goals] * self.num_envs if isinstance(goals, str) else goals
+        if (not isinstance(names, (list, tuple, np.ndarray)) or len(names) != self.num_envs
+                or not all(isinstance(name, str) and name in self.goals for name in names)):
+            raise _upswing.InputError(f"goal: expected {', '.join(self.goals)}, or a list of "
+                                      f"{self.num_envs} of them, got {goals!r}")
+        return list(names)
 
     def states(self) -> npt.NDArray[np.float64]:
         return np.array([self.env.get_state(i) for i in range(self.num_envs)])

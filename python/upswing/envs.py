@@ -88,7 +88,8 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
 
         Args:
             seed: seed of this and the following episodes; None continues the random stream
-            options: {"state": [q1, q2, w1, w2]} [rad, rad/s] sets the start state
+            options: {"state": [q1, q2, w1, w2]} [rad, rad/s] sets the start state; with any_pose,
+                {"goal": "up-down"} sets the goal, link 1 first
 
         Returns:
             Observation (D,), float32, and info
@@ -96,7 +97,7 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
         if self._closed:
             raise gym.error.ClosedEnvironmentError("reset: the environment is closed")
         if options and "reset_mask" in options:
-            raise _upswing.InputError("options: expected state, got 'reset_mask'")
+            raise _upswing.InputError("options: expected state or goal, got 'reset_mask'")
         super().reset(seed=None if seed is None else seed_of(seed))
         self._core.begin(self._core.seeds_of(seed, self.np_random), options)
         self._ended = False
@@ -258,6 +259,7 @@ class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArra
             seed: seed s for the seeds s, s + 1, …, or one seed per environment; None continues the
                 random streams
             options: {"state": q1, q2, w1, w2 [rad, rad/s]}, (4,) or (N, 4), sets the start states;
+                with any_pose, {"goal": a pose such as "up-down", or N poses} sets the goals;
                 {"reset_mask": bools (N,)} selects the environments to reset
 
         Returns:

@@ -104,6 +104,8 @@ class PendulumEnv : public VectorEnv {
   void Push(int env, const std::array<double, 2>& torque) { physics_->Push(env, torque); }
   /// Begins an episode of an environment in a state.
   void SetState(int env, const PendulumState& state);
+  /// Sets the goal of the episode that SetState then begins; only with any_pose.
+  void SetGoal(int env, const Pose& goal) { builder_.SetGoal(env, goal); }
 
  private:
   void Reset(int env);
