@@ -46,6 +46,11 @@ void Config::DescribeEnvironment(Options& o) {
         "share of training episodes that start in a random state instead of hanging");
   o.Add(&random_start_velocity, "random_start_velocity", {0, 50}, "rad/s",
         "largest velocity of random start states");
+  o.Add(
+       &random_start_drive, "random_start_drive", {0, 10}, "s",
+       "time for which motors at both joints drive the links from upright to a random pose; random "
+       "starts are where it ends; 0: random velocities")
+      .implied = true;
   o.Add(&memory, "memory", {0, kMostMemory}, "steps",
         "number of past steps whose torque and velocity changes the agent observes");
   o.Add(&identify, "identify",
@@ -90,7 +95,7 @@ EnvConfig Config::Environments() const {
   env.memory = static_cast<int>(memory);
   if (identify) env.identified_from = plant;
   env.any_pose = any_pose;
-  env.start = {train.start_noise, random_start_share, random_start_velocity};
+  env.start = {train.start_noise, random_start_share, random_start_velocity, random_start_drive};
   env.reward = reward;
   env.seed = static_cast<uint64_t>(train.seed);
   env.stream = "training environment";

@@ -35,7 +35,8 @@ struct Config {
   TrainConfig train;
   std::string start_policy;  // PATH#CHECKSUM of the policy to start from (BuildConfig); or empty
   std::string environment;   // description of a foreign task's environment; empty: double pendulum
-  double episode_seconds = 4, random_start_share = 0.9, random_start_velocity = 5;
+  double episode_seconds = 4, random_start_share = 0.9, random_start_velocity = 5,
+         random_start_drive = 0;
   int64_t memory = 0;
   bool identify = false, any_pose = false;
   std::string physics = "mujoco";       // engine of the training

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "base/text.h"
 
@@ -121,20 +120,11 @@ void PendulumEnv::Randomize(int env) {
 }
 
 void PendulumEnv::Reset(int env) {
-  constexpr double kPi = std::numbers::pi;
   if (!plants_.empty()) Randomize(env);
   Rng& rng = rngs_[static_cast<size_t>(env)];
   const StartStates& start = config_.start;
-  PendulumState s;
   const bool is_random = rng.Uniform() < start.random_share;
-  if (is_random) {
-    s = {rng.Uniform(-kPi, kPi), rng.Uniform(-kPi, kPi),
-         rng.Uniform(-start.random_velocity, start.random_velocity),
-         rng.Uniform(-start.random_velocity, start.random_velocity)};
-  } else {
-    s = {start.noise * rng.Normal(), start.noise * rng.Normal(), start.noise * rng.Normal(),
-         start.noise * rng.Normal()};
-  }
+  PendulumState s = is_random ? start.Random(plant(env), rng) : start.Hanging(rng);
   if (config_.any_pose && config_.goal) {
     builder_.SetGoal(env, *config_.goal);
   } else if (config_.any_pose && is_random) {

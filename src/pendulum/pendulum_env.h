@@ -15,17 +15,10 @@
 #include "pendulum/own_reward.h"
 #include "pendulum/physics.h"
 #include "pendulum/randomization.h"
+#include "pendulum/start_states.h"
 #include "pendulum/task.h"
 
 namespace upswing {
-
-/// Distribution of start states. A share of the episodes begins at random angles and velocities.
-/// The others begin hanging, with normal noise on all four state variables.
-struct StartStates {
-  double noise = 0.1;          // standard deviation, rad and rad/s
-  double random_share = 0;     // share of episodes that begin at random angles in [-π, π]
-  double random_velocity = 5;  // bound of the uniform velocities of random starts, rad/s
-};
 
 /// Settings of a PendulumEnv.
 struct PendulumEnvConfig : PhysicsConfig {
