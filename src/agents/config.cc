@@ -46,10 +46,9 @@ void Config::DescribeEnvironment(Options& o) {
         "share of training episodes that start in a random state instead of hanging");
   o.Add(&random_start_velocity, "random_start_velocity", {0, 50}, "rad/s",
         "largest velocity of random start states");
-  o.Add(
-       &random_start_drive, "random_start_drive", {0, 10}, "s",
-       "time for which motors at both joints drive the links from upright to a random pose; random "
-       "starts are where it ends; 0: random velocities")
+  o.Add(&random_start_drive, "random_start_drive", {0, 10}, "s",
+        "time for which motors at both joints drive the links to a random pose after an episode; a "
+        "random start is where this ends; 0: random angles and velocities")
       .implied = true;
   o.Add(&memory, "memory", {0, kMostMemory}, "steps",
         "number of past steps whose torque and velocity changes the agent observes");

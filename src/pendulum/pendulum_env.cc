@@ -124,7 +124,7 @@ void PendulumEnv::Reset(int env) {
   Rng& rng = rngs_[static_cast<size_t>(env)];
   const StartStates& start = config_.start;
   const bool is_random = rng.Uniform() < start.random_share;
-  PendulumState s = is_random ? start.Random(plant(env), rng) : start.Hanging(rng);
+  PendulumState s = is_random ? start.Random(plant(env), state(env), rng) : start.Hanging(rng);
   if (config_.any_pose && config_.goal) {
     builder_.SetGoal(env, *config_.goal);
   } else if (config_.any_pose && is_random) {
@@ -139,6 +139,7 @@ void PendulumEnv::Reset(int env) {
 
 void PendulumEnv::Restart(int env, std::optional<uint64_t> seed) {
   if (seed) {
+    physics_->SetState(env, {});
     const auto i = static_cast<size_t>(env);
     rngs_[i] = Rng(*seed, config_.stream);
     if (!plants_.empty()) plant_rngs_[i] = Rng(*seed, PlantStream(config_.stream));

@@ -54,7 +54,8 @@ struct PendulumEnvConfig : PhysicsConfig {
 EnvSpec PendulumSpec(const PendulumEnvConfig& config);
 
 /// N double pendulums and their episodes. Reaching the time limit truncates; only a numerical
-/// blow-up (see Physics::Step) terminates. The start states do not depend on the physics.
+/// blow-up (see Physics::Step) terminates. The start states do not depend on the physics,
+/// unless a drive makes them.
 ///
 /// With randomised plants, observation and reward use the plant of the episode. With disturbances,
 /// observations hold what the sensors measure, and motors apply the delayed torque. State, reward
