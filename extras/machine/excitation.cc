@@ -4,17 +4,13 @@
 #include <cmath>
 
 namespace upswing::machine {
-namespace {
-
-constexpr double kGrowth = 1.035, kDecay = 0.7;  // of the amplitude in a step; beyond the level
-constexpr double kEnough = 0.7;                  // level up to which the amplitude grows
-constexpr int kShortest = 3, kLongest = 15;      // time for which a share is held, steps
-constexpr double kAlong = 0.6;                   // probability of a push along with the motion
-constexpr double kSlow = 0.5;                    // rad/s
-
-}  // namespace
 
 double Excitation::operator()(int64_t /*step*/, const PendulumState& state) {
+  constexpr double kGrowth = 1.035, kDecay = 0.7;  // of the amplitude in a step; beyond the level
+  constexpr double kEnough = 0.7;                  // level up to which the amplitude grows
+  constexpr int kShortest = 3, kLongest = 15;      // time for which a share is held, steps
+  constexpr double kAlong = 0.6;                   // probability of a push along with the motion
+  constexpr double kSlow = 0.5;                    // rad/s
   const double level = level_(state), w = joint_ == 1 ? state.w1 : state.w2;
   if (held_-- <= 0) {
     held_ = kShortest + static_cast<int>(rng_.Uniform(0, kLongest - kShortest));

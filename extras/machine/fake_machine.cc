@@ -8,12 +8,6 @@
 #include "extras/machine/link.h"
 
 namespace upswing::machine {
-namespace {
-
-constexpr double kTick = 0.02;        // longest time between two looks at the clock, s
-constexpr size_t kMostMoving = 4096;  // frames on a line
-
-}  // namespace
 
 void FakeConfig::Describe(Options& o) {
   o.Section("line");
@@ -36,6 +30,7 @@ void FakeConfig::Describe(Options& o) {
 }
 
 void FaultyLine::Put(const Frame& frame, double now) {
+  constexpr size_t kMostMoving = 4096;  // frames on the line
   const double arrives =
       now + faults_.delay + (faults_.jitter > 0 ? rng_.Uniform(0, faults_.jitter) : 0);
   if (moving_.size() < kMostMoving) moving_.push_back({arrives, frame});
@@ -133,6 +128,7 @@ std::optional<Frame> FakeMachine::Answer(const Frame& command, double now) {
 
 void Serve(Channel& channel, FakeMachine& machine, const LineFaults& faults, uint64_t seed,
            const std::function<bool()>& stop, const std::function<void(double)>& report) {
+  constexpr double kTick = 0.02;  // longest time between two looks at the clock, s
   FaultyLine to_machine(faults, seed, "line: commands"),
       from_machine(faults, seed, "line: readings");
   FrameReader reader(channel.datagrams());

@@ -4,11 +4,6 @@
 #include <utility>
 
 namespace upswing::machine {
-namespace {
-
-constexpr double kMostTurn = 7.5;  // of a joint in a try, rad
-
-}  // namespace
 
 RunOutcome RunCycles(const LearnConfig& c, const RunRules& rules, const MachineSensors& sensors,
                      Estimator estimator, MachineController own, MachineLink& link,
@@ -25,6 +20,7 @@ RunOutcome RunCycles(const LearnConfig& c, const RunRules& rules, const MachineS
                     .seconds = rules.seconds,
                     .actuated_joint = c.actuated_joint,
                     .compensation = rules.compensation};
+  constexpr double kMostTurn = 7.5;  // of a joint in a try, rad
   const LoopSummary* summary = nullptr;
   PendulumState first;
   double upright_at = 0;  // s

@@ -10,14 +10,6 @@
 #include "runs/plant_file.h"
 
 namespace upswing::realaigym {
-namespace {
-
-using nlohmann::ordered_json;
-
-constexpr int64_t kBoardHz = 500;
-static_assert(kBoardTimestep * kBoardHz == 1);
-
-}  // namespace
 
 std::string OtherPlant(const MachinePolicy& policy) {
   const Plant& plant = policy->plant;
@@ -27,6 +19,8 @@ std::string OtherPlant(const MachinePolicy& policy) {
 }
 
 ControllerMaker ControllersOf(const MachinePolicy& policy) {
+  constexpr int64_t kBoardHz = 500;
+  static_assert(kBoardTimestep * kBoardHz == 1);
   return [policy, motor = MotorOf(RobotOf(*policy))]() -> CycleController {
     return [loop = PerCycle(ControllerOf(policy), kBoardHz), motor,
             begin = -1.0](const CycleInput& in) mutable -> Joints {
@@ -57,7 +51,7 @@ BoardReport ScoreOnBoard(const MachinePolicy& policy, uint64_t seed, ThreadPool&
 }
 
 std::string BoardJson(const BoardReport& report) {
-  ordered_json j;
+  nlohmann::ordered_json j;
   j["policy"] = report.policy->name;
   j["robot"] = NameOf(RobotOf(*report.policy));
   j["performance"] = OutcomeJson(report.nominal);
@@ -98,11 +92,11 @@ std::vector<UptimeRun> ScoreUptime(const MachinePolicy& policy, uint64_t seed, i
 std::string UptimeJson(const UptimeReport& report) {
   const Interval interval = report.interval();
   const auto [mean, deviation] = report.scores();
-  ordered_json j{{"policy", report.policy->name},
-                 {"robot", NameOf(RobotOf(*report.policy))},
-                 {"mean_score", mean},
-                 {"interval", {interval.low, interval.high}},
-                 {"deviation", deviation}};
+  nlohmann::ordered_json j{{"policy", report.policy->name},
+                           {"robot", NameOf(RobotOf(*report.policy))},
+                           {"mean_score", mean},
+                           {"interval", {interval.low, interval.high}},
+                           {"deviation", deviation}};
   for (const UptimeRun& run : report.runs) {
     j["runs"].push_back({{"score", run.score}, {"swing_ups", run.swing_ups}});
   }

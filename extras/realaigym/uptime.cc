@@ -4,12 +4,6 @@
 #include <cmath>
 
 namespace upswing::realaigym {
-namespace {
-
-constexpr double kPidPeriod = 0.001;  // s; the benchmark's PID believes this, at steps of 2 ms
-constexpr int kCalmSteps = 10;        // without a violation, before a reset may end
-
-}  // namespace
 
 Resets::Resets(const ResetRules& rules, uint64_t seed)
     : rules_(rules), rng_(seed, "realaigym: resets") {
@@ -31,6 +25,7 @@ void Resets::Begin(double time, bool violated) {
 }
 
 std::optional<Joints> Resets::Torque(double time, const PendulumState& measured) {
+  constexpr int kCalmSteps = 10;  // without a violation, before a reset may end
   const auto& [q1, q2, w1, w2] = measured;
   const bool violated = std::max(std::abs(q1), std::abs(q2)) > rules_.most_angle ||
                         std::max(std::abs(w1), std::abs(w2)) > rules_.most_velocity;
@@ -45,6 +40,7 @@ std::optional<Joints> Resets::Torque(double time, const PendulumState& measured)
 }
 
 Joints Resets::Pid(const PendulumState& measured) {
+  constexpr double kPeriod = 0.001;  // s; the benchmark's PID believes this, at steps of 2 ms
   static const Manipulator body = ManipulatorOf(BoardPlant());
   const ManipulatorTerms held = body.At({measured.q1, measured.q2, 0, 0});  // gravity
   const Joints gravity{held.h1, held.h2};
@@ -54,9 +50,8 @@ Joints Resets::Pid(const PendulumState& measured) {
   for (size_t j = 0; j < 2; ++j) {
     error_sum_[j] += error[j];
     const double most = rules_.most_proportional;
-    torque[j] =
-        std::clamp(rules_.kp * error[j], -most, most) + rules_.ki * error_sum_[j] * kPidPeriod;
-    if (errors_ > 2) torque[j] += rules_.kd * (error[j] - error_[j]) / kPidPeriod;
+    torque[j] = std::clamp(rules_.kp * error[j], -most, most) + rules_.ki * error_sum_[j] * kPeriod;
+    if (errors_ > 2) torque[j] += rules_.kd * (error[j] - error_[j]) / kPeriod;
     torque[j] = std::clamp(torque[j], -kBoardTorqueLimit, kBoardTorqueLimit) + gravity[j];
   }
   error_ = error;

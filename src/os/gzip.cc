@@ -8,17 +8,13 @@
 #include "base/error.h"
 
 namespace upswing {
-namespace {
-
-// Logs of machines shrink to a third, and dull simulated ones to a tenth. A file can expand 1000
-// times. Small texts may do so.
-constexpr size_t kMostRatio = 100, kSmall = 1 << 20;
-
-}  // namespace
 
 bool IsGzip(std::string_view bytes) { return bytes.starts_with("\x1f\x8b"); }
 
 std::string Gunzip(std::string_view bytes, const std::string& where, size_t most_bytes) {
+  // Logs of machines shrink to a third, and dull simulated ones to a tenth. A file can expand 1000
+  // times. Small texts may do so.
+  constexpr size_t kMostRatio = 100, kSmall = 1 << 20;
   most_bytes = std::min(most_bytes, kSmall + kMostRatio * bytes.size());
   z_stream stream{};
   stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));

@@ -8,18 +8,12 @@
 #include "runs/tensor_file.h"
 
 namespace upswing {
-namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
-using nlohmann::ordered_json;
-
-constexpr int64_t kMost = int64_t{1} << 62;
-
-}  // namespace
 
 FinishedRun FinishedRun::Parse(std::string_view text) {
-  const json j = ParseJsonObject(text);
+  constexpr int64_t kMost = int64_t{1} << 62;
+  const nlohmann::json j = ParseJsonObject(text);
   FinishedRun run;
   TrainState& s = run.state;
   s.steps = JsonInteger(j, "steps", 0, kMost);
@@ -42,10 +36,10 @@ FinishedRun FinishedRun::Parse(std::string_view text) {
 
 void FinishedRun::Write(const fs::path& path) const {
   const TrainState& s = state;
-  ordered_json j{{"settings", settings},
-                 {"planned_steps", planned_steps},
-                 {"stop_when_solved", stop_when_solved},
-                 {"version", version}};
+  nlohmann::ordered_json j{{"settings", settings},
+                           {"planned_steps", planned_steps},
+                           {"stop_when_solved", stop_when_solved},
+                           {"version", version}};
   conditions.AddTo(j);
   j.update({{"steps", s.steps},
             {"episodes", s.episodes},
