@@ -1,23 +1,20 @@
 #include "extras/deploy/c_text.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 
 #include "base/text.h"
 
 namespace upswing::deploy {
-namespace {
-
-bool IsPlain(char c) {
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-         std::string_view(" .,:;()+-=_").find(c) != std::string_view::npos;
-}
-
-}  // namespace
 
 std::string CommentText(std::string_view text) {
+  const auto is_unsafe = [](char c) {
+    const bool is_letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
+    return !is_letter && std::string_view("0123456789 .,:;()+-=_").find(c) == std::string::npos;
+  };
   std::string safe(text);
-  for (char& c : safe) c = IsPlain(c) ? c : '_';
+  std::ranges::replace_if(safe, is_unsafe, '_');
   return safe;
 }
 

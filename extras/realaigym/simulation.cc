@@ -7,18 +7,6 @@
 #include "pendulum/runge_kutta.h"
 
 namespace upswing::realaigym {
-namespace {
-
-/// Torque (N·m) of an episode's pushes about the motor's joint at a time (s).
-double PushTorque(const BoardEpisode& episode, double time) {
-  double torque = 0;
-  for (const BoardPush& push : episode.pushes) {
-    if (push.amplitude != 0) torque += push.Torque(time);
-  }
-  return torque;
-}
-
-}  // namespace
 
 MachineLog SimulateEpisode(Robot robot, const BoardEpisode& episode,
                            const CycleController& controller, double seconds) {
@@ -50,8 +38,12 @@ MachineLog SimulateEpisode(Robot robot, const BoardEpisode& episode,
     }
     log.commanded.push_back(torque);
 
+    double pushed = 0;  // N·m
+    for (const BoardPush& push : episode.pushes) {
+      if (push.amplitude != 0) pushed += push.Torque(time);
+    }
     Joints acting = torque;
-    acting[motor] += PushTorque(episode, time);
+    acting[motor] += pushed;
     const auto acceleration = [&](const PendulumState& s, double /*share*/) {
       return body.Acceleration(s, acting);
     };

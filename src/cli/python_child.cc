@@ -18,15 +18,6 @@
 #include "cli/signals.h"
 
 namespace upswing {
-namespace {
-
-/// The Python to run: a name in the PATH, or a path.
-std::string PythonName() {
-  const char* given = std::getenv("UPSWING_PYTHON");
-  return given != nullptr && *given != '\0' ? given : "python3";
-}
-
-}  // namespace
 
 PythonChild::PythonChild(std::string command, std::string program, std::string job)
     : command_(std::move(command)), socket_(-1) {
@@ -36,8 +27,9 @@ PythonChild::PythonChild(std::string command, std::string program, std::string j
   }
   socket_ = Descriptor(ends[0]);
   const Descriptor other(ends[1]);
-  setenv("PYTHONSAFEPATH", "1", 1);  // no modules from the present folder
-  std::string python = PythonName(), flag = "-c";
+  setenv("PYTHONSAFEPATH", "1", 1);                   // no modules from the present folder
+  const char* given = std::getenv("UPSWING_PYTHON");  // a name in the PATH, or a path
+  std::string python = given != nullptr && *given != '\0' ? given : "python3", flag = "-c";
   const std::array<char*, 5> words{python.data(), flag.data(), program.data(), job.data(), nullptr};
 
   posix_spawn_file_actions_t files;
