@@ -69,11 +69,9 @@ std::optional<Figure> TermsFigure(const fs::path& run) {
   const std::vector<CsvColumn> columns = ReadCsv(text, names, table.string());
   const std::vector<double>& step = columns[0].values;
   if (step.empty()) return std::nullopt;
-  Panel panel;
-  panel.x_label = "step";
-  panel.y_label = "sum of a training episode";
+  Panel panel{.x_label = "step", .y_label = "sum of a training episode"};
   for (size_t k = 1; k < names.size(); ++k) {
-    Line line{names[k], {}, {}, {}, {}};
+    Line line{.name = names[k]};
     for (size_t i = 0, end = 0; i < step.size(); i = end) {
       double sum = 0;
       for (; end < step.size() && (end == i || step[end] < step[i] + step.back() / 100); ++end) {
@@ -84,10 +82,7 @@ std::optional<Figure> TermsFigure(const fs::path& run) {
     }
     panel.lines.push_back(std::move(line));
   }
-  Figure figure;
-  figure.panels = {panel};
-  figure.height = 400;
-  return figure;
+  return Figure{.panels = {panel}, .height = 400};
 }
 
 int RunPlot(const PlotArguments& a) {

@@ -28,11 +28,8 @@ Panel MapPanel(const MapResult& map, const std::string& title, HeatMap heat_map)
   const MapAxis& y = map.config.y;
   heat_map.x = x.values;
   heat_map.y = y.values;
-  Panel panel;
-  panel.title = title;
-  panel.x_label = x.label();
-  panel.y_label = y.label();
-  panel.heat_map = std::move(heat_map);
+  Panel panel{
+      .title = title, .x_label = x.label(), .y_label = y.label(), .heat_map = std::move(heat_map)};
   const auto inside = [](const MapAxis& axis) {
     return axis.at_training && *axis.at_training >= axis.values.front() &&
            *axis.at_training <= axis.values.back();
@@ -54,45 +51,38 @@ std::string CaptionOf(const MapResult& map) {
 }
 
 HeatMap SuccessMap(const MapResult& map) {
-  HeatMap success;
-  success.label = "successful episodes (%)";
-  success.high = 100;
+  HeatMap success{.label = "successful episodes (%)", .high = 100};
   for (const MapCell& cell : map.cells) success.z.push_back(100 * RateOf(map, cell));
   return success;
 }
 
 Figure MapFigure(const MapResult& map) {
-  HeatMap success = SuccessMap(map), swing_up;
+  HeatMap swing_up{.label = "swing-up time (s)"};
   double longest = 0;  // swing-up time, s
-  swing_up.label = "swing-up time (s)";
   for (const MapCell& cell : map.cells) {
     swing_up.z.push_back(cell.swing_up_seconds);
     longest = std::max(longest, cell.successes > 0 ? cell.swing_up_seconds : 0);
   }
   // If nothing has to swing up, the times differ too little for colours to show.
   if (longest < 0.1) swing_up.high = 1;
-  Figure figure;
-  figure.title = map.policy;
-  figure.caption = CaptionOf(map);
-  figure.width = 1100;
-  figure.height = 530;
-  figure.columns = 2;
-  figure.panels = {
-      MapPanel(map, "Success", std::move(success)),
-      MapPanel(map, map.config.episodes > 1 ? "Swing-up time, median" : "Swing-up time",
-               std::move(swing_up))};
-  return figure;
+  const char* title = map.config.episodes > 1 ? "Swing-up time, median" : "Swing-up time";
+  return {.title = map.policy,
+          .panels = {MapPanel(map, "Success", SuccessMap(map)),
+                     MapPanel(map, title, std::move(swing_up))},
+          .columns = 2,
+          .width = 1100,
+          .height = 530,
+          .caption = CaptionOf(map)};
 }
 
 /// A figure with a success panel for each policy.
 Figure SuccessFigure(const std::vector<MapResult>& maps) {
-  Figure figure;
-  figure.columns = maps.size() == 4 ? 2 : static_cast<int>(std::min<size_t>(3, maps.size()));
-  const int columns = figure.columns;
-  const int count = static_cast<int>(maps.size()), rows = (count + columns - 1) / columns;
-  figure.width = 40 + 420 * columns;
-  figure.height = 60 + 430 * rows;
-  figure.caption = CaptionOf(maps.front());
+  const int count = static_cast<int>(maps.size()), columns = count == 4 ? 2 : std::min(3, count);
+  const int rows = (count + columns - 1) / columns;
+  Figure figure{.columns = columns,
+                .width = 40 + 420 * columns,
+                .height = 60 + 430 * rows,
+                .caption = CaptionOf(maps.front())};
   for (int i = 0; i < count; ++i) {
     const MapResult& map = maps[static_cast<size_t>(i)];
     HeatMap success = SuccessMap(map);

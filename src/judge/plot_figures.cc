@@ -22,8 +22,7 @@ double Link2(const PendulumState& s) { return (s.q1 + s.q2) * kDegrees; }
 /// A curve through the rows.
 template <typename Y>
 Line OverTime(const std::string& name, const Rows& rows, Y y) {
-  Line line;
-  line.name = name;
+  Line line{.name = name};
   for (const RolloutRow& row : rows) {
     line.x.push_back(row.t);
     line.y.push_back(y(row));
@@ -35,8 +34,7 @@ Line OverTime(const std::string& name, const Rows& rows, Y y) {
 /// edge and starts again at the other.
 Line AngleOverTime(const std::string& name, const Rows& rows,
                    double (*angle_of)(const PendulumState&)) {
-  Line line;
-  line.name = name;
+  Line line{.name = name};
   double last_angle = 0, last_turns = 0;
   const auto push = [&](double t, double angle) {
     line.x.push_back(t);
@@ -63,8 +61,7 @@ Line AngleOverTime(const std::string& name, const Rows& rows,
 /// A step curve: a row's value holds until the next row.
 template <typename Y>
 Line Held(const std::string& name, const Rows& rows, Y y) {
-  Line line;
-  line.name = name;
+  Line line{.name = name};
   for (const RolloutRow& row : rows) {
     if (!line.x.empty()) {
       line.x.push_back(row.t);
@@ -77,10 +74,7 @@ Line Held(const std::string& name, const Rows& rows, Y y) {
 }
 
 Panel PanelOf(const std::string& y_label, std::vector<Line> lines) {
-  Panel panel;
-  panel.y_label = y_label;
-  panel.lines = std::move(lines);
-  return panel;
+  return {.y_label = y_label, .lines = std::move(lines)};
 }
 
 Panel Angles(const Rollout& rollout) {
@@ -156,8 +150,7 @@ Panel QValues(const Rows& rows, std::span<const double> torques) {
   constexpr size_t kMostColumns = 250;
   const size_t steps = std::max<size_t>(1, rows.size() - 1);  // the last row has no duration
   const size_t width = (steps + kMostColumns - 1) / kMostColumns;
-  HeatMap map;
-  map.label = "Q - largest Q (reward)";
+  HeatMap map{.label = "Q - largest Q (reward)"};
   // Order the actions from the lowest torque to the highest.
   std::vector<size_t> actions(torques.size());
   std::iota(actions.begin(), actions.end(), size_t{0});
@@ -187,10 +180,9 @@ Panel QValues(const Rows& rows, std::span<const double> torques) {
 
 Figure EpisodeFigure(const Rollout& rollout, const Policy& policy) {
   const Rows& rows = rollout.rows;
-  Figure figure;
-  figure.width = 1000;
-  figure.panels = {Angles(rollout), Velocities(rows), Energies(rollout), Torques(rows),
-                   Rewards(rows)};
+  Figure figure{.panels = {Angles(rollout), Velocities(rows), Energies(rollout), Torques(rows),
+                           Rewards(rows)},
+                .width = 1000};
   constexpr int kPanelHeight = 170;
   if (rows.front().spread) figure.panels.push_back(Spread(rows));
   if (!rows.front().q.empty()) figure.panels.push_back(Values(rows));

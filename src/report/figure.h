@@ -22,11 +22,11 @@ struct Line {
 
 /// A table of numbers as colours. Cell (i, j) lies around (x[j], y[i]); x and y increase.
 struct HeatMap {
-  std::vector<double> x, y;  // (nx), (ny) centres of the cells
-  std::vector<double> z;     // (ny × nx); NaN: an empty cell
-  std::string label;         // label of the colour bar
-  double low = 0, high = 0;  // colour range; low ≥ high: the range of z
-  bool bar = true;           // whether to draw the colour bar; panels in a row can share one
+  std::vector<double> x = {}, y = {};  // (nx), (ny) centres of the cells
+  std::vector<double> z = {};          // (ny × nx); NaN: an empty cell
+  std::string label = {};              // label of the colour bar
+  double low = 0, high = 0;            // colour range; low ≥ high: the range of z
+  bool bar = true;  // whether to draw the colour bar; panels in a row can share one
 };
 
 /// One pair of axes. Lines lie above the heat map.
