@@ -134,7 +134,7 @@ void PrintPolicy(const LoadedPolicy& loaded) {
 /// The settings of a run and the state in its checkpoint.
 struct RunFacts {
   explicit RunFacts(const fs::path& path)
-      : checkpoint(LoadTensors(RunFolder::CheckpointPath(path))),
+      : checkpoint(LoadTensors(path / RunFolder::kCheckpoint)),
         config(ReadRunConfig(path)),
         spec(config.Spec()),
         state(spec.num_envs, static_cast<int>(spec.term_names.size())) {

@@ -68,7 +68,7 @@ std::optional<FinishedRun> FinishedRun::Read(const fs::path& path) {
 
 std::optional<TrainState> ReadTrainState(const fs::path& run, const EnvSpec& spec) {
   if (!fs::exists(run / RunFolder::kConfig)) return std::nullopt;
-  const Tensors checkpoint = LoadPartOfTensors(RunFolder::CheckpointPath(run), "train/");
+  const Tensors checkpoint = LoadPartOfTensors(run / RunFolder::kCheckpoint, "train/");
   TrainState state(spec.num_envs, static_cast<int>(spec.term_names.size()));
   state.State(Archive::Loader(checkpoint).In("train"));
   return state;

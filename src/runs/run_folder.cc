@@ -62,7 +62,7 @@ void RunFolder::Create(const fs::path& given, const std::string& config, Tensors
     Making folder(place, Making::Kind::kFolder);
     WriteFileAtomically(folder.path() / kConfig, config);
     for (const char* size : kSizes) checkpoint.AddScalar(size, int64_t{0});
-    SaveTensors(checkpoint, CheckpointPath(folder.path()));
+    SaveTensors(checkpoint, folder.path() / kCheckpoint);
     folder.Publish();
   } catch (const Error& failure) {
     throw Error(failure.exit_code(),
@@ -142,7 +142,7 @@ void RunFolder::SaveCheckpoint(Tensors& checkpoint) {
     Growing().at(i)->Sync();
     checkpoint.AddScalar(kSizes.at(i), Growing().at(i)->size());
   }
-  SaveTensors(checkpoint, CheckpointPath(path_));
+  SaveTensors(checkpoint, path_ / kCheckpoint);
 }
 
 Row EpisodeRow(const TrainState& s, const FinishedEpisode& episode, const EnvSpec& spec) {

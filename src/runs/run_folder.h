@@ -68,9 +68,6 @@ class RunFolder {
   RunFolder& operator=(const RunFolder&) = delete;
 
   const std::filesystem::path& path() const { return path_; }
-  static std::filesystem::path CheckpointPath(const std::filesystem::path& run) {
-    return run / kCheckpoint;
-  }
 
   /// Adds rows to the tables. Episodes end thousands of times a second. Their rows are written with
   /// the next row of metrics or checkpoint, or when many are waiting.

@@ -78,7 +78,7 @@ void SeedRun::WriteFailed(const std::string& why) const {
 }
 
 bool SeedRun::IsReduced() const {
-  return fs::exists(done()) && !fs::exists(RunFolder::CheckpointPath(path));
+  return fs::exists(done()) && !fs::exists(path / RunFolder::kCheckpoint);
 }
 
 std::vector<SeedRun> RunsOf(const StudyPlan& plan) {

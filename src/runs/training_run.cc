@@ -70,7 +70,7 @@ std::unique_ptr<TrainingRun> TrainingRun::Resume(const fs::path& path,
       new TrainingRun(path, ReadRunConfig(path, flags), std::move(make_foreign)));
   run->lock_.emplace(std::move(lock));
   Training& training = run->training_;
-  const Tensors checkpoint = LoadTensors(RunFolder::CheckpointPath(path));
+  const Tensors checkpoint = LoadTensors(path / RunFolder::kCheckpoint);
   training.Load(checkpoint);
   run->checkpoint_at_ = training.state().steps;
   run->folder_.emplace(path, checkpoint);
