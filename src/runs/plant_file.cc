@@ -21,17 +21,6 @@ constexpr size_t kMostPlantBytes = 1 << 20;
 /// Tables of a plant file with the other parts of a machine.
 constexpr std::array<std::string_view, 4> kOtherTables{"actuator", "sensors", "loop", "sessions"};
 
-/// The settings of a plant file.
-struct PlantSettings {
-  Plant plant;
-  Disturbance disturbance;
-
-  void Describe(Options& o) {
-    plant.Describe(o);
-    disturbance.Describe(o);
-  }
-};
-
 /// Removes kOtherTables and the machine's name. Throws BadInput unless each table left is one of a
 /// plant file.
 void TakeOwnTables(toml::table& table, const std::string& where) {
@@ -73,10 +62,12 @@ std::vector<FlagValue> PlantFile::PlantFlags() const {
 PlantFile ParsePlantFile(std::string_view toml, const std::string& where) {
   toml::table table = ParseToml(toml, where);
   TakeOwnTables(table, where);
-  PlantSettings settings;
   PlantFile file;
+  Disturbance disturbance;
   const Covariance covariance = TakeCovariance(table, where);
-  const Options of_plant = OptionsOf(settings.plant), all = OptionsOf(settings);
+  const Options of_plant = OptionsOf(file.plant);
+  Options all = of_plant;
+  all.AddMissing(OptionsOf(disturbance));
   for (FlagValue& flag : ApplyTable(all, table, where, false)) {
     const std::string& first = all.Find(flag.name, where).front()->name;
     if (of_plant.Get(first) == nullptr) file.conditions.push_back(std::move(flag));
@@ -86,7 +77,6 @@ PlantFile ParsePlantFile(std::string_view toml, const std::string& where) {
     Posterior::Parse(posterior, place);  // throws unless the matrix is positive
     file.conditions.push_back({"posterior", posterior, place});
   }
-  file.plant = settings.plant;
   file.name = where;
   return file;
 }
