@@ -28,13 +28,6 @@ ControllerConfig ConfigOf(const LoadedPolicy& loaded) {
   return config;
 }
 
-std::vector<float> Floats(const auto& numbers) {
-  std::vector<float> floats;
-  floats.reserve(static_cast<size_t>(numbers.size()));
-  for (const double number : numbers) floats.push_back(static_cast<float>(number));
-  return floats;
-}
-
 /// The upper triangle of P, row by row.
 std::vector<double> Triangle(const Eigen::Matrix4d& P) {
   std::vector<double> numbers;

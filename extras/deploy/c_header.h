@@ -25,6 +25,9 @@ struct CArray {
   std::vector<float> values;
 };
 
+/// Numbers as the values of an array.
+std::vector<float> Floats(const auto& numbers) { return {numbers.begin(), numbers.end()}; }
+
 /// The parts of a C header. Names of macros and arrays lack the prefix.
 struct CParts {
   ExportedTask task;   // its state gives the arguments of the control function

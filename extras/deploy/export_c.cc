@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <numbers>
 
 #include "base/error.h"
@@ -33,8 +34,6 @@ std::vector<float> InBlocks(const LayerView& layer) {
   }
   return ordered;
 }
-
-std::vector<float> Copy(std::span<const float> values) { return {values.begin(), values.end()}; }
 
 /// The layers that choose the torque. Leaves out a dueling network's value stream, which does not
 /// change the best torque, and keeps only a Gaussian's mean.
@@ -79,13 +78,9 @@ std::vector<float> EnergyConstants(const Plant& plant) {
   const double own2 = Energy(plant, {0, 0, 0, 1}) - hanging;   // w1 = 0, w1 + w2 = 1
   const double both = Energy(plant, {0, 0, 1, 0}) - hanging - own1 - own2;
   const double length = plant.length1 + plant.length2;
-  std::vector<float> constants;
-  for (const double constant :
-       {own1 / whole, own2 / whole, both / whole, (hanging + folded) / 2 / whole,
-        (hanging - folded) / 2 / whole, plant.length1 / length, plant.length2 / length}) {
-    constants.push_back(static_cast<float>(constant));
-  }
-  return constants;
+  return Floats(std::array{own1 / whole, own2 / whole, both / whole, (hanging + folded) / 2 / whole,
+                           (hanging - folded) / 2 / whole, plant.length1 / length,
+                           plant.length2 / length});
 }
 
 /// Adds the macros that the double pendulum's header needs.
@@ -107,11 +102,11 @@ void AddLayers(const std::vector<LayerView>& layers, const std::string& prefix, 
       parts.constants.push_back({name + what, comment, std::move(values)});
     };
     add("_weight", Concat(layer.out(), " x ", layer.in()), InBlocks(layer));
-    add("_bias", "", Copy(layer.b));
+    add("_bias", "", Floats(layer.b));
     std::string norm = "0, 0";
     if (layer.layer_norm()) {
-      add("_norm_weight", "", Copy(layer.gain));
-      add("_norm_bias", "", Copy(layer.norm_bias));
+      add("_norm_weight", "", Floats(layer.gain));
+      add("_norm_bias", "", Floats(layer.norm_bias));
       norm = Concat(array, "_norm_weight,\n   ", array, "_norm_bias");
     }
     const char activation = layer.activation == Activation::kRelu   ? 'r'
@@ -142,9 +137,8 @@ CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
   parts.task = policy.task;
   if (!policy.is_foreign()) AddPlant(loaded.plant, parts);
   if (policy.is_discrete()) {
-    parts.constants.push_back({"torques",
-                               policy.is_foreign() ? "" : "N m",
-                               {policy.torques().begin(), policy.torques().end()}});
+    parts.constants.push_back(
+        {"torques", policy.is_foreign() ? "" : "N m", Floats(policy.torques())});
   }
   AddLayers(layers, prefix, parts);
 
