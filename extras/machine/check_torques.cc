@@ -70,8 +70,8 @@ std::string DelayText(const std::vector<Response>& responses, const Response& be
     low = std::min(low, response.rows);
     high = std::max(high, response.rows);
   }
-  return fmt::format("{} row{}{}", best.rows, best.rows == 1 ? "" : "s",
-                     low < high ? fmt::format(" ({} to {})", low, high) : "");
+  const std::string rows = Counted(best.rows, "row");
+  return low < high ? fmt::format("{} ({} to {})", rows, low, high) : rows;
 }
 
 /// Reports a gain that no motor has; false if the gain is plausible.

@@ -77,12 +77,8 @@ Disturbance DisturbanceOf(const Twin& twin) {
 }
 
 std::string Quoted(std::string_view text) {
-  std::string quoted = "\"";
-  for (const char c : Printable(text)) {
-    if (c == '"' || c == '\\') quoted += '\\';
-    quoted += c;
-  }
-  return quoted + '"';
+  const std::string escaped = Replaced(Printable(text), "\\", "\\\\");
+  return Concat("\"", Replaced(escaped, "\"", "\\\""), "\"");
 }
 
 }  // namespace
@@ -187,11 +183,11 @@ std::string TwinText(const Twin& twin) {
   }
   if (twin.uncertain.empty()) return text;
   text += "\n[covariance]  # of the values with these names, in this order\n";
-  const size_t n = twin.uncertain.size();
-  for (size_t i = 0; i < n; ++i) {
+  for (const std::string& a : twin.uncertain) {
     std::vector<std::string> row;
-    for (size_t j = 0; j < n; ++j) row.push_back(FormatNumber(twin.covariance[i * n + j]));
-    text += Concat(twin.uncertain[i], " = [", Join(row, ", "), "]\n");
+    for (const std::string& b : twin.uncertain)
+      row.push_back(FormatNumber(CovarianceOf(twin, a, b)));
+    text += Concat(a, " = [", Join(row, ", "), "]\n");
   }
   return text;
 }

@@ -26,12 +26,7 @@ constexpr std::array kViridis{"#440154", "#48186a", "#472d7b", "#424086", "#3b52
 /// Quotes a text so that gnuplot takes it literally. Within single quotes, only the quote is
 /// special.
 std::string Quoted(const std::string& text) {
-  std::string quoted = "'";
-  for (const char c : Printable(text)) {
-    quoted += c;
-    if (c == '\'') quoted += c;
-  }
-  return quoted + "'";
+  return Concat("'", Replaced(Printable(text), "'", "''"), "'");
 }
 
 std::string Number(double x) { return std::isfinite(x) ? FormatNumber(x) : "NaN"; }
