@@ -45,22 +45,15 @@ static inline pendulum pendulum_derivative(const pendulum *s, double torque)
                     PENDULUM_DAMPING * s->w1;
   const double f2 = -bs * s->w1 * s->w1 - g2 - PENDULUM_DAMPING * s->w2;
   const double det = M11 * M22 - M12 * M12;
-  pendulum d;
-  d.q1 = s->w1;
-  d.q2 = s->w2;
-  d.w1 = (M22 * f1 - M12 * f2) / det;
-  d.w2 = (M11 * f2 - M12 * f1) / det;
+  const pendulum d = {s->w1, s->w2, (M22 * f1 - M12 * f2) / det, (M11 * f2 - M12 * f1) / det};
   return d;
 }
 
 /* a + h b */
 static inline pendulum pendulum_sum(const pendulum *a, double h, const pendulum *b)
 {
-  pendulum sum;
-  sum.q1 = a->q1 + h * b->q1;
-  sum.q2 = a->q2 + h * b->q2;
-  sum.w1 = a->w1 + h * b->w1;
-  sum.w2 = a->w2 + h * b->w2;
+  const pendulum sum = {a->q1 + h * b->q1, a->q2 + h * b->q2,
+                        a->w1 + h * b->w1, a->w2 + h * b->w2};
   return sum;
 }
 

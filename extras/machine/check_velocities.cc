@@ -74,10 +74,8 @@ std::string DifferenceOf(Pieces pieces, int joint) {
 
 /// Finds the largest velocity where the angle moves faster.
 void CheckVelocityLimit(Pieces pieces, int joint, const Reporter& report) {
-  double limit = 0;
-  for (const double v : ValuesOf(pieces, &MachineLog::velocity, joint)) {
-    limit = std::max(limit, std::abs(v));
-  }
+  const auto [low, high] = std::ranges::minmax(ValuesOf(pieces, &MachineLog::velocity, joint));
+  const double limit = std::max(std::abs(low), std::abs(high));
   constexpr int kRows = 5;
   std::optional<LogRows> longest;
   int times = 0;

@@ -64,11 +64,9 @@ void Add(const MachineLog& log, double period, int delays, Equations& all) {
         for (int j = 0; j < 2; ++j) impulse[d][j] += h * log.commanded[k - 1 - d][j];
       }
     }
-    all.left.push_back(left1);
-    all.left.push_back(left2);
+    all.left.insert(all.left.end(), {left1, left2});
     for (int d = 0; d < delays; ++d) {
-      all.right[d].push_back(impulse[d][0]);
-      all.right[d].push_back(impulse[d][1]);
+      all.right[d].insert(all.right[d].end(), impulse[d].begin(), impulse[d].end());
     }
   }
 }

@@ -45,11 +45,8 @@ void ExpectSame(const MachineLog& log, const HardwareReport& report, std::option
 }  // namespace
 
 ScoreScales HardwareScales(Robot robot, bool pushed) {
-  ScoreScales scales;
   const bool narrow = robot == Robot::kAcrobot && pushed;
-  scales.torque_cost = narrow ? 20 : 100;
-  scales.smoothness = narrow ? 1 : 4;
-  return scales;
+  return {.torque_cost = narrow ? 20.0 : 100.0, .smoothness = narrow ? 1.0 : 4.0};
 }
 
 Robot RobotIn(const MachineLog& log) {

@@ -326,9 +326,7 @@ int TrainMany(const ManyRuns& many) {
 }
 
 Comparison CompareRuns(const StudyPlan& plan) {
-  CompareRequest request;
-  request.root = plan.folder;
-  request.different_tasks = true;
+  CompareRequest request{.root = plan.folder, .different_tasks = true};
   for (const SeedRun& run : RunsOf(plan)) request.paths.push_back(run.path.string());
   return Compare(request);
 }

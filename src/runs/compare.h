@@ -11,10 +11,10 @@ namespace upswing {
 
 /// Which runs to compare.
 struct CompareRequest {
-  std::vector<std::string> paths;   // runs or folders of runs, at any depth
-  std::filesystem::path root = {};  // base folder of variants' names; empty: each of `paths`
-  bool unfinished = false;          // include runs that are not finished
-  bool different_tasks = false;     // also compare groups evaluated on different tasks
+  std::vector<std::string> paths = {};  // runs or folders of runs, at any depth
+  std::filesystem::path root = {};      // base folder of variants' names; empty: each of `paths`
+  bool unfinished = false;              // include runs that are not finished
+  bool different_tasks = false;         // also compare groups evaluated on different tasks
 };
 
 /// Figures of groups of runs and of pairs of groups.
