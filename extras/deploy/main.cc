@@ -6,11 +6,14 @@ namespace upswing::deploy {
 void AddExport(CommandLine& line);
 void AddDemo(CommandLine& line);
 
+namespace {
+
+constexpr Command kCommands[] = {{"export", AddExport}, {"demo", AddDemo}};
+
+}  // namespace
 }  // namespace upswing::deploy
 
 // An exception during the report of another one ends the program.
 int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
-  using namespace upswing::deploy;
-  constexpr upswing::Command kCommands[] = {{"export", AddExport}, {"demo", AddDemo}};
-  return upswing::MainProgram(argc, argv, kCommands);
+  return upswing::MainProgram(argc, argv, upswing::deploy::kCommands);
 }

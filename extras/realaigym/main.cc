@@ -5,10 +5,14 @@ namespace upswing::realaigym {
 // Each has a file *_command.cc.
 void AddRealAiGym(CommandLine& line);
 
+namespace {
+
+constexpr Command kCommands[] = {{"realaigym", AddRealAiGym}};
+
+}  // namespace
 }  // namespace upswing::realaigym
 
 // An exception during the report of another one ends the program.
 int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
-  constexpr upswing::Command kCommands[] = {{"realaigym", upswing::realaigym::AddRealAiGym}};
-  return upswing::MainProgram(argc, argv, kCommands);
+  return upswing::MainProgram(argc, argv, upswing::realaigym::kCommands);
 }
