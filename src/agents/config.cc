@@ -46,10 +46,12 @@ void Config::DescribeEnvironment(Options& o) {
         "share of training episodes that start in a random state instead of hanging");
   o.Add(&random_start_velocity, "random_start_velocity", {0, 50}, "rad/s",
         "largest velocity of random start states");
-  o.Add(&random_start_drive, "random_start_drive", {0, 10}, "s",
-        "time for which motors at both joints drive the links to a random pose after an episode; a "
-        "random start is where this ends; 0: random angles and velocities")
-      .implied = true;
+  Option& drive = o.Add(
+      &random_start_drive, "random_start_drive", {0, 10}, "s",
+      "time for which motors at both joints drive the links towards a random pose before a random "
+      "start, in place of random angles and velocities; 0: none");
+  drive.step = kControlPeriod;
+  drive.implied = true;
   o.Add(&memory, "memory", {0, kMostMemory}, "steps",
         "number of past steps whose torque and velocity changes the agent observes");
   o.Add(&identify, "identify",
@@ -94,7 +96,10 @@ EnvConfig Config::Environments() const {
   env.memory = static_cast<int>(memory);
   if (identify) env.identified_from = plant;
   env.any_pose = any_pose;
-  env.start = {train.start_noise, random_start_share, random_start_velocity, random_start_drive};
+  env.start = {.noise = train.start_noise,
+               .random_share = random_start_share,
+               .random_velocity = random_start_velocity,
+               .random_drive = random_start_drive};
   env.reward = reward;
   env.seed = static_cast<uint64_t>(train.seed);
   env.stream = "training environment";

@@ -325,6 +325,26 @@ TEST_P(PendulumEnvs, StartsAreHangingWithNoiseOrAnywhere) {
   EXPECT_NEAR(std::sqrt(square / (config.num_envs - anywhere)), 0.1, 0.01);
 }
 
+TEST_P(PendulumEnvs, ADriveBeginsWhereTheLastEpisodeEnded) {
+  PendulumEnvConfig config = SmallConfig();
+  config.start = {.random_share = 1, .random_drive = 0.2};
+  PendulumEnv env(config), same(config);
+  StepResult result = env.MakeResult();
+  const std::vector<double> torque{1, -2, 3};
+  for (int step = 0; step < 4; ++step) env.Step(torque, result);
+  // Joint 2 of environment 0 has turned twice; in environment 1, backwards.
+  env.SetState(0, {std::numbers::pi, 4 * std::numbers::pi, 0, 0});
+  env.SetState(1, {std::numbers::pi, -4 * std::numbers::pi, 0, 0});
+  for (int step = 0; step < 5; ++step) env.Step(torque, result);
+  EXPECT_EQ(result.truncated[0] + result.truncated[1], 2);
+  EXPECT_LT(env.state(0).w2, -5);
+  EXPECT_GT(env.state(1).w2, 5);
+  // With a seed, it begins as in a new set of environments.
+  env.Restart(0, config.seed);
+  EXPECT_EQ(env.state(0).w2, same.state(0).w2);
+  ExpectLoadedGoesOn(config, 7);
+}
+
 TEST_P(PendulumEnvs, EpisodesWithGoalsBeginInAnotherPoseOrAnywhere) {
   PendulumEnvConfig config = Config();
   config.num_envs = 4800;

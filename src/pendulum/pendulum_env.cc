@@ -139,7 +139,7 @@ void PendulumEnv::Reset(int env) {
 
 void PendulumEnv::Restart(int env, std::optional<uint64_t> seed) {
   if (seed) {
-    physics_->SetState(env, {});
+    physics_->SetState(env, {});  // a drive begins here, and not where an earlier episode ended
     const auto i = static_cast<size_t>(env);
     rngs_[i] = Rng(*seed, config_.stream);
     if (!plants_.empty()) plant_rngs_[i] = Rng(*seed, PlantStream(config_.stream));

@@ -54,8 +54,8 @@ struct PendulumEnvConfig : PhysicsConfig {
 EnvSpec PendulumSpec(const PendulumEnvConfig& config);
 
 /// N double pendulums and their episodes. Reaching the time limit truncates; only a numerical
-/// blow-up (see Physics::Step) terminates. The start states do not depend on the physics,
-/// unless a drive makes them.
+/// blow-up (see Physics::Step) terminates. The start states do not depend on physics and
+/// actions, unless a drive leads to them.
 ///
 /// With randomised plants, observation and reward use the plant of the episode. With disturbances,
 /// observations hold what the sensors measure, and motors apply the delayed torque. State, reward
@@ -98,8 +98,6 @@ class PendulumEnv : public VectorEnv {
   void Push(int env, const std::array<double, 2>& torque) { physics_->Push(env, torque); }
   /// Begins an episode of an environment in a state.
   void SetState(int env, const PendulumState& state);
-  /// Sets the goal of the episode that SetState then begins; only with any_pose.
-  void SetGoal(int env, const Pose& goal) { builder_.SetGoal(env, goal); }
 
  private:
   void Reset(int env);

@@ -11,18 +11,22 @@ struct StartStates {
   double noise = 0.1;          // standard deviation, rad and rad/s
   double random_share = 0;     // share of episodes that begin in a random state
   double random_velocity = 5;  // bound of the uniform velocities of random states, rad/s
-  // With a time (s), a random state is where DriveToPose ends, from the last episode's end.
+  // Seconds of DriveToPose before each random start, which then replaces uniform angles and
+  // velocities; 0: none.
   double random_drive = 0;
 
   PendulumState Hanging(Rng& rng) const;
-  /// `last`: the state in which the episode before ended; hanging before the first.
+  /// `last`: the state at the end of the episode before; hanging before the first.
   PendulumState Random(const Plant& plant, const PendulumState& last, Rng& rng) const;
 };
 
-/// The state after motors at both joints have driven the links from `s` towards a random pose for
-/// `seconds`, as RealAIGym's resets do. Each motor has the plant's torque limit, and holds the
-/// links against gravity besides. A joint that has turned is turned back, as if it had turned at
-/// most 2.5 times. A state that has blown up counts as hanging.
-PendulumState DriveToPose(const Plant& plant, PendulumState s, double seconds, Rng& rng);
+/// The state after motors at both joints have driven the links for `seconds` towards a random pose
+/// in [-π, π]. Proportional and derivative torques stay within the plant's torque limit; the torque
+/// that holds the links against gravity comes on top. The gains in units of the limit are those of
+/// RealAIGym's resets (docs/howto/realaigym.md), without the integral.
+///
+/// Angles are not wrapped: a joint that has turned is turned back. Five turns count as none. Before
+/// and after the drive, a state that is faster than 200 rad/s is replaced by hanging at rest.
+PendulumState DriveToPose(const Plant& plant, const PendulumState& from, double seconds, Rng& rng);
 
 }  // namespace upswing
