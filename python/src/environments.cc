@@ -144,13 +144,14 @@ class Environments {
     });
   }
 
-  /// Begins an episode of an environment in a state (q1, q2, w1, w2) with a pose as the goal. Other
-  /// names of goals keep the present one.
-  void SetStart(int env, const std::array<double, 4>& s, const std::string& goal) {
+  /// Begins an episode of an environment in a state (q1, q2, w1, w2), or as drawn, with the goal of
+  /// this name, or as drawn.
+  void SetStart(int env, const std::optional<std::array<double, 4>>& s,
+                const std::optional<std::string>& goal) {
     Alone([&] {
-      const auto* const pose = std::ranges::find(kPoses, goal, PoseName);
-      if (pose != kPoses.end()) env_.SetGoal(env, *pose);
-      env_.SetState(env, {s[0], s[1], s[2], s[3]});
+      // Episodes are drawn until one has the goal, so that it begins as others with this goal do.
+      while (goal && PoseName(*env_.goal(env)) != *goal) env_.Restart(env, {});
+      if (s) env_.SetState(env, {(*s)[0], (*s)[1], (*s)[2], (*s)[3]});
       ShowStart(env);
     });
   }
@@ -278,7 +279,8 @@ void BindEnvironments(nb::module_& m) {
       .def("reset", &Environments::Reset, nb::arg("seeds"), nb::arg("mask"))
       .def("spec", &DescribeTask)
       .def("get_state", &Environments::State, nb::arg("env"))
-      .def("set_start", &Environments::SetStart, nb::arg("env"), nb::arg("state"), nb::arg("goal"))
+      .def("set_start", &Environments::SetStart, nb::arg("env"), nb::arg("state").none(),
+           nb::arg("goal").none())
       .def("goal", &Environments::Goal, nb::arg("env"))
       .def(
           "plant", [](Environments& self, int env) { return PlantDict(self.PlantOf(env)); },

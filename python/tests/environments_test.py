@@ -356,8 +356,8 @@ class BadInput(BadInputTest):
         self.refuse("goal: expected an environment with any_pose",
                     lambda: env.reset(options={"goal": "up-down"}))
         env = upswing.DoublePendulumEnv(any_pose=True)
-        for goal in ("up", "", 3, ["up-up", "up-up"], [["up-up"]]):
-            self.refuse("goal: expected up-up, up-down, down-up, down-down, or a list of 1",
+        for goal in ("up", "", 3, np.array(3), ["up-up", "up-up"], [["up-up"]], [None]):
+            self.refuse("goal: expected up-up, up-down, down-up, down-down",
                         lambda goal=goal: env.reset(options={"goal": goal}))
 
 

@@ -64,6 +64,10 @@ class Policies(unittest.TestCase):
                 self.assertEqual(tuple(obs[8:]), goal)
             self.assertTrue(info["at_goal"])
         self.assertEqual(goals, {(1, 1), (1, -1), (-1, 1), (-1, -1)})
+        for seed in range(12):  # an episode begins in another pose than its goal
+            obs, _ = env.reset(seed=seed, options={"goal": np.array("down-down")})
+            self.assertEqual(tuple(obs[8:]), (-1, -1))
+            self.assertLess(min(np.cos(env.unwrapped.state[0]), np.cos(env.unwrapped.state[:2].sum())), 0)
         start = [np.pi, 0, 0, 0]
         obs, _ = env.reset(options={"state": start, "goal": "up-down"})
         np.testing.assert_array_equal(env.unwrapped.state, start)

@@ -160,7 +160,7 @@ class Vector(unittest.TestCase):
         np.testing.assert_array_equal(envs.states[1], [3, 0, 1, 0])
         envs = make(any_pose=True)
         goals = envs.reset(seed=0)[0][:, 8:].copy()
-        obs, _ = envs.reset(options={"goal": ["up-up", "up-down", "down-up"], "reset_mask": mask})
+        obs, _ = envs.reset(options={"goal": ["up-up", None, "down-up"], "reset_mask": mask})
         np.testing.assert_array_equal(obs[:, 8:], [[1, 1], goals[1], [-1, 1]])
         for bad in ([True] * 2, np.array([1, 0, 1]), np.zeros(3, bool)):
             with self.assertRaises(upswing.InputError):

@@ -118,23 +118,26 @@ class Core:
                     f"({size},) or ({n}, {size}), got shape {np.shape(states)}") from None
             if not np.isfinite(states[mask]).all():
                 raise _upswing.InputError("state: expected finite numbers, got others")
-        names = [""] * n if goals is None else self.goals_of(goals)
+        chosen = np.flatnonzero(mask).tolist()
+        names = [None] * n if goals is None else self.goals_of(goals, chosen)
         self.env.reset(seeds, mask.astype(np.uint8).tolist())
         if states is not None or goals is not None:
-            for i in np.flatnonzero(mask).tolist():
-                state = self.env.get_state(i) if states is None else states[i].tolist()
-                self.env.set_start(i, state, names[i])
+            for i in chosen:
+                self.env.set_start(i, None if states is None else states[i].tolist(), names[i])
         self.is_reset = True
 
-    def goals_of(self, goals: Any) -> list[str]:
-        """The name of a pose for each environment."""
+    def goals_of(self, goals: Any, chosen: list[int]) -> list[Any]:
+        """A goal for each environment. A chosen environment needs the name of a pose."""
         if not self.goals:
             raise _upswing.InputError("goal: expected an environment with any_pose=True")
-        names = [goals] * self.num_envs if isinstance(goals, str) else goals
-        if (not isinstance(names, (list, tuple, np.ndarray)) or len(names) != self.num_envs
-                or not all(isinstance(name, str) and name in self.goals for name in names)):
-            raise _upswing.InputError(f"goal: expected {', '.join(self.goals)}, or a list of "
-                                      f"{self.num_envs} of them, got {goals!r}")
+        names = goals.tolist() if isinstance(goals, np.ndarray) else goals
+        names = [names] * self.num_envs if isinstance(names, str) else names
+        expected = f"goal: expected {', '.join(self.goals)}"
+        if not isinstance(names, (list, tuple)) or len(names) != self.num_envs:
+            raise _upswing.InputError(f"{expected}, or a list of {self.num_envs} of them")
+        for i in chosen:
+            if not isinstance(names[i], str) or names[i] not in self.goals:
+                raise _upswing.InputError(f"{expected}, got {names[i]!r}")
         return list(names)
 
     def states(self) -> npt.NDArray[np.float64]:

@@ -46,7 +46,8 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
         width, height: size of pictures [pixels]
         **settings: settings of the environment with the defaults of a training, the ones with
             `environment` in `upswing.settings()`: agent, which sets the defaults; physics ("mujoco"
-            or "closed-form"), episode_seconds, random_start_share, start_noise, memory, any_pose; the plant
+            or "closed-form"), episode_seconds, random_start_share, random_start_drive,
+            start_noise, memory, any_pose; the plant
             (mass1, …, torque_limit, actuated_joint, rotor_inertia, gear_ratio, coulomb1, coulomb2,
             center1, center2, inertia1, inertia2, armature); plant, a plant file (TOML with a
             table [plant]) or a shipped plant such as "realaigym", which these change; sensor_noise, delay, encoder_counts, velocity_window, velocity_filter,
@@ -89,7 +90,7 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
         Args:
             seed: seed of this and the following episodes; None continues the random stream
             options: {"state": [q1, q2, w1, w2]} [rad, rad/s] sets the start state; with any_pose,
-                {"goal": "up-down"} sets the goal, link 1 first
+                {"goal": "up-down"} sets the goal of this episode, link 1 first
 
         Returns:
             Observation (D,), float32, and info
@@ -259,7 +260,8 @@ class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArra
             seed: seed s for the seeds s, s + 1, …, or one seed per environment; None continues the
                 random streams
             options: {"state": q1, q2, w1, w2 [rad, rad/s]}, (4,) or (N, 4), sets the start states;
-                with any_pose, {"goal": a pose such as "up-down", or N poses} sets the goals;
+                with any_pose, {"goal": a pose such as "up-down", or N poses} sets the goals of
+                these episodes;
                 {"reset_mask": bools (N,)} selects the environments to reset
 
         Returns:
