@@ -185,8 +185,9 @@ std::string TwinText(const Twin& twin) {
   text += "\n[covariance]  # of the values with these names, in this order\n";
   for (const std::string& a : twin.uncertain) {
     std::vector<std::string> row;
-    for (const std::string& b : twin.uncertain)
+    for (const std::string& b : twin.uncertain) {
       row.push_back(FormatNumber(CovarianceOf(twin, a, b)));
+    }
     text += Concat(a, " = [", Join(row, ", "), "]\n");
   }
   return text;
