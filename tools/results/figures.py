@@ -119,7 +119,7 @@ def svg(fig):
     light, dark = (";".join(f"--{name}:{colors[k]}" for name, colors in VARIABLES.items()) for k in (1, 2))
     rule = f"svg{{{light}}}\n@media (prefers-color-scheme:dark){{svg{{{dark}}}}}\n"
     text = text.replace("</style>", f"\n{rule}</style>", 1)
-    text = text.replace("</svg>", getattr(fig, "film", "") + "</svg>")
+    text = text.replace("</svg>", getattr(fig, "film", "") + "</svg>")  # a figure's moving parts
     return "\n".join(line.rstrip() for line in text.splitlines()) + "\n"
 
 
@@ -252,36 +252,40 @@ def poses():
 
 @figure("board")
 def board():
-    """A film: a run of 60 s of each robot of RealAIGym, and the time in which its tip is high."""
+    """A film: a run of 60 s of each robot of RealAIGym, and the time in which its tip is high.
+
+    Its data are every 20th row of `realaigym score runs/AGENT-seed21 --csv`; `reset` is 1 where both motors act."""
     import numpy as np
-    fig, motions, lengths = canvas(800, 405), {}, {"link1": 60, "link2": 90}  # pixels
+    fig, motions = canvas(800, 405), {}
+    lengths = {"link1": 60, "link2": 90}  # pixels
+    line = 0.9 * sum(lengths.values())
     for row in data_of(CSV / "board.csv"):
         motions.setdefault(row["robot"], []).append([float(row[name]) for name in ("t", "q1", "q2", "reset")])
-    fig.film = ""
+
+    def animated(kind, values):
+        return (f'<animateTransform attributeName="transform" type="{kind}" values="{values}" dur="60s" '
+                f'repeatCount="indefinite"/>')
+
+    fig.film = ""  # svg() adds it: matplotlib does not animate
     for x, (robot, motion) in zip((200, 600), motions.items()):
         t, q1, q2, resets = np.array(motion).T
-        high = -lengths["link1"] * np.cos(q1) - lengths["link2"] * np.cos(q1 + q2) > 135
-        note(fig, x, 14, f"{robot}: high for {high.mean():.0%} of {t[-1]:.0f} s", ha="center", color=INK)
+        high = -lengths["link1"] * np.cos(q1) - lengths["link2"] * np.cos(q1 + q2) > line
+        note(fig, x, 14, f"{robot}: high for {high.mean():.0%} of 60 s", ha="center", color=INK)
         stage = panel(fig, x - 180, 30, 360, 320, xlim=(-180, 180), ylim=(-160, 160))
-        stage.axhline(135, color=MUTED, linewidth=1, linestyle=(0, (4, 4)))
+        stage.axhline(line, color=MUTED, linewidth=1, linestyle=(0, (4, 4)))
         stage.set_axis_off()
-        bar = panel(fig, x - 180, 360, 360, 14, xlim=(0, t[-1]), ylim=(0, 1), yticks=[])
+        bar = panel(fig, x - 180, 360, 360, 14, xlim=(0, 60), ylim=(0, 1), xticks=[0, 20, 40, 60], yticks=[])
         bar.grid(visible=False)
         for active, color in ((high, TORQUE), (resets == 1, MUTED)):
             edges = t[np.flatnonzero(np.diff(np.r_[False, active, False])).clip(max=len(t) - 1)]
             bar.broken_barh([(begin, end - begin) for begin, end in edges.reshape(-1, 2)], (0, 1), color=color, linewidth=0)
-
-        def animated(kind, values):
-            return (f'<animateTransform attributeName="transform" type="{kind}" values="{values}" '
-                    f'dur="{t[-1]:.0f}s" repeatCount="indefinite"/>')
-
-        body = ""
-        for (link, length), q in reversed([*zip(lengths.items(), (q1, q2))]):
-            body = (f'<g>{animated("rotate", ";".join(f"{angle:.0f}" for angle in -np.degrees(q)))}<line y2="{length}" '
-                    f'stroke="var(--{link})" stroke-width="9" stroke-linecap="round"/>'
-                    f'<g transform="translate(0 {length})">{body}</g></g>')
-        fig.film += (f'<g transform="translate({x} 190)">{body}</g><path d="M{x - 180} 356v22" stroke="var(--ink)" '
-                     f'stroke-width="2">{animated("translate", "0;360")}</path>')
+        arm = ""
+        for link, q in (("link2", q2), ("link1", q1)):  # link 2 hangs on link 1
+            length, degrees = lengths[link], ";".join(f"{angle:.0f}" for angle in -np.degrees(q))
+            arm = (f'<g>{animated("rotate", degrees)}<line y2="{length}" style="stroke:var(--{link});stroke-width:9;'
+                   f'stroke-linecap:round"/><g transform="translate(0 {length})">{arm}</g></g>')
+        fig.film += (f'<g transform="translate({x} 190)">{arm}</g><path d="M{x - 180} 356v22" style="stroke:var(--ink);'
+                     f'stroke-width:2">{animated("translate", "0;360")}</path>')
     return fig
 
 
