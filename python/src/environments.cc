@@ -90,9 +90,7 @@ class Environments {
   int threads() const { return pool_.threads(); }
   /// Names of the goals that episodes may have; none if they are always upright.
   std::vector<std::string> goals() const {
-    std::vector<std::string> names;
-    if (config_.any_pose) std::ranges::transform(kPoses, std::back_inserter(names), PoseName);
-    return names;
+    return config_.any_pose ? PoseNames() : std::vector<std::string>();
   }
   /// Results of the last step; `next_obs` has the successors, even in ended episodes.
   const StepResult& result() const { return result_; }

@@ -5,6 +5,7 @@
 
 #include "base/options.h"
 #include "base/text.h"
+#include "pendulum/goal.h"
 #include "pendulum/physics.h"
 
 /// Arguments shared by several commands and by the Python functions of the same names. Each has its
@@ -23,7 +24,7 @@ inline void DescribeThreads(Options& o, int64_t* threads) {
 
 /// Argument "goal": the name of a pose.
 inline void DescribeGoal(Options& o, std::string* goal) {
-  o.AddChoice(goal, "goal", {"up-up", "up-down", "down-up", "down-down"},
+  o.AddChoice(goal, "goal", PoseNames(),
               "pose that a policy for any pose is to reach, link 1 first; `eval` then starts "
               "hanging")
       .usual = "up-up; each episode of `eval` draws its own";

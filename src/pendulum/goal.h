@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 #include <string>
+#include <vector>
 
 #include "base/text.h"
 #include "pendulum/task.h"
@@ -24,6 +25,13 @@ inline constexpr std::array<Pose, 4> kPoses{Pose{true, true}, Pose{true, false},
 /// The name of a pose, such as "up-down": link 1 up, link 2 down.
 inline std::string PoseName(const Pose& pose) {
   return Concat(pose.up1 ? "up-" : "down-", pose.up2 ? "up" : "down");
+}
+
+/// The names of all poses, in the order of kPoses.
+inline std::vector<std::string> PoseNames() {
+  std::vector<std::string> names;
+  for (const Pose& pose : kPoses) names.push_back(PoseName(pose));
+  return names;
 }
 
 /// The state with its angles measured from `pose` in place of upright: rest in the pose becomes
