@@ -9,13 +9,17 @@
 #include "pendulum/runge_kutta.h"
 
 namespace upswing {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+}  // namespace
 
 PendulumState StartStates::Hanging(Rng& rng) const {
   return {noise * rng.Normal(), noise * rng.Normal(), noise * rng.Normal(), noise * rng.Normal()};
 }
 
 PendulumState StartStates::Random(const Plant& plant, const PendulumState& last, Rng& rng) const {
-  constexpr double kPi = std::numbers::pi;
   if (random_drive > 0) return DriveToPose(plant, last, random_drive, rng);
   return {rng.Uniform(-kPi, kPi), rng.Uniform(-kPi, kPi),
           rng.Uniform(-random_velocity, random_velocity),
@@ -23,15 +27,13 @@ PendulumState StartStates::Random(const Plant& plant, const PendulumState& last,
 }
 
 PendulumState DriveToPose(const Plant& plant, const PendulumState& from, double seconds, Rng& rng) {
-  constexpr double kPi = std::numbers::pi;
-  constexpr double kStep = 0.002;  // s
-  constexpr double kTurns = 5;     // an angle after five turns is the same
-  constexpr double kFarthest = 1e6, kFastest = 200;  // rad, rad/s; beyond, a state has blown up
-  constexpr double kFullError = 0.6;                 // rad, at which a motor has its full torque
-  constexpr double kFullVelocity = 3;                // rad/s, the same
-  const auto usable = [](const PendulumState& s) {   // false of NaN
-    return std::abs(s.q1) + std::abs(s.q2) < kFarthest &&
-           std::abs(s.w1) + std::abs(s.w2) < kFastest;
+  constexpr double kStep = 0.002;      // s
+  constexpr double kTurns = 5;         // an angle after five turns is the same
+  constexpr double kFastest = 200;     // rad/s; a faster state has blown up
+  constexpr double kFullError = 0.6;   // rad, at which a motor has its full torque
+  constexpr double kFullVelocity = 3;  // rad/s, the same
+  const auto usable = [](const PendulumState& s) {
+    return std::abs(s.w1) + std::abs(s.w2) < kFastest;  // false of NaN
   };
   const Manipulator body = ManipulatorOf(plant);
   const double limit = plant.torque_limit;

@@ -26,7 +26,7 @@ struct StartStates {
 /// RealAIGym's resets (docs/howto/realaigym.md), without the integral.
 ///
 /// Angles are not wrapped: a joint that has turned is turned back. Five turns count as none. Before
-/// and after the drive, a state that is faster than 200 rad/s is replaced by hanging at rest.
+/// and after the drive, hanging at rest replaces a state with |w1| + |w2| beyond 200 rad/s.
 PendulumState DriveToPose(const Plant& plant, const PendulumState& from, double seconds, Rng& rng);
 
 }  // namespace upswing
