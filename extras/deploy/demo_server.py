@@ -15,6 +15,7 @@ import sys
 sys.path = [place for place in sys.path if place]  # no modules from the present folder
 
 # pylint: disable=wrong-import-position
+import contextlib  # noqa: E402
 import errno  # noqa: E402
 import gzip  # noqa: E402
 import hashlib  # noqa: E402
@@ -216,8 +217,9 @@ def main():
     server = listen()
     compress_all(FOLDERS[0])
     threading.Thread(target=server.serve_forever, daemon=True).start()
-    print(server.server_address[1], flush=True)
-    sys.stdin.buffer.read()  # until the program ends
+    with contextlib.suppress(ConnectionError):
+        os.write(sys.stdout.fileno(), b"%d\n" % server.server_address[1])
+        sys.stdin.buffer.read()  # until the program ends
 
 
 main()

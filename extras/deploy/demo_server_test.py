@@ -4,6 +4,7 @@
 import gzip
 import os
 import re
+import select
 import socket
 import subprocess
 import sys
@@ -214,6 +215,21 @@ class Server(ProgramTest):
                          (1, f"upswing: port {port} is already in use\n"))
         self.connect(port)  # an open connection does not delay the end
         self.assertEqual(self.stop(first), (0, ""))
+
+    def test_ends_silently_after_the_program(self):
+        """However the connection ends: before the port is written, or with the port unread."""
+        for waits in (False, True):
+            with self.subTest(waits=waits):
+                ours, its = socket.socketpair()
+                if not waits:
+                    ours.close()
+                server = subprocess.Popen([sys.executable, "-c", PROGRAM, f"15\n4173\n65535\n{self.page}"],
+                                          stdin=its, stdout=its, stderr=subprocess.PIPE)
+                its.close()
+                if waits:
+                    select.select([ours], [], [], 60)
+                    ours.close()
+                self.assertEqual((server.communicate()[1], server.returncode), (b"", 0))
 
     def test_modules_of_the_present_folder_are_not_read(self):
         (self.folder / "gzip.py").write_text("raise SystemExit('imported')\n", encoding="utf-8")

@@ -405,13 +405,13 @@ class Episodes:
                 return  # the motion diverged, and the program has started again
 
     def _ask(self, steps: float, pulls: Sequence[float]) -> None:
-        try:
-            print(steps, *pulls, flush=True)
-        except BrokenPipeError:
-            sys.exit(0)  # the program has ended
-        line = sys.stdin.readline()
+        request = " ".join(map(str, (steps, *pulls))) + "\n"
+        line = ""
+        with contextlib.suppress(ConnectionError):
+            os.write(sys.stdout.fileno(), request.encode())  # print could leave a rest to write at the end
+            line = sys.stdin.readline()
         if not line:
-            sys.exit(0)
+            sys.exit(0)  # the program has ended
         self.steps, *numbers = map(float, line.split())
         table = np.reshape(numbers, (len(self.names), 5))
         self.scene.show(table[:, :4], table[:, 4].tolist(), self.steps)

@@ -3,8 +3,10 @@
 
 import csv
 import os
+import select
 import shutil
 import signal
+import socket
 import subprocess
 import time
 import unittest
@@ -151,6 +153,25 @@ class Recordings(ViewTest):
             said, _ = process.communicate()
         self.assertEqual((process.returncode, said), (143, b""))
         self.assertEqual(list(self.folder.iterdir()), [])
+
+    def test_the_drawing_program_ends_silently_after_the_program(self):
+        """However the connection ends: before a request, before its answer, or with the request unread."""
+        run("view", "--record", "a.png", "--size", "32x24", cwd=self.folder,
+            env=self.script('#!/bin/sh\nprintf %s "$3" >job\n'))
+        job = (self.folder / "job").read_text(encoding="utf-8")
+        for reads, waits in ((0, False), (4096, True), (0, True)):
+            with self.subTest(reads=reads, waits=waits):
+                ours, its = socket.socketpair()
+                if not waits:
+                    ours.close()
+                drawer = subprocess.Popen([PYTHON, ROOT / "python/upswing/_view.py", job], cwd=self.folder,
+                                          stdin=its, stdout=its, stderr=subprocess.PIPE)
+                its.close()
+                if waits:
+                    select.select([ours], [], [], PATIENCE)
+                    ours.recv(reads)
+                    ours.close()
+                self.assertEqual((drawer.communicate()[1], drawer.returncode), (b"", 0))
 
     def test_something_is_missing(self):
         environment = {name: text for name, text in os.environ.items()
