@@ -1,7 +1,7 @@
 # shellcheck shell=sh
 # ./upswing docs: builds the documentation. Read by ./upswing, whose functions it uses, after
 # tools/web.sh and tools/demo.sh.
-: "${root:?}" "${setup:?}" "${program:?}" "${page:?}" "${packages:?}"
+: "${root:?}" "${setup:?}" "${program:?}" "${page:?}" "${packages:?}" "${python:?}"
 
 docs=$root/build/docs
 docs_venv=$root/build/docs-venv
@@ -52,7 +52,7 @@ docs() {
   [ -f "$docs/index.html" ] || fail "the documentation is not built: run ./upswing docs once" \
     "without --no-setup"
   case $action in
-    serve) exec python3 -B "$root/tools/docs.py" serve "$docs" ;;
+    serve) exec "$python" -B "$root/tools/docs.py" serve "$docs" ;;
     site) add_page && write_site ;;
     build) echo "$docs/index.html: the documentation; to look at it: ./upswing docs --serve" ;;
   esac
@@ -75,7 +75,7 @@ set_site() {
 set_up_docs() {
   # shellcheck disable=SC2086  # a list of words
   (install_packages $packages doxygen && lock &&
-    make_venv "the documentation" "$docs_venv" python3 tools/docs-requirements.txt) </dev/null || exit 1
+    make_venv "the documentation" "$docs_venv" tools/docs-requirements.txt) </dev/null || exit 1
 }
 
 build_docs() {
@@ -104,7 +104,7 @@ write_site() {
   trap 'exit 130' INT
   trap 'exit 143' TERM
   { cp -R "$page/." "$tmp" && cp -R "$docs" "$tmp/docs" &&
-    python3 -B "$root/tools/docs.py" join "$tmp" &&
+    "$python" -B "$root/tools/docs.py" join "$tmp" &&
     # GitHub Pages leaves out folders such as _static unless this file is there.
     : >"$tmp/.nojekyll"; } || fail "could not copy the site (see above)"
   chmod =rwx "$tmp" # mode from the umask

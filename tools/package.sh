@@ -1,7 +1,7 @@
 # shellcheck shell=sh
 # ./upswing package: builds packages for people without a compiler. Read by ./upswing, whose functions it
 # uses, after tools/web.sh, tools/demo.sh and tools/docs.sh.
-: "${root:?}" "${setup:?}" "${packages:?}"
+: "${root:?}" "${setup:?}" "${packages:?}" "${python:?}"
 
 package_usage() {
   cat <<'END_OF_USAGE'
@@ -60,7 +60,7 @@ package() {
   # Check before a build of ten minutes.
   # shellcheck disable=SC2086  # lists of words
   (install_packages $packages && cd "$root" &&
-    exec python3 -B tools/package/package.py $kinds --check $changes) </dev/null || exit 2
+    exec "$python" -B tools/package/package.py $kinds --check $changes) </dev/null || exit 2
   set_up_docs
   # shellcheck disable=SC2046  # a list of words
   set_up release upswing $(extra_programs)
@@ -76,7 +76,7 @@ package() {
 
 # Installs the tools for the SBOM and the wheels.
 set_up_package() {
-  (lock && make_venv "packages" "$root/build/package/venv" python3 tools/package/requirements.txt) \
+  (lock && make_venv "packages" "$root/build/package/venv" tools/package/requirements.txt) \
     </dev/null || exit 1
 }
 

@@ -1,7 +1,7 @@
 # shellcheck shell=sh
 # ./upswing python: a virtual environment with the package upswing. Read by ./upswing, whose functions
 # it uses.
-: "${root:?}" "${setup:?}"
+: "${root:?}" "${setup:?}" "${packages:?}"
 
 python_venv=$root/build/python-venv
 
@@ -20,24 +20,9 @@ Examples:
 END_OF_USAGE
 }
 
-# Prints a Python that modules can be built for: 3.10 or newer, with its headers.
-find_base_python() {
-  for base in python3 /usr/bin/python3; do
-    "$base" - 2>/dev/null <<'END' || continue
-import pathlib, sys, sysconfig, venv, ensurepip
-header = pathlib.Path(sysconfig.get_path("include"), "Python.h")
-sys.exit(not (sys.version_info >= (3, 10) and header.exists()))
-END
-    "$base" -c 'import sys; print(sys.executable)'
-    return
-  done
-  return 1
-}
-
 # Makes the virtual environment, which has the package as it is built.
 make_python_venv() {
-  base=$(find_base_python) || fail "no Python 3.10 or newer with its headers (Debian's python3-dev)"
-  make_venv Python "$python_venv" "$base" tools/python-requirements.txt "$root/build/release/python"
+  make_venv Python "$python_venv" tools/python-requirements.txt "$root/build/release/python"
 }
 
 # Lets the release build have the package too.
@@ -53,7 +38,7 @@ configure_python() {
 
 # Installs what the package needs and readies the build for it.
 set_up_python() {
-  find_base_python >/dev/null || packages="$packages python3-dev"
+  packages="$packages python3-dev" # the headers for the module
   # shellcheck disable=SC2086  # a list of words
   (install_packages $packages && lock && make_python_venv && configure_python) </dev/null || exit 1
 }

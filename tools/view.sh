@@ -1,6 +1,6 @@
 # shellcheck shell=sh
 # ./upswing view: a virtual environment with MuJoCo's viewer. Read by ./upswing, whose functions it uses.
-: "${root:?}" "${setup:?}" "${packages:?}"
+: "${root:?}" "${setup:?}" "${packages:?}" "${python:?}"
 
 # set_up_view ARGUMENTS: installs the libraries and Python packages that draw, unless ARGUMENTS ask for help,
 # and names the Python to the program. UPSWING_PYTHON names another one.
@@ -13,7 +13,7 @@ set_up_view() {
   packages="$packages libegl1 libgl1 libgl1-mesa-dri"
   if [ "$setup" = yes ]; then
     # shellcheck disable=SC2086  # a list of words
-    (install_packages $packages && lock && make_venv view "$venv" python3 tools/view-requirements.txt) \
+    (install_packages $packages && lock && make_venv view "$venv" tools/view-requirements.txt) \
       </dev/null || exit 1
   fi
   [ ! -x "$venv/bin/python" ] || export UPSWING_PYTHON="$venv/bin/python"

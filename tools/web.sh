@@ -89,7 +89,7 @@ set_up_chromium() {
 # the record of the module has the hashes of module and sources.
 set_up_wasm() {
   [ "${UPSWING_COMPILE_WASM:-}" = 1 ] ||
-    ! python3 -B "$root/web/wasm/build.py" --check 2>/dev/null || return 0
+    ! "$python" -B "$root/web/wasm/build.py" --check 2>/dev/null || return 0
   for name in zig highway muparser; do
     version=$(sed -n 's/^[a-z]*\(==\| @ .*_\)\([0-9.]*[0-9]\).*/\2/p' "$root/tools/$name-requirements.txt")
     "$root/tools/fetch_wheel" $name "$root/build/deps/$name-$version" </dev/null || exit 1
