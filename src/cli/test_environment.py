@@ -54,7 +54,7 @@ def make(name):
                 sys.executable, "-m", "venv", venv)
         command(f"cannot install {requirements(name).name} (is there a network?)",
                 venv / "bin/python", "-m", "pip", "--disable-pip-version-check", "install", "--quiet",
-                "--only-binary=:all:", "--requirement", requirements(name))
+                "--only-binary=:all:", "--require-hashes", "--requirement", requirements(name))
         mark.write_text(wanted(name), encoding="utf-8")
 
 

@@ -245,7 +245,7 @@ Description: controllers that swing up and balance a double pendulum
         # Both do nothing if the pinned versions, which the SBOM names, are installed.
         run(python, "-m", "venv", venv)
         run(venv / "bin/python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check",
-            "--only-binary=:all:", "-r", Path(__file__).with_name("requirements.txt"))
+            "--only-binary=:all:", "--require-hashes", "-r", Path(__file__).with_name("requirements.txt"))
         folder = self.work / f"build-{version}"
         plain = self.work / f"plain-{version}"
         settings = [f"build-dir={folder}", "cmake.source-dir=python",

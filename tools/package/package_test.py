@@ -176,13 +176,10 @@ class VersionTest(unittest.TestCase):
 
 
 class PinsTest(unittest.TestCase):
-    def test_actions_and_release_tools_are_pinned_by_hash(self):
+    def test_actions_are_pinned_by_hash(self):
         for path in (ROOT / ".github/workflows").glob("*.yml"):
             for action in re.findall(r"uses: (.*)", path.read_text(encoding="utf-8")):
                 self.assertRegex(action, r"^actions/[\w-]+@[0-9a-f]{40} # v[\d.]+$")
-        for name in ("requirements.txt", "uv-requirements.txt"):
-            text = (FOLDER / name).read_text(encoding="utf-8")
-            self.assertEqual(text.count("=="), text.count("--hash=sha256:"), name)
 
 
 class LauncherTest(unittest.TestCase):

@@ -32,7 +32,7 @@ def install():
     print(f"installing {requirements.name} into {VENV}", file=sys.stderr)
     actors.run([sys.executable, "-m", "venv", "--clear", VENV])
     actors.run([PYTHON, "-m", "pip", "--disable-pip-version-check", "install", "--quiet",
-                "--only-binary=:all:", "--require-hashes", "--no-deps", "-r", requirements])
+                "--only-binary=:all:", "--require-hashes", "-r", requirements])
     done.write_text(wanted, encoding="utf-8")
 
 

@@ -5,7 +5,7 @@
   ... tools/peers/foreign.py --cases cartpole-dqn,hopper-ppo --seeds 5 --json foreign.json
   ... tools/peers/foreign.py --table foreign.json
 
-The Python that runs it needs both libraries: tools/peers/requirements.txt and gymnasium[box2d,mujoco].
+The Python that runs it needs both libraries (tools/peers/requirements.txt).
 Each training is a process with one thread; the sides alternate. The file of --json keeps the results
 after each training, and a later call adds the missing ones. A return is the mean of EPISODES episodes
 of the last policy without exploration, with start states that no training saw. Seconds are those of
