@@ -158,11 +158,14 @@ test('a formula that is too wide takes the focus and scrolls by keyboard', async
 }) => {
   await openAt(page, { width: 340, height: 640 });
   const wide = page.locator('details:has-text("learns the two separately") > math');
+  await wide.evaluate((math) => (math.style.fontSize = '300%')); // too wide in any font
+  await expect(wide).toHaveAttribute('tabindex', '0');
   await wide.focus();
   await expect(wide).toBeFocused();
   await page.keyboard.press('ArrowRight');
   await expect.poll(() => wide.evaluate((math) => math.scrollLeft)).toBeGreaterThan(0);
   expect(await page.evaluate(() => upswing.world.push)).toBeNull(); // does not shove
+  await wide.evaluate((math) => math.removeAttribute('style'));
   await page.setViewportSize({ width: 740, height: 900 });
   await expect(wide).not.toHaveAttribute('tabindex');
 });

@@ -24,6 +24,25 @@ test('the page loads at most 2.3 MB compressed, asks no other host, and nothing 
   expect(await shift(page)).toBeLessThan(0.05);
 });
 
+test('every preloaded font is shown, and loads once', async ({ page }) => {
+  await open(page);
+  const fonts = await page.evaluate(async () => {
+    await document.fonts.ready;
+    const rules = [...document.styleSheets].flatMap((sheet) => [...sheet.cssRules]);
+    const faces = rules.filter((rule) => rule instanceof CSSFontFaceRule).map(({ style }) => style);
+    return [...document.querySelectorAll<HTMLLinkElement>('link[rel="preload"]')].map(({ href }) => {
+      const face = faces.find((face) => face.getPropertyValue('src').includes(new URL(href).pathname));
+      const family = face?.getPropertyValue('font-family').replaceAll('"', '');
+      return {
+        shown: [...document.fonts].find((font) => font.family === family)?.status,
+        loads: performance.getEntriesByName(href).length,
+      };
+    });
+  });
+  expect(fonts).toEqual(fonts.map(() => ({ shown: 'loaded', loads: 1 })));
+  expect(fonts.length).toBeGreaterThan(0);
+});
+
 test.describe("limits of the page's content security policy", () => {
   test.use({ complains: true });
   test('text is never run as code', async ({ stage: page }) => {
