@@ -151,7 +151,8 @@ class Recordings(ViewTest):
                           any(path.stat().st_size for path in self.folder.iterdir()))
             process.send_signal(signal.SIGTERM)
             said, _ = process.communicate()
-        self.assertEqual((process.returncode, said), (143, b""))
+        self.assertEqual(process.returncode, 143)
+        self.assertRegex(said, rb"^(upswing: 0%.* left\n)*$")  # a slow machine shows progress
         self.assertEqual(list(self.folder.iterdir()), [])
 
     def test_the_drawing_program_ends_silently_after_the_program(self):
