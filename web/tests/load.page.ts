@@ -30,14 +30,18 @@ test('every preloaded font is shown, and loads once', async ({ page }) => {
     await document.fonts.ready;
     const rules = [...document.styleSheets].flatMap((sheet) => [...sheet.cssRules]);
     const faces = rules.filter((rule) => rule instanceof CSSFontFaceRule).map(({ style }) => style);
-    return [...document.querySelectorAll<HTMLLinkElement>('link[rel="preload"]')].map(({ href }) => {
-      const face = faces.find((face) => face.getPropertyValue('src').includes(new URL(href).pathname));
-      const family = face?.getPropertyValue('font-family').replaceAll('"', '');
-      return {
-        shown: [...document.fonts].find((font) => font.family === family)?.status,
-        loads: performance.getEntriesByName(href).length,
-      };
-    });
+    return [...document.querySelectorAll<HTMLLinkElement>('link[rel="preload"]')].map(
+      ({ href }) => {
+        const face = faces.find((face) =>
+          face.getPropertyValue('src').includes(new URL(href).pathname),
+        );
+        const family = face?.getPropertyValue('font-family').replaceAll('"', '');
+        return {
+          shown: [...document.fonts].find((font) => font.family === family)?.status,
+          loads: performance.getEntriesByName(href).length,
+        };
+      },
+    );
   });
   expect(fonts).toEqual(fonts.map(() => ({ shown: 'loaded', loads: 1 })));
   expect(fonts.length).toBeGreaterThan(0);
