@@ -36,7 +36,8 @@ function(upswing_layer name)
     upswing_unity(${name}_test)
     upswing_quickly(${name}_test)
     target_link_libraries(${name}_test PRIVATE upswing_${name} ${ARG_PRIVATE} GTest::gtest_main)
-    gtest_discover_tests(${name}_test TEST_PREFIX ${name}.
+    # With ccache's base_dir, __FILE__ is relative to the build folder; tests find their data there.
+    gtest_discover_tests(${name}_test TEST_PREFIX ${name}. WORKING_DIRECTORY ${CMAKE_BINARY_DIR}
                          NO_PRETTY_VALUES DISCOVERY_MODE PRE_TEST)
   endif()
 endfunction()
