@@ -60,7 +60,7 @@ export function inline(
   const watch = script(readFileSync(join(pictures, 'watch.js'), 'utf8'));
   const policy =
     `default-src 'none'; script-src ${hashOf(code)} ${hashOf(watch)} ${hashOf(sandboxed!)} 'wasm-unsafe-eval'; ` +
-    `style-src ${hashOf(style)}; img-src data:; font-src data:; worker-src blob:; ` +
+    `style-src ${hashOf(style)}; img-src data:; font-src data:; worker-src blob: data:; ` +
     `base-uri 'none'; form-action 'none'`;
   return drawn(
     text('index.html')

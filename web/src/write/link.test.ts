@@ -35,7 +35,7 @@ test("the sandbox's policy allows its own script and nothing else, and the page'
   const [, script] = /<script>(.*?)<\/script>/s.exec(sandbox)!;
   const hash = createHash('sha256').update(script!).digest('base64');
   expect(sandbox).toContain(
-    `content="default-src 'none'; script-src 'sha256-${hash}'; worker-src blob:"`,
+    `content="default-src 'none'; script-src 'sha256-${hash}'; worker-src data:"`,
   );
   expect(read('../../index.html')).toContain(
     `script-src 'self' 'wasm-unsafe-eval' 'sha256-${hash}';`,

@@ -1,7 +1,13 @@
 'use strict';
 // Goes before a visitor's controller, the function torque(), in its worker. Leaves it the language
-// without clock, chance and everything that a browser adds.
+// without clock, chance and everything that a browser adds. sandbox.ts fills in its length.
 (() => {
+  // Lines that close their function would run on their own, and their declarations would be hoisted
+  // over the names below. They make the function's text shorter. Nothing of theirs has run yet.
+  const source = torque.toString();
+  if (source.length !== SOURCE_LENGTH) {
+    throw `a bracket in row ${source.split('\n').length - 1} closes the controller's function`;
+  }
   const KEPT = new Set([
     ...[
       'Array',
@@ -21,12 +27,14 @@
   addEventListener('message', ({ ports: [port] }) => {
     const send = port.postMessage.bind(port);
     send('ready');
-    // Rows of q1, q2, w1, w2, t; answers a torque for each.
+    // Rows of q1, q2, w1, w2, t; answers a torque for each. The controller may have altered every
+    // prototype, so nothing here iterates or calls a method.
     port.onmessage = ({ data }) => {
       const torques = new Float64Array(data.length / 5);
       for (let i = 0; i < torques.length; ++i) {
-        const [q1, q2, w1, w2, t] = data.subarray(5 * i, 5 * i + 5);
-        const value = torque(q1, q2, w1, w2, t);
+        const k = 5 * i;
+        const t = data[k + 4];
+        const value = torque(data[k], data[k + 1], data[k + 2], data[k + 3], t);
         if (typeof value !== 'number') return send([t, value === null ? 'null' : typeof value]);
         if (value !== value) return send([t, 'NaN']);
         torques[i] = value;
@@ -38,7 +46,15 @@
     if (scope === Object.prototype) break;
     for (const name of Object.getOwnPropertyNames(scope)) {
       const { configurable } = Object.getOwnPropertyDescriptor(scope, name);
-      if (configurable && name !== 'constructor' && !KEPT.has(name)) delete scope[name];
+      if (configurable && !KEPT.has(name)) delete scope[name];
+    }
+  }
+  // Texts in the visitor's language differ between visitors.
+  for (const { prototype } of [Array, BigInt, Float64Array, Number, Object, String]) {
+    for (const scope of [prototype, Object.getPrototypeOf(prototype) ?? prototype]) {
+      for (const name of Object.getOwnPropertyNames(scope)) {
+        if (/^(toLocale|localeCompare)/.test(name)) delete scope[name];
+      }
     }
   }
   Math.random = () => {

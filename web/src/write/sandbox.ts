@@ -7,9 +7,23 @@ import SANDBOX from './sandbox.html?raw';
 /// from there. The frame's text is a part of this script, because no service worker answers for a
 /// sandboxed frame without a network.
 
-const HEAD = `${PRELUDE}\nfunction torque(q1, q2, w1, w2, t) {\n`;
-const ROWS_BEFORE = HEAD.split('\n').length - 1;
+const HEAD = 'function torque(q1, q2, w1, w2, t) {\n';
+const ROWS_BEFORE = `${PRELUDE}\n${HEAD}`.split('\n').length - 1;
 const LONGEST_PROBLEM = 160; // characters
+
+/// The script of the worker: the lines of a controller as the body of a function, after the prelude.
+function scriptOf(text: string): string {
+  // encodeURIComponent refuses lone surrogates.
+  const source = `${HEAD}${text.replace(/\p{Cs}/gu, '\ufffd')}\n}`;
+  return `${PRELUDE.replace('SOURCE_LENGTH', String(source.length))}\n${source}`;
+}
+
+/// The first row with the word `import`; null if there is none. The policy forbids import(), but the
+/// moment of its refusal would be a source of chance. A keyword cannot be written with escapes.
+function rowOfImport(text: string): number | null {
+  const place = text.search(/\bimport\b/);
+  return place < 0 ? null : text.slice(0, place).split('\n').length;
+}
 
 /// Why a controller failed, in one line, and its row (from 1 on) if that is known.
 export interface Problem {
@@ -57,8 +71,12 @@ export class Sandbox {
     if (source === null || source !== contentWindow) return;
     if (data === 'ready' && !this.ready) {
       this.ready = true;
+      const row = rowOfImport(this.text);
+      if (row !== null) {
+        return this.fail({ text: 'a controller cannot use the word import', row });
+      }
       // An opaque origin has no name.
-      contentWindow.postMessage(`${HEAD}${this.text}\n}`, '*', [this.port]);
+      contentWindow.postMessage(scriptOf(this.text), '*', [this.port]);
       return;
     }
     const { problem, row } = (data ?? {}) as { problem?: unknown; row?: unknown };
@@ -68,7 +86,7 @@ export class Sandbox {
     const rows = this.text.split('\n').length;
     const own = row - ROWS_BEFORE;
     const text = problem.replace(/^(uncaught exception: |Uncaught )/, '');
-    if (own > rows) this.fail({ text: `${text}: is a bracket still open?`, row: rows });
+    if (own > rows) this.fail({ text: `${text}: is a bracket open, or one too many?`, row: rows });
     else this.fail({ text, row: own >= 1 ? own : null });
   };
 }
