@@ -33,13 +33,15 @@ install(FILES ${CMAKE_CURRENT_BINARY_DIR}/upswing-config.cmake
 # Packages have shared libraries of their own in lib/upswing, and the wheel's MuJoCo comes along with its
 # headers and licences.
 file(RELATIVE_PATH FROM_BIN /${CMAKE_INSTALL_BINDIR} /${CMAKE_INSTALL_LIBDIR}/upswing)
-set(UPSWING_RPATH "$ORIGIN/${FROM_BIN}")
+set(UPSWING_RUN_PATH "$ORIGIN/${FROM_BIN}")
 if(NOT mujoco_FOUND)
   install(DIRECTORY ${UPSWING_MUJOCO}/ DESTINATION ${UPSWING_INSTALLED_MUJOCO})
-  list(APPEND UPSWING_RPATH "$ORIGIN/${FROM_BIN}/mujoco/lib")
+  list(APPEND UPSWING_RUN_PATH "$ORIGIN/${FROM_BIN}/mujoco/lib")
 endif()
-set_target_properties(${UPSWING_PROGRAMS} PROPERTIES INSTALL_RPATH "${UPSWING_RPATH}")
 install(TARGETS ${UPSWING_PROGRAMS})
+foreach(NAME IN LISTS UPSWING_PROGRAMS)
+  upswing_install_run_path(${NAME} ${CMAKE_INSTALL_BINDIR} PATHS ${UPSWING_RUN_PATH})
+endforeach()
 install(FILES LICENSE README.md CHANGELOG.md CITATION.cff DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(DIRECTORY web/public/agents DESTINATION ${CMAKE_INSTALL_DATADIR}/upswing/page) # shipped policies
 install(DIRECTORY examples DESTINATION ${CMAKE_INSTALL_DATADIR}/upswing PATTERN "*_test.py" EXCLUDE

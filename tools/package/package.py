@@ -15,7 +15,10 @@ import shutil
 import subprocess
 import sys
 import tarfile
+import zipfile
 from pathlib import Path
+
+import elf
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 KINDS = ["tarball", "deb", "wheels"]
@@ -124,6 +127,7 @@ class Packager:
         shutil.rmtree(self.work, ignore_errors=True)
         output("cmake", "--install", self.target.build, "--strip", "--prefix", self.tree)
         add_libraries(self.target, self.programs(), self.tree / "lib/upswing")
+        self.check_linking(self.tree, {"bin"})
         shutil.copytree(self.page, self.tree / "share/upswing/page", dirs_exist_ok=True)
         documents = self.tree / "share/doc/upswing"
         shutil.copytree(self.docs, documents / "html",
@@ -132,6 +136,12 @@ class Packager:
         (documents / "sbom.cdx.json").write_text(notices.sbom(self.version, self.epoch),
                                                  encoding="utf-8")
         normalise(self.tree, self.epoch)
+
+    def check_linking(self, folder, own):
+        """Refuses to ship programs, modules and libraries that are linked unsafely."""
+        faults = elf.faults_below(folder, own, f"{self.target.tools}readelf")
+        if faults:
+            raise Refused(f"expected safely linked files, got {len(faults)} faults; first {faults[0]}")
 
     def programs(self):
         return sorted((self.tree / "bin").iterdir())
@@ -270,6 +280,9 @@ Description: controllers that swing up and balance a double pendulum
             "--plat", "auto", "--only-plat", "--wheel-dir", audited, wheel,
             env=environment | {"PATH": f"{sys.prefix}/bin:{os.environ['PATH']}"})
         (wheel,) = audited.glob("*.whl")
+        with zipfile.ZipFile(wheel) as archive:
+            archive.extractall(audited / "files")
+        self.check_linking(audited / "files", {"upswing", "upswing/bin"})
         return Path(shutil.copy2(wheel, self.out))
 
 
