@@ -13,6 +13,7 @@
 #include "nn/network_policy.h"
 #include "os/file.h"
 #include "os/host.h"
+#include "os/lock.h"
 #include "runs/config_files.h"
 #include "runs/find_policy.h"
 #include "runs/run_folder.h"
@@ -254,9 +255,9 @@ std::vector<std::string> ExportToPage(const std::vector<std::string>& paths, con
   }
   const fs::path index_file = folder / "agents.json";
   (void)ReadIndex(index_file);  // check before writing anything
-  MakeFolder(folder);
-
+  NewFolder made(folder);
   const FolderLock lock(folder);  // concurrent exports would lose entries
+  made.Keep();
   ordered_json index = ReadIndex(index_file);
   std::vector<std::string> names;
   const auto write = [&](const std::string& name, std::span<const std::byte> bytes) {

@@ -60,7 +60,8 @@ int RunLearn(const LearnArguments& a) {
   } else {
     g_learned = std::make_unique<ChannelLink>(Channel::Connect(address));
   }
-  MakeNewFolder(a.out);
+  CheckFree(a.out);
+  NewFolder folder(a.out);
   GuardMotors([] { g_learned->SwitchOffAtOnce(); });
   ThreadPool pool(ResolveThreads(a.threads));
   std::string report;
@@ -74,9 +75,9 @@ int RunLearn(const LearnArguments& a) {
   } catch (const Error&) {  // there was no run, so that the command can be repeated
     std::error_code error;
     std::filesystem::remove(std::filesystem::path(a.out) / "log-01.csv", error);
-    std::filesystem::remove(a.out, error);
     throw;
   }
+  folder.Keep();
   const std::string used = fmt::format("{:.1f} s of motion, {:.1f} s of computing, {}", r.motion,
                                        r.computing, Counted(r.tries, "attempt"));
   report += r.reason.empty() ? "balanced: " : fmt::format("not balanced, {}: ", r.reason);

@@ -1,13 +1,13 @@
 #include "extras/machine/log_writer.h"
 
 #include <fmt/format.h>
-#include <sys/file.h>
 
 #include <chrono>
 #include <iterator>
 
 #include "base/error.h"
 #include "base/text.h"
+#include "os/lock.h"
 
 namespace upswing::machine {
 namespace {
@@ -39,10 +39,9 @@ bool LogRing::Pop(LoopRow& row) {
 
 LogWriter::LogWriter(const std::string& path) : ring_(kRows) {
   if (path.empty()) return;
-  file_.emplace_back(path);
   // A log is never replaced, because a machine's motion cannot be repeated.
-  const AppendFile& file = file_.front();
-  if (flock(file.descriptor(), LOCK_EX | LOCK_NB) != 0 || file.size() > 0) {
+  file_ = OpenLocked(path);
+  if (!file_ || file_->size() > 0) {
     throw BadInput(Concat("--log: expected a new file, got ", path, ", which exists"));
   }
   text_ = kHeader;
@@ -55,7 +54,7 @@ LogWriter::~LogWriter() {
 }
 
 void LogWriter::Add(const LoopRow& row, bool waits) {
-  if (file_.empty()) return;
+  if (!file_) return;
   while (!ring_.Push(row)) {
     if (!waits) {
       ++dropped_;
@@ -67,7 +66,7 @@ void LogWriter::Add(const LoopRow& row, bool waits) {
 
 void LogWriter::Flush() {
   try {
-    if (error_.empty()) file_.front().Append(text_);
+    if (error_.empty()) file_->Append(text_);
   } catch (const Error& error) {
     error_ = error.what();  // the machine goes on; Finish reports it
   }

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -41,7 +42,7 @@ class LogRing {
 class LogWriter {
  public:
   /// Expects that the path is new, or an empty file that no other process locks. An empty path:
-  /// rows are dropped. Throws BadInput and changes nothing otherwise, and as AppendFile does.
+  /// rows are dropped. Throws BadInput and changes nothing otherwise, and as OpenLocked does.
   explicit LogWriter(const std::string& path);
   /// Ends the thread.
   ~LogWriter();
@@ -59,7 +60,7 @@ class LogWriter {
   void Work();
   void Flush();
 
-  std::vector<AppendFile> file_;  // at most one
+  std::optional<AppendFile> file_;
   LogRing ring_;
   std::atomic<bool> ending_{false};
   std::string text_, error_;

@@ -17,7 +17,7 @@ import zlib
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "src/cli"))
-from testing import PATIENCE, ROOT, UPSWING, ProgramTest, read_csv  # noqa: E402
+from testing import PATIENCE, ROOT, UPSWING, ProgramTest, read_csv, without_locks  # noqa: E402
 
 TWIN = ROOT / "extras/machine/testdata/twin.toml"
 # Tests run on busy machines: readings may be late, which a real run would not accept.
@@ -228,6 +228,17 @@ class Protection(ProgramTest):
             done = self.run_here("run", "lqr", "--link", "udp:127.0.0.1:9", "--patience", 0.2,
                                  "--log", "free.csv")
             self.assert_one_line(done, 1, "no readings")
+
+    def test_without_locks_the_cause_is_said_and_no_log_is_left(self):
+        run = ["run", "lqr", "--link", TWIN, "--seconds", 0.2, "--log", "log.csv"]
+        self.refuse(run, "cannot lock log.csv: No locks available", preexec_fn=without_locks)
+        self.write("log.csv", "")
+        self.refuse(run, "cannot lock log.csv: No locks available", preexec_fn=without_locks)
+        done = self.run_here("machine", "learn", "--link", TWIN, "--encoder-counts", 16470,
+                             "--out", "new/learned", preexec_fn=without_locks)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("upswing: cannot lock new/learned/log-01.csv: No locks", done.stderr)
+        self.assertEqual([path.name for path in self.folder.iterdir()], ["log.csv"])
 
     def test_a_full_disk_leaves_a_whole_log(self):
         limit = 100_000  # bytes

@@ -10,8 +10,8 @@ import signal
 import time
 import unittest
 
-from testing import (PATIENCE, ProgramTest, SmallRunTest, read_tensors, run, small, snapshot, with_number,
-                     write_tensors)
+from testing import (PATIENCE, ROOT, ProgramTest, SmallRunTest, read_tensors, run, small, snapshot,
+                     with_number, without_locks, write_tensors)
 
 GROWING = ["metrics.csv", "episodes.csv", "evals.csv", "events.out.tfevents.0.upswing", "log.txt"]
 REPLACED = ["config.toml", "checkpoint.safetensors", "policy.safetensors"]
@@ -38,6 +38,42 @@ class RunTest(SmallRunTest):
         else:
             path.symlink_to(away)
         return away
+
+
+@unittest.skipIf("UPSWING_EMULATOR" in os.environ and os.environ["UPSWING_EMULATOR"],
+                 "an emulator needs its own system calls")
+class NoLocksTest(ProgramTest):
+    """On a file system without locks a command names the cause and leaves nothing."""
+
+    def test_new_folders(self):
+        for out in ("run", "new/parent/run"):
+            self.refuse(small(out=out), f"cannot lock {out}: No locks available",
+                        preexec_fn=without_locks)
+        (self.folder / "empty").mkdir()
+        self.refuse(small(out="empty"), "empty: No locks available", preexec_fn=without_locks)
+        self.refuse(small(out=None), "runs/d3qn-small-seed1: No locks", preexec_fn=without_locks)
+        policy = ROOT / "web/public/agents/d3qn.safetensors"
+        self.refuse(["export", policy, "--page", "site/agents"], "cannot lock site/agents: No locks",
+                    preexec_fn=without_locks)
+
+    def test_many_runs(self):
+        many = small(**TINY) + ["--seeds", "2"]
+        self.refuse(many, "cannot lock many: No locks", preexec_fn=without_locks)
+        # NFS may have locks of folders only.
+        self.refuse(many, "cannot lock many/.locks-", "No locks",
+                    preexec_fn=lambda: without_locks(folders=False))
+
+    def test_what_exists_stays_as_it_is(self):
+        self.succeed(*small(**TINY | {"out": "run"}))
+        self.refuse(["train", "--resume", "run", "--steps", "800"], "cannot lock run: No locks",
+                    preexec_fn=without_locks)
+        self.write("little.toml", '[settings]\nagent = "d3qn-small"\nsteps = 400\n[variants.one]\n')
+        self.succeed("study", "little.toml", "--out", "study", "--seeds", "4", "--prepare")
+        # A worker calls no run failed.
+        self.refuse(["study", "--work", "study"], "cannot lock study/one/seed1.claim: No locks",
+                    preexec_fn=without_locks)
+        self.refuse(["study", "little.toml", "--out", "study", "--seeds", "4"],
+                    "cannot lock study: No locks", preexec_fn=without_locks)
 
 
 class LinkTest(RunTest):

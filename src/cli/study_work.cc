@@ -16,6 +16,7 @@
 #include "cli/signals.h"
 #include "cli/train_view.h"
 #include "os/file.h"
+#include "os/lock.h"
 #include "runs/run_folder.h"
 #include "runs/study_plan.h"
 
@@ -161,6 +162,8 @@ class Worker {
     } catch (const FolderBusy&) {  // a process without a claim, such as `train --resume`
       ++claimed_by_others_;
       return false;
+    } catch (const NoLocks&) {  // no fault of the run
+      throw;
     } catch (const std::exception& error) {
       CountFailure(run, error);
     }

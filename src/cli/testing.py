@@ -5,6 +5,8 @@ in UPSWING_ROOT is used.
 """
 
 import csv
+import ctypes
+import errno
 import json
 import os
 import pty
@@ -42,6 +44,26 @@ def limits():
     resource.setrlimit(resource.RLIMIT_CPU, (20, 20))
     if "UPSWING_SANITIZED" not in os.environ:  # sanitizers reserve the address space
         resource.setrlimit(resource.RLIMIT_AS, (1 << 30, 1 << 30))
+
+
+def without_locks(folders=True):
+    """Makes the locks of files, and of folders, fail in this process, as on a file system without them:
+    a filter of system calls. Skips the test where the system has no such filter."""
+    calls = {"x86_64": (72, 73), "aarch64": (25, 32)}  # fcntl, flock
+    load, equal, end, allow, fail = 0x20, 0x15, 0x06, 0x7fff0000, 0x00050000 | errno.ENOLCK
+    no_new_privileges, seccomp, by_filter, set_lock, command = 38, 22, 2, 37, 24
+    if os.uname().machine not in calls:
+        raise unittest.SkipTest("no filter for this processor")
+    fcntl, flock = calls[os.uname().machine]
+    program = [(load, 0, 0, 0), (equal, 3, 0, flock if folders else -1 & 0xffffffff),
+               (equal, 0, 3, fcntl), (load, 0, 0, command), (equal, 0, 1, set_lock), (end, 0, 0, fail),
+               (end, 0, 0, allow)]
+    code = ctypes.create_string_buffer(b"".join(struct.pack("HBBI", *line) for line in program))
+    given = ctypes.create_string_buffer(struct.pack("HxxxxxxQ", len(program), ctypes.addressof(code)))
+    system = ctypes.CDLL(None)
+    if (system.prctl(no_new_privileges, 1, 0, 0, 0) != 0
+            or system.prctl(seccomp, by_filter, given, 0, 0) != 0):
+        raise OSError("cannot filter system calls")
 
 
 def small(**changes):

@@ -22,6 +22,7 @@
 #include "cli/study_work.h"
 #include "os/child_process.h"
 #include "os/file.h"
+#include "os/lock.h"
 #include "runs/seeds.h"
 
 namespace upswing {

@@ -1,7 +1,6 @@
 #include "os/file.h"
 
 #include <fcntl.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -13,8 +12,6 @@
 #include <iterator>
 #include <tuple>
 #include <utility>
-
-#include "os/host.h"
 
 namespace upswing {
 namespace {
@@ -38,22 +35,6 @@ bool IsOfPath(int error_number) {
                                ENODEV, ENOENT, ENOTDIR, ENXIO,      EPERM,  ENOTEMPTY,
                                EROFS,  EBUSY,  EXDEV,   EOPNOTSUPP, ENOLCK, ENOSYS};
   return std::ranges::find(kOfPath, error_number) != kOfPath.end();
-}
-
-/// A lock of a whole file. It is one of a byte range, which a process on the NFS server respects,
-/// too. It is one of an open file: a second descriptor of this process does not get it.
-struct flock WholeFile() {
-  struct flock lock {};
-  lock.l_type = F_WRLCK;
-  return lock;
-}
-
-/// Whether the open file `fd` is the one at `path`.
-bool IsAt(const fs::path& path, int fd) {
-  struct stat at_path {};
-  struct stat open {};
-  return lstat(path.c_str(), &at_path) == 0 && fstat(fd, &open) == 0 &&
-         at_path.st_dev == open.st_dev && at_path.st_ino == open.st_ino;
 }
 
 void WriteInPlace(const fs::path& path, std::string_view text) {
@@ -203,24 +184,36 @@ fs::path FreePath(const fs::path& path) {
   return free;
 }
 
-void MakeFolder(const fs::path& folder) {
+void MakeFolder(const fs::path& folder) { NewFolder(folder).Keep(); }
+
+NewFolder::NewFolder(const fs::path& folder) {
+  std::vector<fs::path> missing;  // deepest first
+  for (fs::path part = folder; !part.empty() && !Exists(part); part = part.parent_path()) {
+    missing.push_back(part);
+  }
   std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw PathError("cannot make the folder", folder, error.value());
+  for (; !missing.empty() && !error; missing.pop_back()) {
+    // Another process may be faster, and the folder is its own then.
+    if (fs::create_directory(missing.back(), error)) made_.push_back(missing.back());
+  }
+  if (!error) fs::create_directories(folder, error);
+  if (!error) return;
+  Remove();
+  throw PathError("cannot make the folder", folder, error.value());
 }
 
-FolderLock::FolderLock(const fs::path& folder)
-    : descriptor_(open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
-  if (descriptor_.get() < 0) throw PathError("cannot read", folder, errno);
-  if (flock(descriptor_.get(), LOCK_EX | LOCK_NB) == 0) return;
-  if (errno != EWOULDBLOCK) throw PathError("cannot lock", folder, errno);
-  throw FolderBusy(Concat(folder.string(), ": another process is at work here"));
+NewFolder::~NewFolder() { Remove(); }
+
+void NewFolder::Remove() const {
+  // Fails where another process has put something.
+  for (auto part = made_.rbegin(); part != made_.rend(); ++part) rmdir(part->c_str());
 }
 
-AppendFile::AppendFile(fs::path path)
-    : path_(std::move(path)),
-      descriptor_(open(path_.c_str(),
-                       O_WRONLY | O_CREAT | O_APPEND | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0666)) {
+AppendFile::AppendFile(fs::path path) : path_(std::move(path)) {
+  constexpr int kFlags = O_WRONLY | O_CREAT | O_APPEND | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC;
+  descriptor_ = Descriptor(open(path_.c_str(), kFlags | O_EXCL, 0666));
+  is_new_ = descriptor_.get() >= 0;
+  if (!is_new_ && errno == EEXIST) descriptor_ = Descriptor(open(path_.c_str(), kFlags, 0666));
   const auto refuse = [&](std::string_view what) {
     return BadInput(Concat("cannot write ", path_.string(),
                            ": expected a regular file that only this folder has, got ", what));
@@ -258,33 +251,5 @@ void AppendFile::Append(std::span<const std::byte> bytes) {
   }
   size_ += static_cast<int64_t>(bytes.size());
 }
-
-FileLock::FileLock(const fs::path& path) {
-  // The file of another user counts as locked.
-  if (Exists(path) && access(path.c_str(), W_OK) != 0 && errno == EACCES) return;
-  AppendFile file(path);
-  struct flock whole = WholeFile();
-  if (fcntl(file.descriptor(), F_OFD_SETLK, &whole) != 0) {
-    if (errno == EAGAIN || errno == EACCES) return;
-    throw PathError("cannot lock", path, errno);
-  }
-  // Between opening and locking, the holder may have removed the file.
-  if (!IsAt(path, file.descriptor())) return;
-  file.CutTo(0);
-  file.Append(Holder(getpid()));
-  file_.emplace(std::move(file));
-}
-
-FileLock::~FileLock() {
-  if (file_ && IsAt(file_->path(), file_->descriptor())) unlink(file_->path().c_str());
-}
-
-bool FileLock::IsHeld(const fs::path& path) {
-  const Descriptor fd(open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
-  struct flock whole = WholeFile();
-  return fd.get() >= 0 && fcntl(fd.get(), F_OFD_GETLK, &whole) == 0 && whole.l_type != F_UNLCK;
-}
-
-std::string FileLock::Holder(int64_t pid) { return Concat(HostName(), " ", pid, "\n"); }
 
 }  // namespace upswing

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <ios>
-#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -71,24 +70,26 @@ std::filesystem::path FreePath(const std::filesystem::path& path);
 /// Makes a folder and its missing parents. Throws as PathError does.
 void MakeFolder(const std::filesystem::path& folder);
 
-/// Makes a folder. It may exist if it is empty. Throws as CheckFree and MakeFolder do.
-void MakeNewFolder(const std::filesystem::path& folder);
-
-/// Error: another process works in the folder.
-class FolderBusy : public Error {
+/// A folder whose first use may fail. Makes it and its missing parents. Removes those that it made
+/// and that are empty, unless Keep is called.
+class NewFolder {
  public:
-  explicit FolderBusy(const std::string& message) : Error(2, message) {}
-};
+  /// Throws as PathError does.
+  explicit NewFolder(const std::filesystem::path& folder);
+  ~NewFolder();
+  NewFolder(const NewFolder&) = delete;
+  NewFolder& operator=(const NewFolder&) = delete;
 
-/// Lock that keeps other processes from working in a folder while the object exists.
-class FolderLock {
- public:
-  /// Throws FolderBusy if another process holds the lock. Otherwise throws as PathError does.
-  explicit FolderLock(const std::filesystem::path& folder);
+  void Keep() { made_.clear(); }
 
  private:
-  Descriptor descriptor_;
+  void Remove() const;
+
+  std::vector<std::filesystem::path> made_;  // parents first
 };
+
+/// Makes a folder. It may exist if it is empty. Throws as CheckFree and MakeFolder do.
+void MakeNewFolder(const std::filesystem::path& folder);
 
 /// A file that only grows, such as a log or a CSV. Its size is saved in the checkpoint. On resume,
 /// the file is cut to that size, so that rows written after the checkpoint do not appear twice.
@@ -112,38 +113,16 @@ class AppendFile {
 
   /// Size of the file in bytes.
   int64_t size() const { return size_; }
+  /// Whether the constructor made the file.
+  bool is_new() const { return is_new_; }
   const std::filesystem::path& path() const { return path_; }
   int descriptor() const { return descriptor_.get(); }
 
  private:
   std::filesystem::path path_;
-  Descriptor descriptor_;
+  Descriptor descriptor_{-1};
   int64_t size_ = 0;
-};
-
-/// Lock on a file, by which one process reserves a piece of work that processes on many hosts
-/// share. The file contains the holder. The lock ends with the object or the process; on NFSv4,
-/// also some time after the host ends. The file of a killed process stays, but is not locked.
-class FileLock {
- public:
-  /// Makes the file if there is none, and locks it unless another process holds the lock. Throws as
-  /// AppendFile does, and as PathError does if the file system has no locks.
-  explicit FileLock(const std::filesystem::path& path);
-  /// Removes the file, if this object holds the lock.
-  ~FileLock();
-  FileLock(const FileLock&) = delete;
-  FileLock& operator=(const FileLock&) = delete;
-
-  /// Whether this object holds the lock.
-  bool held() const { return file_.has_value(); }
-
-  /// Whether a process holds the lock of a file; false if the system cannot tell.
-  static bool IsHeld(const std::filesystem::path& path);
-  /// Content of a file that process `pid` of this host has locked: host and process.
-  static std::string Holder(int64_t pid);
-
- private:
-  std::optional<AppendFile> file_;
+  bool is_new_ = false;
 };
 
 }  // namespace upswing

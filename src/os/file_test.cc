@@ -3,15 +3,10 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
-#include <atomic>
-#include <chrono>
 #include <csignal>
-#include <cstdlib>
 #include <filesystem>
-#include <thread>
 #include <vector>
 
 #include "base/error.h"
@@ -173,12 +168,20 @@ TEST_F(FileTest, MissingFilesAndFoldersAreBadInput) {
   EXPECT_THROW(WriteFileAtomically(folder_ / "no" / "such", "x"), Error);
 }
 
-TEST_F(FileTest, AFolderIsLockedForOneAtATime) {
+TEST_F(FileTest, ANewFolderIsRemovedUnlessItIsKept) {
+  fs::create_directory(folder_ / "old");
+  { const NewFolder folder(folder_ / "old/a/b"); }
+  { const NewFolder folder(folder_ / "old"); }
+  EXPECT_TRUE(fs::is_empty(folder_ / "old"));
   {
-    const FolderLock lock(folder_);
-    EXPECT_THROW(FolderLock{folder_}, Error);
+    const NewFolder folder(folder_ / "old/a/b");
+    WriteFileAtomically(folder_ / "old/a/of another", "");
   }
-  EXPECT_NO_THROW(FolderLock{folder_});
+  EXPECT_TRUE(fs::exists(folder_ / "old/a/of another"));
+  EXPECT_FALSE(fs::exists(folder_ / "old/a/b"));
+  NewFolder(folder_ / "old/a/c/").Keep();
+  EXPECT_TRUE(fs::is_directory(folder_ / "old/a/c"));
+  EXPECT_THROW(NewFolder(folder_ / "old/a/of another/d"), Error);
 }
 
 TEST_F(FileTest, AppendFileIsCutBackToAGivenSize) {
@@ -216,87 +219,6 @@ TEST_F(FileTest, AppendFileIsOpenedThroughNoLink) {
   }
   EXPECT_EQ(ReadOwnFile(folder_ / "target"), "mine");
   EXPECT_FALSE(fs::exists(folder_ / "nowhere"));
-}
-
-TEST_F(FileTest, AFileLockHasOneHolderAndLeavesNothing) {
-  const fs::path path = folder_ / "seed1.claim";
-  EXPECT_FALSE(FileLock::IsHeld(path));
-  {
-    const FileLock lock(path);
-    EXPECT_TRUE(lock.held());
-    EXPECT_TRUE(FileLock::IsHeld(path));
-    EXPECT_FALSE(FileLock(path).held());
-    EXPECT_EQ(ReadOwnFile(path), FileLock::Holder(getpid()));
-  }
-  EXPECT_TRUE(fs::is_empty(folder_));
-  EXPECT_TRUE(FileLock(path).held());
-}
-
-TEST_F(FileTest, AFileLockEndsWithItsProcessWhateverItsChildrenDo) {
-  const fs::path path = folder_ / "seed1.claim";
-  const pid_t child = fork();
-  if (child == 0) {
-    const FileLock lock(path);
-    const bool started = std::system("sleep 10 >/dev/null 2>&1 &") == 0;
-    _exit(lock.held() && started ? 0 : 1);  // as if killed: removes no file
-  }
-  int status = 0;
-  ASSERT_EQ(waitpid(child, &status, 0), child);
-  ASSERT_EQ(status, 0);
-  EXPECT_EQ(ReadOwnFile(path), FileLock::Holder(child));
-  EXPECT_FALSE(FileLock::IsHeld(path));
-  EXPECT_TRUE(FileLock(path).held());
-}
-
-TEST_F(FileTest, AFileLockHasOneHolderWhileOthersRemoveTheFile) {
-  constexpr int kEach = 30;
-  const fs::path path = folder_ / "seed1.claim";
-  std::atomic<int> holders{0};
-  std::atomic<bool> several{false};
-  std::vector<std::thread> threads;
-  for (int thread = 0; thread < 4; ++thread) {
-    threads.emplace_back([&] {
-      for (int times = 0; times < kEach;) {
-        const FileLock lock(path);
-        if (!lock.held()) continue;
-        if (++holders > 1) several = true;
-        std::this_thread::sleep_for(std::chrono::microseconds(200));
-        ++times;
-        --holders;
-      }
-    });
-  }
-  for (std::thread& thread : threads) thread.join();
-  EXPECT_FALSE(several);
-  EXPECT_TRUE(fs::is_empty(folder_));
-}
-
-TEST_F(FileTest, AFileLockDoesNotRemoveTheFileOfAnother) {
-  const fs::path path = folder_ / "seed1.claim";
-  {
-    const FileLock lock(path);
-    fs::remove(path);
-    WriteFileAtomically(path, "of another\n");
-  }
-  EXPECT_EQ(ReadOwnFile(path), "of another\n");
-}
-
-TEST_F(FileTest, AFileLockIsNotTakenThroughLinksPipesAndFolders) {
-  const fs::path path = folder_ / "seed1.claim";
-  const auto refuse = [&] {
-    EXPECT_THROW(FileLock{path}, Error);
-    EXPECT_FALSE(FileLock::IsHeld(path));
-    fs::remove(path);
-  };
-  WriteFileAtomically(folder_ / "target", "mine");
-  fs::create_symlink("target", path);
-  refuse();
-  ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);
-  refuse();
-  fs::create_directory(path);
-  refuse();
-  EXPECT_EQ(ReadOwnFile(folder_ / "target"), "mine");
-  EXPECT_THROW(FileLock{folder_ / "none/seed1.claim"}, Error);
 }
 
 }  // namespace

@@ -36,8 +36,10 @@ class Making {
   Making(const Making&) = delete;
   Making& operator=(const Making&) = delete;
 
-  /// Descriptor of a file, open for writing.
+  /// Descriptor: of a file open for writing, of a folder open for reading.
   int descriptor() const { return descriptor_.get(); }
+  /// The final path.
+  const std::filesystem::path& target() const { return target_; }
   /// The temporary path.
   const std::filesystem::path& path() const { return path_; }
 

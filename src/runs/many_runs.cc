@@ -63,10 +63,14 @@ FolderLock Prepare(const ManyRuns& many) {
     if (!variant.name.empty()) CheckNoLink(folder);
     CheckRuns(folder, variant.config, many.more_steps);
   }
+  NewFolder folder(plan.folder);
+  if (!lock) lock.emplace(plan.folder);
+  ExpectFileLocks(plan.folder);  // for the claims of the workers
+  folder.Keep();
   WritePlan(plan);
   if (!many.study_file.empty()) WriteIfOther(plan.folder / "study.toml", many.study_file);
   for (const SeedRun& run : RunsOf(plan)) fs::remove(run.failed());  // so that it is tried again
-  return lock ? std::move(*lock) : FolderLock(plan.folder);
+  return std::move(*lock);
 }
 
 int DefaultJobs(int64_t threads) {

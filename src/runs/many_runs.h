@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string>
 
-#include "os/file.h"
+#include "os/lock.h"
 #include "runs/study_plan.h"
 
 namespace upswing {

@@ -54,16 +54,22 @@ fs::path FreePlace(const fs::path& path) {
 
 }  // namespace
 
-void RunFolder::Create(const fs::path& given, const std::string& config, Tensors& checkpoint) {
+FolderLock RunFolder::Create(const fs::path& given, const std::string& config,
+                             Tensors& checkpoint) {
   const fs::path path = WithoutSlash(given);
   const fs::path place = FreePlace(path);
   try {
-    if (place.has_parent_path()) MakeFolder(place.parent_path());
+    NewFolder parent(place.has_parent_path() ? place.parent_path() : ".");
     Making folder(place, Making::Kind::kFolder);
+    FolderLock lock(folder);
     WriteFileAtomically(folder.path() / kConfig, config);
     for (const char* size : kSizes) checkpoint.AddScalar(size, int64_t{0});
     SaveTensors(checkpoint, folder.path() / kCheckpoint);
     folder.Publish();
+    parent.Keep();
+    return lock;
+  } catch (const NoLocks&) {
+    throw;
   } catch (const Error& failure) {
     throw Error(failure.exit_code(),
                 Concat("cannot make the run folder ", path.string(), ": ", failure.what()));

@@ -9,6 +9,7 @@
 
 #include "base/tensors.h"
 #include "os/file.h"
+#include "os/lock.h"
 #include "rl/trainer.h"
 
 namespace upswing {
@@ -52,11 +53,11 @@ class RunFolder {
   /// Makes the folder with the text of config.toml and the first checkpoint. Adds the tables' sizes
   /// to the checkpoint, so that the folder can be opened with it.
   ///
-  /// Makes missing parent folders, as mkdir -p does. The folder appears under its name complete or
-  /// not at all (see Making). Throws BadInput if something is already there. Otherwise throws as
-  /// PathError does.
-  static void Create(const std::filesystem::path& path, const std::string& config,
-                     Tensors& checkpoint);
+  /// Makes missing parent folders, as mkdir -p does. The folder appears under its name complete and
+  /// locked, or not at all (see Making). Throws BadInput if something is already there, and
+  /// NoLocks. Otherwise throws as PathError does.
+  static FolderLock Create(const std::filesystem::path& path, const std::string& config,
+                           Tensors& checkpoint);
 
   /// Opens a run after its checkpoint has been loaded. The caller holds the run's FolderLock.
   /// Throws BadInput and changes nothing if a table is shorter than its size in the checkpoint. The

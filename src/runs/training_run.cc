@@ -52,8 +52,8 @@ std::unique_ptr<TrainingRun> TrainingRun::Make(const fs::path& out, Config confi
   std::unique_ptr<TrainingRun> run(new TrainingRun(path, config, std::move(make_foreign)));
   if (start) run->training_.StartFrom(*start, Concat("--from ", config.start_policy));
   Tensors checkpoint = run->training_.Checkpoint();
-  RunFolder::Create(path, ConfigToml(run->training_.config(), false), checkpoint);
-  run->lock_.emplace(path);
+  run->lock_.emplace(
+      RunFolder::Create(path, ConfigToml(run->training_.config(), false), checkpoint));
   run->folder_.emplace(path, checkpoint);
   return run;
 }
