@@ -3,6 +3,7 @@
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
@@ -11,6 +12,7 @@
 #include <concepts>
 #include <mutex>
 #include <optional>
+#include <tuple>
 
 #include "base/error.h"
 #include "base/text.h"
@@ -21,6 +23,7 @@
 #include "rl/ppo_config.h"
 #include "rl/torque_levels.h"
 #include "runs/config_files.h"
+#include "runs/plant_file.h"
 
 namespace upswing {
 namespace {
@@ -40,22 +43,37 @@ int64_t LevelsOf(const std::string& actions, const std::string& levels) {
   return config.discrete() ? config.levels : 0;
 }
 
-/// Settings of `num_envs` environments: those of the named or default agent with these changes.
-/// Throws BadInput for settings that environments do not have.
-Config ConfigOf(const std::string& num_envs, const SettingTexts& settings) {
+/// The settings of a plant file: name, text and place of each.
+using PlantSettings = std::vector<std::tuple<std::string, std::string, std::string>>;
+
+/// Reads the shipped plant of this name, or the plant file at this path. Throws BadInput.
+PlantSettings LoadPlant(const std::string& name) {
+  PlantSettings settings;
+  for (const FlagValue& flag : WithPlantFile({{"plant", name, "plant"}})) {
+    settings.emplace_back(flag.name, flag.text, flag.where);
+  }
+  return settings;
+}
+
+/// Settings of `num_envs` environments: those of the named or default agent, with the plant's, and
+/// with these changes. Throws BadInput for settings that environments do not have.
+Config ConfigOf(const std::string& num_envs, const PlantSettings& plant,
+                const SettingTexts& settings) {
   std::vector<FlagValue> flags = FlagsOf(settings);
   flags.push_back({"envs", num_envs, "num_envs"});
   Config scratch;
   const Options every = EverySetting(scratch);
   for (const FlagValue& flag : flags) {
-    if (flag.name == "plant") continue;  // a plant file
     for (const Option* option : every.Find(flag.name, flag.where)) {
       if (IsEnvironmentSetting(*option)) continue;
       throw BadInput(Concat(flag.where, ": expected a setting of an environment, got ", flag.name,
                             ", a setting of a training"));
     }
   }
-  return BuildConfig("", flags);
+  std::vector<FlagValue> all;
+  for (const auto& [name, text, where] : plant) all.push_back({name, text, where});
+  all.insert(all.end(), flags.begin(), flags.end());
+  return BuildConfig("", all);
 }
 
 PendulumEnvConfig EnvConfigOf(const Config& config, ThreadPool& pool) {
@@ -71,9 +89,10 @@ class Environments {
  public:
   /// `same_step`: the next episode begins in the step that ends an episode; else the following step
   /// begins it and ignores the action (Gymnasium's AutoresetMode). Throws BadInput.
-  Environments(const std::string& num_envs, const SettingTexts& settings,
-               const std::string& actions, const std::string& levels, bool same_step)
-      : config_(ConfigOf(num_envs, settings)),
+  Environments(const std::string& num_envs, const PlantSettings& plant,
+               const SettingTexts& settings, const std::string& actions,
+               const std::string& levels, bool same_step)
+      : config_(ConfigOf(num_envs, plant, settings)),
         same_step_(same_step),
         pool_(ResolveThreads(config_.train.threads)),
         env_(EnvConfigOf(config_, pool_)),
@@ -269,10 +288,10 @@ nb::dict DescribeTask(Environments& self) {
 
 void BindEnvironments(nb::module_& m) {
   nb::class_<Environments> c(m, "Environments");
-  c.def(nb::init<const std::string&, const SettingTexts&, const std::string&, const std::string&,
-                 bool>(),
-        nb::arg("num_envs"), nb::arg("settings"), nb::arg("actions"), nb::arg("levels"),
-        nb::arg("same_step"), nb::call_guard<nb::gil_scoped_release>())
+  c.def(nb::init<const std::string&, const PlantSettings&, const SettingTexts&, const std::string&,
+                 const std::string&, bool>(),
+        nb::arg("num_envs"), nb::arg("plant"), nb::arg("settings"), nb::arg("actions"),
+        nb::arg("levels"), nb::arg("same_step"), nb::call_guard<nb::gil_scoped_release>())
       .def("step", &Environments::Step, nb::arg("action"))
       .def("reset", &Environments::Reset, nb::arg("seeds"), nb::arg("mask"))
       .def("spec", &DescribeTask)
@@ -286,6 +305,7 @@ void BindEnvironments(nb::module_& m) {
       .def_prop_ro(
           "obs", [](Environments& self) { return ViewOf(self, self.obs(), true); },
           nb::rv_policy::reference_internal);
+  m.def("load_plant", &LoadPlant, nb::arg("name"), nb::call_guard<nb::gil_scoped_release>());
   AddView(c, "final_obs", &StepResult::next_obs, true);
   AddView(c, "reward", &StepResult::reward, false);
   AddView(c, "reward_terms", &StepResult::reward_terms, true);

@@ -94,6 +94,18 @@ nb::dict DescribeInfo(const PolicyHandle& self) {
   return d;
 }
 
+/// The bytes of a policy's file.
+nb::bytes FileOf(const Policy& policy) {
+  const std::vector<std::byte> file = WriteSafetensors(policy.ToTensors()).Joined();
+  return nb::bytes(file.data(), file.size());
+}
+
+/// The policy in a file with these bytes. Throws BadInput, which names the file.
+LoadedPolicy PolicyOf(const nb::bytes& file, const std::string& name) {
+  const auto* bytes = static_cast<const std::byte*>(file.data());
+  return ReadPolicy(ReadSafetensors({bytes, bytes + file.size()}, name));
+}
+
 std::shared_ptr<PolicyHandle> Load(const std::string& name, const SettingTexts& settings,
                                    const std::vector<std::string>& made_for) {
   PolicyArguments arguments;
@@ -102,6 +114,22 @@ std::shared_ptr<PolicyHandle> Load(const std::string& name, const SettingTexts& 
   arguments.made_for = made_for;
   const nb::gil_scoped_release unlocked;
   return std::make_shared<PolicyHandle>(GetPolicy(arguments));
+}
+
+/// The controller of an earlier handle with these settings, name, plant and swing-up policy (the
+/// bytes of its file, or None). Reads no file, so that it is the same controller.
+std::shared_ptr<PolicyHandle> Redesign(const std::string& controller, const SettingTexts& settings,
+                                       const std::string& title,
+                                       const std::map<std::string, double>& plant,
+                                       const std::optional<nb::bytes>& swing_up) {
+  ControllerConfig config;
+  SetFlags(OptionsOf(config), FlagsOf(settings));
+  std::vector<FlagValue> values;
+  for (const auto& [name, value] : plant) values.push_back({name, FormatNumber(value), name});
+  SetFlags(OptionsOf(config.plant), values);
+  if (swing_up) config.swing_up_policy = PolicyOf(*swing_up, config.swing_up).policy;
+  const nb::gil_scoped_release unlocked;
+  return std::make_shared<PolicyHandle>(DesignController(controller, config, title));
 }
 
 }  // namespace
@@ -118,9 +146,10 @@ void BindPolicies(nb::module_& m) {
             SaveTensors(self.policy().ToTensors(), path);
           },
           nb::arg("path"))
-      .def("to_bytes", [](const PolicyHandle& self) {
-        const std::vector<std::byte> file = WriteSafetensors(self.policy().ToTensors()).Joined();
-        return nb::bytes(file.data(), file.size());
+      .def("to_bytes", [](const PolicyHandle& self) { return FileOf(self.policy()); })
+      .def("swing_up_bytes", [](const PolicyHandle& self) -> std::optional<nb::bytes> {
+        if (!self.loaded().swing_up) return {};
+        return FileOf(*self.loaded().swing_up);
       });
   const auto add = [&](const char* name, auto member) {
     c.def_prop_ro(name, [member](const PolicyHandle& self) {
@@ -148,11 +177,11 @@ void BindPolicies(nb::module_& m) {
   m.def(
       "policy_of_bytes",
       [](const nb::bytes& file, const std::string& name) {
-        const auto* bytes = static_cast<const std::byte*>(file.data());
-        return std::make_shared<PolicyHandle>(
-            ReadPolicy(ReadSafetensors({bytes, bytes + file.size()}, name)));
+        return std::make_shared<PolicyHandle>(PolicyOf(file, name));
       },
       nb::arg("file"), nb::arg("name"));
+  m.def("redesign", &Redesign, nb::arg("controller"), nb::arg("settings"), nb::arg("title"),
+        nb::arg("plant"), nb::arg("swing_up").none());
   m.def("controllers", &ControllerNames);
   m.def(
       "function_policy",

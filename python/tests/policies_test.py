@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
 """Tests of policies: files act as in the program; broken and foreign files are refused."""
 
+import copy
 import csv
 import hashlib
 import io
+import multiprocessing
 import os
 import pickle
 import subprocess
@@ -175,6 +177,64 @@ class Copies(unittest.TestCase):
             copy = pickle.loads(pickle.dumps(policy))
             np.testing.assert_array_equal(copy.act(obs), policy.act(obs))
             self.assertEqual(copy.info, policy.info)
+
+
+    def test_copies_do_not_read_files_again(self):
+        rng = np.random.default_rng(1)
+        near = np.array([np.pi, 0, 0, 0]) + rng.normal(scale=0.02, size=(20, 4))
+        upright = gym.make_vec(ID, 20).reset(seed=0, options={"state": near})[0]
+        obs = np.concatenate([upright, rng.normal(size=(50, 8)).astype(np.float32)])
+        with tempfile.TemporaryDirectory() as folder:
+            plant, file = Path(folder, "plant.toml"), Path(folder, "policy.safetensors")
+            policies = {}
+
+            def write(mass2, agent):
+                plant.write_text(f"[plant]\nmass2 = {mass2}\n")
+                file.write_bytes((AGENTS / f"{agent}.safetensors").read_bytes())
+
+            write(1.2, "d3qn")
+            for name, made_for in (("lqr", plant), ("energy", str(plant)), ("pfl", plant)):
+                policies[name] = upswing.load_policy(name, made_for=made_for, lqr_torque=2)
+            policies["hybrid"] = upswing.load_policy("hybrid", swing_up=file, made_for=plant)
+            policies["file"] = upswing.load_policy(file)
+            expected = {name: policy.act(obs) for name, policy in policies.items()}
+            pickled = pickle.dumps(policies)
+            handles = {name: policy._handle for name, policy in policies.items()}
+
+            def check():
+                for copies in (pickle.loads(pickled), copy.deepcopy(policies),
+                               {name: copy.copy(policy) for name, policy in policies.items()},
+                               pickle.loads(pickle.dumps(pickle.loads(pickled)))):
+                    for name, policy in copies.items():
+                        np.testing.assert_array_equal(policy.act(obs), expected[name], name)
+                        self.assertEqual(policy.info, policies[name].info)
+                        self.assertEqual(repr(policy), repr(policies[name]))
+                        self.assertIsNot(policy._handle, handles[name])
+
+            check()
+            write(2.5, "sac")
+            # Read again, they are others.
+            other = upswing.load_policy("lqr", made_for=plant, lqr_torque=2).act(obs)
+            self.assertFalse(np.array_equal(other, expected["lqr"]))
+            check()
+            plant.unlink()
+            file.unlink()
+            check()
+            before = os.getcwd()
+            os.chdir(folder)
+            self.addCleanup(os.chdir, before)
+            Path("lqr").write_text("a file with the name of a controller")
+            check()
+            os.chdir(before)
+            if "spawn" in multiprocessing.get_all_start_methods():
+                with multiprocessing.get_context("spawn").Pool(1) as pool:
+                    np.testing.assert_array_equal(pool.apply(policies["hybrid"].act, (obs,)),
+                                                  expected["hybrid"])
+        # An evaluation of a copy designs it for each plant, as one of the original does.
+        settings = {"episodes": 3, "physics": "closed-form", "randomize": 0.2}
+        policy = upswing.load_policy("lqr", lqr_torque=2, made_for={"mass2": 1.2})
+        self.assertEqual(upswing.evaluate(copy.deepcopy(policy), **settings),
+                         upswing.evaluate(policy, **settings))
 
 
 class BadInput(BadInputTest):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -12,7 +12,28 @@ from gymnasium import spaces
 
 from . import _upswing
 from ._mujoco import stop_clock
-from ._settings import text_of, texts_of, whole_number
+from ._settings import path_of, text_of, texts_of, whole_number
+
+
+class LoadedPlant:
+    """The settings of a plant file as it was read. A copy of an environment has it in place of the
+    file, which may have changed."""
+
+    def __init__(self, path: Any) -> None:
+        """`path`: plant file or name of a shipped plant. Raises InputError."""
+        self.name = path_of("plant", path)
+        self.settings: list[tuple[str, str, str]] = _upswing.load_plant(self.name)
+
+    def __repr__(self) -> str:
+        return f"<plant {self.name}>"
+
+
+def with_loaded_plant(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings of environments, with the plant file loaded if there is one. Raises InputError."""
+    plant = settings.get("plant")
+    if plant is None or isinstance(plant, LoadedPlant):
+        return dict(settings)
+    return {**settings, "plant": LoadedPlant(plant)}
 
 
 class Core:
@@ -24,7 +45,10 @@ class Core:
             raise _upswing.InputError("envs: expected none; num_envs is the number of environments")
         if levels is not None and actions == "continuous":
             raise _upswing.InputError("levels: expected actions=\"levels\" with it")
-        self.env = _upswing.Environments(text_of(num_envs), texts_of(settings), text_of(actions),
+        settings = with_loaded_plant(settings)
+        plant: LoadedPlant | None = settings.pop("plant", None)
+        self.env = _upswing.Environments(text_of(num_envs), plant.settings if plant else [],
+                                         texts_of(settings), text_of(actions),
                                          text_of(9 if levels is None else levels), same_step)
         spec = self.env.spec()
         self.num_envs: int = spec["num_envs"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 import gymnasium as gym
 import numpy as np
@@ -14,7 +14,8 @@ from gymnasium.vector.utils import batch_space
 from typing_extensions import Unpack
 
 from . import _upswing
-from ._environments import Core, Pictures, check_render_mode, seed_of
+from ._environments import (Core, Pictures, check_render_mode, seed_of,
+                            with_loaded_plant)
 from ._settings import settings as settings_of, whole_number
 from ._types import EnvironmentSettings
 
@@ -69,6 +70,7 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
         height: int = 480,
         **settings: Unpack[EnvironmentSettings],
     ) -> None:
+        settings = cast(EnvironmentSettings, with_loaded_plant(settings))
         EzPickle.__init__(self, actions=actions, levels=levels, render_mode=render_mode,
                           width=width, height=height, **settings)
         check_render_mode(render_mode, self.metadata)
@@ -225,6 +227,7 @@ class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArra
             settings["episode_seconds"] = min(
                 settings.get("episode_seconds", usual),
                 round(0.02 * whole_number("max_episode_steps", max_episode_steps), 2))
+        settings = cast(EnvironmentSettings, with_loaded_plant(settings))
         EzPickle.__init__(self, num_envs, actions=actions, levels=levels,
                           autoreset_mode=autoreset_mode, copy=copy, render_mode=render_mode,
                           width=width, height=height, **settings)
@@ -232,6 +235,10 @@ class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArra
         mode = _autoreset_mode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": mode}
         self._same_step = mode == AutoresetMode.SAME_STEP
+        # Settings of a single environment like these, with the plant as it was read.
+        self.single_settings: dict[str, Any] = {
+            "actions": actions, "levels": levels,
+            **{name: value for name, value in settings.items() if name != "threads"}}
         self._core = Core(num_envs, dict(settings), actions, levels, self._same_step)
         self._pictures = Pictures(self._core, width, height)
         self.num_envs: int = self._core.num_envs

@@ -35,7 +35,7 @@ class Policy:
     def __init__(self, handle: _upswing.PolicyHandle, made_by: tuple[Any, ...] = ()) -> None:
         """For internal use: `load_policy` and `train` create policies."""
         self._handle = handle
-        self._made_by = made_by  # for a controller: name, settings and design plant
+        self._made_by = made_by  # for a controller: its name and settings
         self.name: str = handle.name
         self.kind: str = handle.kind
         self.description: str = handle.description
@@ -111,7 +111,9 @@ class Policy:
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self._made_by:
-            return _load, self._made_by
+            # The files that it was made from may have changed.
+            return _redesigned, (*self._made_by, self.name, self._handle.info()["plant"],
+                                 self._handle.swing_up_bytes())
         return _of_bytes, (self._handle.to_bytes(), self.name)
 
     def _rows(self, obs: npt.ArrayLike) -> tuple[npt.NDArray[np.float32], bool]:
@@ -158,7 +160,13 @@ def load_policy(
 
 def _load(name: str, settings: list[tuple[str, str]], made_for: list[str]) -> Policy:
     handle = _upswing.load_policy(name, settings, made_for)
-    return Policy(handle, () if handle.num_parameters > 0 else (name, settings, made_for))
+    return Policy(handle, () if handle.num_parameters > 0 else (name, settings))
+
+
+def _redesigned(controller: str, settings: list[tuple[str, str]], title: str,
+                plant: dict[str, float], swing_up: bytes | None) -> Policy:
+    return Policy(_upswing.redesign(controller, settings, title, plant, swing_up),
+                  (controller, settings))
 
 
 def _of_bytes(file: bytes, name: str) -> Policy:

@@ -21,6 +21,7 @@ struct LoadedPolicy {
   // Designs the controller for another plant; empty for a learned policy. Throws BadInput if no
   // such controller exists.
   std::function<std::shared_ptr<const Policy>(const Plant&)> design_for = {};
+  std::shared_ptr<const Policy> swing_up = {};  // what the controller hybrid swings up with
 
   /// Whether it is for an environment that only Python makes and steps.
   bool is_foreign() const { return IsForeign(task); }

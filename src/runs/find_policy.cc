@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <set>
 
-#include "agents/controllers.h"
 #include "base/error.h"
 #include "base/format.h"
 #include "base/text.h"
@@ -134,19 +133,21 @@ LoadedPolicy GetPolicy(const PolicyArguments& a) {
                           a.name, " means the file; rename the file to use the controller"));
   }
   if (is_controller) {
-    const auto design_for = [name = a.name, config](const Plant& plant) {
-      ControllerConfig other = config;
-      other.plant = plant;
-      return MakeController(name, other);
-    };
-    return {TitleOf(a.name, config, made_for.name, made_for.plant),
-            "",
-            design_for(config.plant),
-            kDoublePendulum,
-            config.plant,
-            design_for};
+    return DesignController(a.name, config,
+                            TitleOf(a.name, config, made_for.name, made_for.plant));
   }
   return LoadPolicy(a.name);
+}
+
+LoadedPolicy DesignController(const std::string& name, const ControllerConfig& config,
+                              const std::string& title) {
+  const auto design_for = [name, config](const Plant& plant) {
+    ControllerConfig other = config;
+    other.plant = plant;
+    return MakeController(name, other);
+  };
+  return {title,        "",         design_for(config.plant), kDoublePendulum,
+          config.plant, design_for, config.swing_up_policy};
 }
 
 LoadedPolicy LoadPolicy(const fs::path& path) {

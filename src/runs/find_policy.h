@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "agents/controllers.h"
 #include "agents/loaded_policy.h"
 
 /// Loading of policies by name: a policy file, a run folder, a shipped policy or a controller.
@@ -32,6 +33,11 @@ std::vector<std::string> ShippedPolicies();
 /// BadInput if the name could mean a controller or a file, or if there are controller settings for
 /// a policy that is not a controller.
 LoadedPolicy GetPolicy(const PolicyArguments& a);
+
+/// Makes the controller `name`, which messages call `title`, without reading a file. Throws as
+/// MakeController does.
+LoadedPolicy DesignController(const std::string& name, const ControllerConfig& config,
+                              const std::string& title);
 
 /// Gets policies of the double pendulum by these names, each a PolicyArguments::name. Each
 /// controller gets those settings in `controllers` that it has. Throws BadInput if none of the
