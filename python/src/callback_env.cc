@@ -42,8 +42,8 @@ auto CallPython(const Call& call) -> decltype(call()) {
 /// object: it reads the actions (N × A) and writes the other arrays. Letters as in base/env.h.
 class CallbackEnv final : public VectorEnv {
  public:
-  /// `make` is the function make(for_evaluation, count, arrays) in Python, which returns an object
-  /// with the methods begin(seeds) and step(). Needs the interpreter's lock.
+  /// `make` is the function make(for_evaluation, count, evaluations, arrays) in Python. It returns
+  /// an object with the methods begin(seeds) and step(). Needs the interpreter's lock.
   CallbackEnv(const nb::object& make, const EnvConfig& config)
       : spec_(SpecOf(config)),
         seed_(config.seed),
@@ -63,7 +63,9 @@ class CallbackEnv final : public VectorEnv {
     arrays["reward"] = reward_;
     arrays["terminated"] = terminated_;
     arrays["truncated"] = truncated_;
-    lanes_ = CallPython([&] { return make(config.for_evaluation, rows(), arrays); });
+    lanes_ = CallPython([&] {
+      return make(config.for_evaluation, rows(), config.evaluations, arrays);
+    });
     Begin(stream_);
   }
   CallbackEnv(const CallbackEnv&) = delete;

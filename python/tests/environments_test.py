@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Tests of a single environment: Gymnasium's own checks, agreement with the program, bad input."""
 
+import copy
 import csv
 import io
 import os
@@ -304,6 +305,46 @@ class Copies(unittest.TestCase):
         envs = pickle.loads(pickle.dumps(upswing.DoublePendulumVectorEnv(3, gravity=9)))
         envs.reset(seed=1)
         self.assertEqual([plant["gravity"] for plant in envs.plants], [9] * 3)
+
+    def test_copies_do_not_read_the_plant_file_again(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder, "plant.toml")
+            file.write_text("[plant]\nmass2 = 1.2\ncoulomb1 = 0.0\n[disturbance]\ndelay = 0.02\n")
+            # The agent's plant has another friction.
+            single = gym.make(ID, plant=file, agent="pendubot", gravity=9.5)
+            many = upswing.DoublePendulumVectorEnv(2, plant=str(file), mass=1.1)
+            pickled = pickle.dumps((single, many))
+
+            def check():
+                for one, two in (pickle.loads(pickled), copy.deepcopy((single, many)),
+                                 pickle.loads(pickle.dumps(pickle.loads(pickled)))):
+                    for env, original in ((one, single), (two, many)):
+                        obs = [each.reset(seed=3)[0] for each in (env, original)]
+                        np.testing.assert_array_equal(*obs)
+                        self.assertEqual(env.unwrapped._core.settings,
+                                         original.unwrapped._core.settings)
+                    self.assertEqual(one.unwrapped.plant["mass2"], 1.2)
+                    self.assertEqual(two.plants[0]["mass2"], 1.1)
+
+            check()
+            file.write_text("[plant]\nmass2 = 2.5\n")
+            check()
+            file.unlink()
+            check()
+
+    def test_evaluations_do_not_read_the_plant_file_again(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder, "plant.toml")
+            results = []
+            for later in (1.2, 2.5):
+                file.write_text("[plant]\nmass2 = 1.2\n")
+                env = gym.make_vec(ID, 2, physics="closed-form", episode_seconds=0.4, plant=file)
+                file.write_text(f"[plant]\nmass2 = {later}\n")
+                training = upswing.train("sac", env=env, seed=1, steps=300, eval_every=300,
+                                         learning_starts=100, hidden=[16], batch=16, threads=1,
+                                         eval_episodes=2, progress=False)
+                results.append(training.evaluations[-1]["mean_return"])
+            self.assertEqual(*results)
 
 
 class BadInput(BadInputTest):

@@ -2,6 +2,8 @@
 """Tests of trainings on Gymnasium environments: learning, ends of episodes, vector environments,
 bits, files, Ctrl-C, bad input."""
 
+import copy
+import functools
 import hashlib
 import itertools
 import json
@@ -18,6 +20,7 @@ from pathlib import Path
 import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
+from gymnasium.utils import EzPickle
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
 
 import upswing
@@ -628,6 +631,188 @@ class BadInput(InFolder, BadInputTest):
         turns = itertools.cycle([Reach(), Reach(), Reach()])
         self.refuse_env(f"env: expected {what}", lambda: next(turns), num_envs=2)
 
+    def test_shared_state(self):
+        class AtRest(Reach):
+            """A point that begins at rest and stays there under the action 0."""
+
+            def __init__(self, simulator):
+                super().__init__()
+                self._simulator = simulator
+
+            def reset(self, *, seed=None, options=None):
+                super().reset(seed=seed)
+                self._simulator["x"] = 0.0
+                return self._obs(), {}
+
+            def step(self, action):
+                self._simulator["x"] += float(action[0])
+                self._steps += 1
+                return self._obs(), -abs(self._simulator["x"]), False, self._steps >= 20, {}
+
+            def _obs(self):
+                return np.array([self._simulator.get("x", 0), 1], np.float32)
+
+        class Clock(Reach):
+            """An environment whose time limit counts the steps of all."""
+
+            steps, limit = 0, 200
+
+            def reset(self, **how):
+                type(self).steps = 0
+                return super().reset(**how)
+
+            def step(self, action):
+                type(self).steps += 1
+                return *super().step(action)[:3], self.steps >= self.limit, {}
+
+        class LateClock(Clock):
+            limit = 30
+
+        class Goal(Reach):
+            """An environment whose reset sets the goal of all."""
+
+            goal = 0.0
+
+            def reset(self, **how):
+                returned = super().reset(**how)
+                type(self).goal = self.np_random.uniform()
+                return returned
+
+            def step(self, action):
+                obs, _, *others = super().step(action)
+                return obs, -abs(self.goal - self._x), *others
+
+        class Random(Reach):
+            """An environment that draws from a generator of all, which a reset seeds."""
+
+            rng = None
+
+            def reset(self, *, seed=None, options=None):
+                if seed is not None:
+                    type(self).rng = np.random.default_rng(seed)
+                super().reset()
+                self._x = self.rng.uniform(-1, 1)
+                return self._obs(), {}
+
+        class Around(gym.Wrapper):
+            """A wrapper with the last action of all."""
+
+            last = 0.0
+
+            def reset(self, **how):
+                type(self).last = 0.0
+                return self.env.reset(**how)
+
+            def step(self, action):
+                obs, reward, *others = self.env.step(action)
+                before, type(self).last = self.last, float(action[0])
+                return obs, reward + before, *others
+
+        simulator = {}
+        cached = functools.lru_cache(lambda: {})
+        pool = itertools.cycle([{}, {}, {}])
+        for make in (lambda: AtRest(simulator), lambda: AtRest(cached()),
+                     lambda: AtRest(next(pool)), Clock, LateClock, Goal, Random,
+                     lambda: Around(Reach())):
+            for n in (1, 3):
+                self.refuse_env("env: expected environments that share no state, got ", make,
+                                num_envs=n, max_episode_steps=300)
+        # The parts of a vector environment share, its evaluations have their own.
+        self.refuse_env("env: expected environments that share no state, got AtRest, where calls "
+                        "of one change what another returns as observation",
+                        SyncVectorEnv([lambda: AtRest(simulator)] * 2), eval_env=lambda: AtRest({}))
+        upswing.train("sac", env=lambda: AtRest({}), num_envs=3, **SHORT)
+
+    def test_random_environments_are_not_accused(self):
+        rng = np.random.default_rng(0)
+
+        class Unseeded(Reach):
+            """An environment that ignores its seed; rarely, so that some episodes repeat."""
+
+            def __init__(self, share):
+                super().__init__()
+                self._share = share
+
+            def step(self, action):
+                obs, reward, *others = super().step(action)
+                return obs, reward + (rng.uniform() < self._share), *others
+
+        class Seeded(Reach):
+            def step(self, action):
+                obs, reward, *others = super().step(action)
+                return obs, reward + self.np_random.normal(), *others
+
+        quick = SHORT | {"steps": 200, "eval_every": 10**6, "eval_episodes": 1}
+        for share in (0.5, 0.02, 0.02, 0.02, 0.02):
+            for env in (lambda: Unseeded(share), copy.deepcopy(Unseeded(share))):
+                with self.assertWarnsRegex(UserWarning, "two episodes after reset") as caught:
+                    rng = np.random.default_rng(2)
+                    upswing.train("sac", env=env, num_envs=3, **quick)
+                self.assertEqual(caught.filename, __file__)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            for env in (Seeded, Seeded(), SyncVectorEnv([Seeded] * 2)):
+                upswing.train("sac", env=env, **quick)
+
+    def test_global_random_numbers(self):
+        class Global(Reach):
+            def reset(self, *, seed=None, options=None):
+                if seed is not None:
+                    np.random.seed(seed)
+                super().reset(seed=seed)
+                self._x = np.random.uniform(-1, 1)
+                return self._obs(), {}
+
+        with self.assertWarnsRegex(UserWarning, "global random numbers") as caught:
+            upswing.train("sac", env=Global, num_envs=2, **SHORT)
+        self.assertEqual(caught.filename, __file__)
+
+    def test_changed_instances(self):
+        class Gain(Reach, EzPickle):
+            """An environment whose copies are made again by its arguments."""
+
+            def __init__(self, gain=1.0, length=20):
+                EzPickle.__init__(self, gain, length)
+                super().__init__(length=length)
+                self.gain = gain
+
+            def step(self, action):
+                obs, reward, *others = super().step(action)
+                return obs, self.gain * reward, *others
+
+        def changed(name="gain", value=10.0, wrap=lambda env: env):
+            env = wrap(Gain())
+            env.set_wrapper_attr(name, value)
+            return env
+
+        what = "expected an environment whose copies act as it does, got Gain, whose copy returns "
+        for env in (changed(), changed(wrap=gym.wrappers.RecordEpisodeStatistics),
+                    changed("_length", 9), changed("_length", 300)):
+            for n in (1, 4):
+                self.refuse_env("env: " + what, env, num_envs=n)
+            self.refuse_env("env: " + what, env, num_envs=2, eval_env=Gain)
+            self.refuse_env("eval_env: " + what, Gain, eval_env=env)
+        env = SyncVectorEnv([Gain] * 3)
+        env.set_attr("gain", 10.0)
+        self.refuse_env("env: expected evaluations to have the environments of SyncVectorEnv, but "
+                        "another Gain of its function 0 returns", env)
+        upswing.train("sac", env=env, eval_env=changed, **SHORT)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            used = Gain(2.0)
+            used.reset(seed=5)
+            used.step(np.ones(1, np.float32))
+            for env in (used, SyncVectorEnv([Gain] * 3)):
+                upswing.train("sac", env=env, **SHORT)
+            upswing.train("sac", env=changed(), eval_env=Gain, **SHORT)  # no copy of it
+        # A change whose effect comes late.
+        late = Gain(length=100)
+        late._length = 200
+        with self.assertWarnsRegex(UserWarning, "copy of Gain has Gain._length 100 in place of 200"
+                                   ) as caught:
+            upswing.train("sac", env=late, num_envs=2, **SHORT)
+        self.assertEqual(caught.filename, __file__)
+
     def test_vector_wrappers(self):
         class Own(gym.vector.VectorWrapper):
             pass
@@ -749,17 +934,108 @@ class BadInput(InFolder, BadInputTest):
                 self.array[:] = super()._obs()
                 return self.array
 
+        class CopiesAtReset(Same):
+            def reset(self, **how):
+                obs, info = super().reset(**how)
+                return obs.copy(), info
+
+        class CopiesAtStep(Same):
+            def step(self, action):
+                obs, *others = super().step(action)
+                return obs.copy(), *others
+
+        expected = upswing.train("sac", env=Reach, num_envs=2, **SHORT).last.act([1, 1])
+        for env_class in (Same, CopiesAtReset, CopiesAtStep):
+            for mode in AutoresetMode:
+                for kind in (SyncVectorEnv, AsyncVectorEnv):
+                    env = kind([env_class] * 2, autoreset_mode=mode)
+                    self.addCleanup(env.close)
+                    if mode == AutoresetMode.SAME_STEP and env_class is not CopiesAtStep:
+                        self.refuse_env(f"for AutoresetMode.SAME_STEP, got {env_class.__name__}, "
+                                        "which returns the same array again", env)
+                    else:
+                        np.testing.assert_array_equal(
+                            upswing.train("sac", env=env, **SHORT).last.act([1, 1]), expected)
+
+        class InTuple(Same):
+            """The array is part of a larger observation."""
+
+            observation_space = spaces.Tuple([Reach.observation_space, spaces.Box(0, 1, (1,))])
+
+            def _obs(self):
+                return super()._obs(), np.zeros(1, np.float32)
+
+        class First(gym.vector.VectorWrapper):
+            """The first part of the observations."""
+
+            def __init__(self, env):
+                super().__init__(env)
+                self.single_observation_space = env.single_observation_space[0]
+                self.observation_space = env.observation_space[0]
+
+            def reset(self, **how):
+                obs, info = self.env.reset(**how)
+                return obs[0], info
+
+            def step(self, actions):
+                obs, *others, info = self.env.step(actions)
+                if "final_obs" in info:
+                    info["final_obs"] = [last and last[0] for last in info["final_obs"]]
+                return obs[0], *others, info
+
+        # The environment of evaluations returns other arrays.
+        self.refuse_env("got InTuple, which returns the same array again",
+                        First(SyncVectorEnv([InTuple] * 2, autoreset_mode="SameStep")),
+                        eval_env=Reach)
+
+    def test_observations_in_one_array_of_all(self):
+        array = np.zeros(2, np.float32)
+
+        class One(Reach):
+            def _obs(self):
+                array[:] = super()._obs()
+                return array
+
         for mode in AutoresetMode:
-            for kind in (SyncVectorEnv, AsyncVectorEnv):
-                env = kind([Same] * 2, autoreset_mode=mode)
+            self.refuse_env("env: expected observations that other environments do not change, got "
+                            "One, where environments 0 and 1 return the same array",
+                            SyncVectorEnv([One] * 2, autoreset_mode=mode))
+        # One after the other, each observation is read before the next one.
+        np.testing.assert_array_equal(
+            upswing.train("sac", env=One, num_envs=2, **SHORT).last.act([1, 1]),
+            upswing.train("sac", env=Reach, num_envs=2, **SHORT).last.act([1, 1]))
+
+    def test_resets_that_swallow_a_step(self):
+        expected = upswing.train("sac", env=Reach, num_envs=2, **SHORT).last.act([1, 1])
+        for mode in AutoresetMode:
+            for n in (1, 2):
+                env = AsyncVectorEnv([Reach] * n, shared_memory=False, autoreset_mode=mode)
                 self.addCleanup(env.close)
-                if mode == AutoresetMode.SAME_STEP:
-                    self.refuse_env("for AutoresetMode.SAME_STEP, got Same, which returns the same "
-                                    "array again", env)
-                elif kind is SyncVectorEnv:
+                if mode == AutoresetMode.NEXT_STEP:
+                    for wrapped in (env, gym.wrappers.vector.RecordEpisodeStatistics(env)):
+                        self.refuse_env("env: expected AsyncVectorEnv with shared_memory=True or "
+                                        "another autoreset mode, got shared_memory=False", wrapped)
+                elif n == 2:
                     np.testing.assert_array_equal(
-                        upswing.train("sac", env=env, **SHORT).last.act([1, 1]),
-                        upswing.train("sac", env=Reach, num_envs=2, **SHORT).last.act([1, 1]))
+                        upswing.train("sac", env=env, **SHORT).last.act([1, 1]), expected)
+
+    def test_own_vector_environments_that_swallow_a_step(self):
+        class Swallows(SyncVectorEnv):
+            """A vector environment that resets ended episodes again after a reset with a mask."""
+
+            def reset(self, *, seed=None, options=None):
+                pending = self._autoreset_envs.copy()
+                returned = super().reset(seed=seed, options=options)
+                self._autoreset_envs |= pending
+                return returned
+
+        class Own(SyncVectorEnv):
+            pass
+
+        self.refuse_env("env: expected a reset with a mask after which the next step counts, got "
+                        "Swallows, whose next step ignores its actions and resets environment 0",
+                        Swallows([Reach] * 2), eval_env=Reach)
+        upswing.train("sac", env=Own([Reach] * 2), eval_env=Reach, **SHORT)
 
     def test_episodes_that_do_not_repeat(self):
         class Drifting(Reach):

@@ -22,11 +22,14 @@ from gymnasium.wrappers.vector import (DictInfoToList, HumanRendering, RecordEpi
 from gymnasium.wrappers.vector import RescaleAction as RescaleVectorAction
 
 from . import _upswing
-from ._lanes import (Arrays, Lanes, VectorLanes, check_apart, check_last_observations,
-                     check_reset)
+from ._copies import check_copies, check_rows
+from ._lanes import Arrays, Lanes, VectorLanes
+from .envs import DoublePendulumVectorEnv
 from ._settings import whole_number
 from .policy import Policy
+from ._sharing import check_apart
 from ._spaces import Spaces, brief, check_finite, one_line
+from ._vector import check_arrays, check_reset
 
 Env = gym.Env[Any, Any]
 VecEnv = VectorEnv[Any, Any, Any]
@@ -45,6 +48,7 @@ class Source:
 
     def __init__(self, env: EnvLike, num_envs: int | None, eval_env: EnvLike | None,
                  max_episode_steps: int | None, solved_return: float | None) -> None:
+        self._env, self._eval_env = env, eval_env
         self._bases: dict[int, Any] = {}  # unwrapped environments by identity
         self._made: list[Any] = []
         first = self._own(_make(env, "env"), env, "env")
@@ -78,27 +82,35 @@ class Source:
         self.limit = Limit(first, trial, max_episode_steps)
         self._try(trial)
         if isinstance(first, VectorEnv):
+            check_arrays(first)
             check_reset(first)
-            check_last_observations(first, trial, self.space)
             self._try(first)
         # An environment that is passed itself needs a copy only for a second episode.
         if not isinstance(eval_env, gym.Env):
             self._add_evaluation()
         self.description = self._describe(solved_return)
 
-    def make(self, for_evaluation: bool, count: int, arrays: Arrays) -> Lanes | VectorLanes:
-        """The environments as the C++ code begins and steps them."""
+    def make(self, for_evaluation: bool, count: int, evaluations: int, arrays: Arrays
+             ) -> Lanes | VectorLanes:
+        """The environments as the C++ code begins and steps them. The training's come first, which
+        checks them together with those of its `evaluations`."""
         if for_evaluation:
-            while len(self._evaluation) < count:
-                self._add_evaluation()
             return Lanes(self._evaluation[:count], self.space, self.limit, arrays, once=True)
+        while len(self._evaluation) < evaluations:
+            self._add_evaluation()
+        more = [] if isinstance(self._first, VectorEnv) else [
+            self._own(self._make_more(), None, "env") for _ in range(1, count)]
+        if isinstance(self._eval_env, gym.Env):
+            check_copies(self._evaluation, "eval_env")
+        if isinstance(self._env, gym.Env):
+            copies = self._evaluation if self._eval_env is None else more
+            check_copies([self._first, *copies], "env")
         if isinstance(self._first, VectorEnv):
-            check_apart(self._evaluation[0], [*self._evaluation[1:], self._first], self.space)
+            if self._eval_env is None:
+                check_rows(self._first, self._evaluation)
+            check_apart(self._evaluation, [self._first], self.limit.steps)
             return VectorLanes(self._first, self.space, self.limit, arrays)
-        more = [self._own(self._make_more(), None, "env") for _ in range(1, count)]
-        check_apart(self._evaluation[0], [*self._evaluation[1:], self._first], self.space)
-        if more:
-            check_apart(more[0], [self._first], self.space)
+        check_apart(self._evaluation, [self._first, *more], self.limit.steps)
         return Lanes([self._first, *more], self.space, self.limit, arrays, once=False)
 
     def close(self) -> None:
@@ -242,6 +254,8 @@ def _part_maker(env: VecEnv) -> Callable[[], Any]:
     if not functions:
         of_vector = ("num_envs", "vectorization_mode", "vector_kwargs", "autoreset_mode")
         settings = {k: v for k, v in base.spec.kwargs.items() if k not in of_vector}
+        if isinstance(base, DoublePendulumVectorEnv):
+            settings = base.single_settings
         functions = [lambda: gym.make(base.spec.id, **settings)]
     in_turn = itertools.cycle(functions)
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import random
 import signal
 import threading
-import warnings
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +14,7 @@ from gymnasium.vector import (AsyncVectorEnv, AutoresetMode, SyncVectorEnv, Vect
                               VectorWrapper)
 
 from . import _upswing
-from ._spaces import RESET, STEP, Spaces, flags, numbers, one_line, unpacked
+from ._spaces import RESET, STEP, Spaces, flags, numbers, unpacked
 from .envs import DoublePendulumVectorEnv
 
 if TYPE_CHECKING:
@@ -87,43 +85,19 @@ WANTED = ("env: expected a vector environment with AutoresetMode.SAME_STEP, or w
           "options[\"reset_mask\"], as gymnasium.make_vec(..., vectorization_mode=\"sync\") makes it")
 
 
-def check_reset(env: VecEnv) -> None:
-    """Raises InputError if the training could not begin single episodes of a vector environment."""
-    if _resets_itself(env) or env.num_envs == 1:
-        return
-    mask = np.arange(env.num_envs) == 0
-    before = np.array(unpacked(env.reset(seed=0), RESET, "env: expected ")[0])
-    try:
-        after = np.array(env.reset(options={"reset_mask": mask})[0])
-        knows = np.array_equal(before[1:], after[1:], equal_nan=True)
-    except Exception as error:
-        raise _upswing.InputError(f"{WANTED}, got {one_line(error)}") from error
-    if not knows:
-        raise _upswing.InputError(f"{WANTED}, got {type(env).__name__}, whose reset resets or "
-                                  "changes every environment")
-
-
-def check_last_observations(env: VecEnv, single: Env, space: Spaces) -> None:
-    """Raises InputError if the reset of an environment like `single` would change its last
-    observation, of which a vector environment of such parts keeps no copy."""
-    inner = env
-    while isinstance(inner, VectorWrapper):
-        inner = inner.env
-    if not (_resets_itself(env) and isinstance(inner, (SyncVectorEnv, AsyncVectorEnv))):
-        return
-    first = single.reset(seed=0)[0]
-    later = single.step(space.action_of(space.any_actions(1)[0]))[0]
-    if first is later or np.shares_memory(first, later):
-        raise _upswing.InputError(
-            "env: expected observations that later steps do not change, for AutoresetMode.SAME_STEP, "
-            f"got {type(single.unwrapped).__name__}, which returns the same array again; return a "
-            "copy, or use NEXT_STEP")
-
-
-def _resets_itself(env: VecEnv) -> bool:
+def resets_itself(env: VecEnv) -> bool:
     """Whether ended episodes begin again in the step that ends them."""
     mode = env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP)
     return AutoresetMode(mode) == AutoresetMode.SAME_STEP
+
+
+def knows_seeds(env: VecEnv) -> bool:
+    """Whether the reset takes one seed for each environment, as that of a single environment."""
+    inner = env
+    while isinstance(inner, VectorWrapper) and (
+            type(inner).reset.__module__.startswith("gymnasium.")):
+        inner = inner.env
+    return isinstance(inner, (SyncVectorEnv, AsyncVectorEnv, DoublePendulumVectorEnv))
 
 
 class VectorLanes:
@@ -132,17 +106,13 @@ class VectorLanes:
 
     def __init__(self, env: VecEnv, space: Spaces, limit: Limit, arrays: Arrays) -> None:
         self._env, self._space, self._limit, self._arrays = env, space, limit, arrays
-        self._same_step = _resets_itself(env)
+        self._same_step = resets_itself(env)
         self._lengths = np.zeros(env.num_envs, np.int64)
 
     def begin(self, seeds: list[int]) -> None:
         # One seed for each environment, as for single environments, if all parts know such seeds.
-        inner = self._env
-        while isinstance(inner, VectorWrapper) and (
-                type(inner).reset.__module__.startswith("gymnasium.")):
-            inner = inner.env
-        each = isinstance(inner, (SyncVectorEnv, AsyncVectorEnv, DoublePendulumVectorEnv))
-        returned = self._env.reset(seed=seeds if each else seeds[0])  # type: ignore[arg-type]
+        each: Any = seeds if knows_seeds(self._env) else seeds[0]
+        returned = self._env.reset(seed=each)
         self._store(unpacked(returned, RESET, "env: expected ")[0], "obs")
         self._lengths[:] = 0
 
@@ -186,37 +156,6 @@ class VectorLanes:
     def _store(self, obs: Any, name: str) -> None:
         array = self._arrays[name]
         array[:] = numbers(obs, array.shape, "env: expected observations")
-
-
-def check_apart(one: Env, others: list[Any], space: Spaces) -> None:
-    """Raises InputError if steps of other environments change what `one` returns. Warns if `one`
-    does not repeat itself."""
-    def returned(disturbed: bool) -> list[npt.NDArray[Any]]:
-        seen = [one.reset(seed=0)[0]]
-        numpy_state, python_state = np.random.get_state(), random.getstate()
-        for other in others if disturbed else []:
-            other.reset(seed=1)
-            actions = space.any_actions(getattr(other, "num_envs", 1))
-            other.step(space.batch_of(actions) if isinstance(other, VectorEnv)
-                       else space.action_of(actions[0]))
-        np.random.set_state(numpy_state)
-        random.setstate(python_state)
-        seen += one.step(space.action_of(space.any_actions(1)[0]))[:3]
-        return [np.array(part, np.float64) for part in seen]
-
-    def same(a: list[npt.NDArray[Any]], b: list[npt.NDArray[Any]]) -> bool:
-        return all(np.array_equal(x, y, equal_nan=True) for x, y in zip(a, b))
-
-    alone = returned(False)
-    if not same(alone, returned(False)):
-        warnings.warn(
-            "env: two episodes after reset(seed=0) differ, so that trainings do not repeat and "
-            "returns depend on eval_every; draw random numbers from self.np_random after "
-            "super().reset(seed=seed), and let reset clear all other state", stacklevel=4)
-    elif not same(alone, returned(True)):
-        raise _upswing.InputError(
-            f"env: expected environments that share no state, got {type(one.unwrapped).__name__}, "
-            "where a step of one changes another; give each its own in __init__")
 
 
 class Interrupts:

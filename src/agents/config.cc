@@ -92,6 +92,7 @@ EnvConfig Config::Environments() const {
   env.disturbances = {disturbance};
   env.randomization = randomization;
   env.num_envs = static_cast<int>(train.envs);
+  env.evaluations = static_cast<int>(train.eval_episodes);
   env.episode_seconds = episode_seconds;
   env.memory = static_cast<int>(memory);
   if (identify) env.identified_from = plant;

@@ -48,6 +48,7 @@ struct EnvConfig : PendulumEnvConfig {
   std::string environment;      // description, see ForeignTask::Parse; empty: double pendulums
   ForeignMaker make_foreign;    // empty: this program cannot make foreign environments
   bool for_evaluation = false;  // environments need not go on after their first episode
+  int evaluations = 0;          // number of environments of each evaluation of the training
 };
 
 /// Makes environments. Throws BadInput as PendulumEnv does, or if they cannot be made here.

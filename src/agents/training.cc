@@ -61,7 +61,7 @@ class TrainingEvaluator : public Evaluator {
  private:
   Evaluation EvaluateIn(const Engine& engine, const Policy& policy, int64_t step) const {
     EnvConfig env = config_.Environments();
-    env.num_envs = static_cast<int>(config_.train.eval_episodes);  // one per episode
+    env.num_envs = env.evaluations;  // one per episode
     env.episode_seconds = SpecOf(env).evaluation.seconds;
     env.start = StartStates();
     env.reward = RewardConfig();
