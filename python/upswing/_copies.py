@@ -1,4 +1,4 @@
-"""Checks that further environments act as those that the caller passed."""
+"""Checks that copies and further environments act as the ones of the caller."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ def check_copies(envs: list[Any], name: str) -> None:
     if part and all(repeats(probe, record, call) for probe, record in zip(probes, records)):
         raise _upswing.InputError(
             f"{name}: expected an environment whose copies act as it does, got {name_of(whole)}, "
-            f"whose copy {_told(records, call, part)} after the same seed and actions, as if changes "
-            "after its construction were lost; pass a function that makes the environment with its "
+            f"whose copy {_told(records, call, part)} after the same seed and actions, as if "
+            "changes after its construction were lost; pass a function that makes the environment with its "
             "changes")
     after = _constants(env), _constants(duplicate)
     for key, value in before[0].items():

@@ -65,7 +65,7 @@ def ended(returned: Any) -> bool:
     return any(flag is True or (flag is not False and np.any(flag)) for flag in returned[2:4])
 
 
-_NUMBERS = (float, bool, int, np.generic)  # which nobody changes
+_NUMBERS = (float, bool, int, np.generic)  # immutable
 
 
 def leaves(value: Any) -> list[Any]:
@@ -112,8 +112,7 @@ def repeats(probe: Probe, record: list[Returned], call: int) -> bool:
 
 
 def plain(env: Any) -> Any:
-    """The environment without Gymnasium's outer wrappers, such as those that count or record each
-    episode."""
+    """The environment without Gymnasium's outer wrappers, which may count or record episodes."""
     wrapper = VectorWrapper if isinstance(env, VectorEnv) else gym.Wrapper
     while isinstance(env, wrapper) and type(env).__module__.startswith("gymnasium."):
         env = env.env

@@ -33,13 +33,13 @@ def check_apart(evaluations: list[gym.Env[Any, Any]], training: list[Any], limit
     if random_seed is not None:
         warnings.warn(
             f"env: two episodes after reset(seed={random_seed}) differ, so that trainings do not "
-            "repeat and returns depend on eval_every; draw random numbers from self.np_random after "
-            "super().reset(seed=seed), and let reset clear all other state", stacklevel=4)
+            "repeat and returns depend on eval_every; draw random numbers from self.np_random "
+            "after super().reset(seed=seed), and let reset clear all other state", stacklevel=4)
     elif group.draws_global:
         warnings.warn(
             "env: the environments draw from the global random numbers of NumPy or Python, which "
-            "all of them share, so that returns depend on eval_every; draw from self.np_random after "
-            "super().reset(seed=seed)", stacklevel=4)
+            "all of them share, so that returns depend on eval_every; draw from self.np_random "
+            "after super().reset(seed=seed)", stacklevel=4)
 
 
 class _Group:
@@ -55,7 +55,7 @@ class _Group:
         self._probes = [Probe(env, seed, steps) for seed, env in enumerate(envs)]
         self._ahead = ahead
         before = _global_random()
-        self._alone = [probe.run() for probe in self._probes]
+        self._undisturbed = [probe.run() for probe in self._probes]
         self.draws_global = _global_random() != before
 
     def check(self) -> int | None:
@@ -65,7 +65,7 @@ class _Group:
             env, (call, name) = self._probes[i].env, place
             if isinstance(env, VectorEnv):
                 continue  # its parts may share random numbers
-            if not repeats(self._probes[i], self._alone[i], call) or not all(
+            if not repeats(self._probes[i], self._undisturbed[i], call) or not all(
                     self._disturbed().get(i) == place for _ in range(TOGETHER)):
                 return i
             raise _upswing.InputError(
@@ -74,15 +74,15 @@ class _Group:
         return None
 
     def _disturbed(self) -> dict[int, tuple[int, str]]:
-        """Runs all probes in turns. Returns the first difference to the record of each probe alone,
-        by the indices of the probes that have one."""
+        """Runs all probes in turns. Returns the first difference of each probe to its undisturbed
+        record, by the probe's index, if there is one."""
         probes = self._probes
         running = dict(enumerate(probe.calls() for probe in probes))
         states: dict[int, Any] = {}
         turn = 0
         while running:
             for i, calls in list(running.items()):
-                if self.draws_global and i in states:  # each its own, as alone
+                if self.draws_global and i in states:  # its own, as undisturbed
                     _set_global_random(states[i])
                 if next(calls, probes) is probes:
                     del running[i]
@@ -94,7 +94,7 @@ class _Group:
                 with contextlib.suppress(Exception):  # the training meets a fault itself
                     probes[-1].run_ahead(self._ahead)
         found = [first_difference(record, probe.record)
-                 for record, probe in zip(self._alone[:-1], probes)]
+                 for record, probe in zip(self._undisturbed[:-1], probes)]
         return {i: place for i, place in enumerate(found) if place[1]}
 
 

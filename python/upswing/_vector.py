@@ -19,7 +19,7 @@ from ._spaces import RESET, STEP, one_line, unpacked
 Env = gym.Env[Any, Any]
 VecEnv = VectorEnv[Any, Any, Any]
 
-SOON = 64  # steps within which an episode may end for a check of what follows
+SOON = 64  # steps within which an episode must end for a check of the next episode's first step
 
 
 def check_reset(env: VecEnv) -> None:
@@ -32,8 +32,8 @@ def check_reset(env: VecEnv) -> None:
             mode == AutoresetMode.NEXT_STEP):
         raise _upswing.InputError(
             f"env: expected {type(base).__name__} with shared_memory=True or another autoreset "
-            "mode, got shared_memory=False with AutoresetMode.NEXT_STEP, where the first step after "
-            "a reset resets again; use AutoresetMode.SAME_STEP or DISABLED")
+            "mode, got shared_memory=False with AutoresetMode.NEXT_STEP, where the first step "
+            "after a reset resets again; use AutoresetMode.SAME_STEP or DISABLED")
     if mode == AutoresetMode.NEXT_STEP and type(base) is not SyncVectorEnv and (
             type(base) is not AsyncVectorEnv or base.worker is not None):
         _check_first_step(base)
