@@ -111,6 +111,7 @@ int RunPlot(const PlotArguments& a) {
   fmt::print("  {:<10} {}\n", config.env.any_pose ? "at goal" : "upright",
              since < 0 ? "not at the end" : fmt::format("from {:.2f} s to the end", since));
   fmt::print("  torque     {}\n", TorqueText(rollout));
+  fmt::print("  reward     {}\n", RewardText(rollout));
   if (a.trial.is_of_eval()) {
     fmt::print("  episode    {} of eval: {}\n", a.trial.episode,
                JudgementText(*loaded.policy, config.env));

@@ -91,6 +91,7 @@ int RunSimulate(const SimulateArguments& a) {
   fmt::print("{}: {} rows\n", Printable(a.csv), rollout.rows.size());
   fmt::print("  plant      {}\n", EpisodeText(rollout));
   fmt::print("  torque     {}\n", TorqueText(rollout));
+  fmt::print("  reward     {}\n", RewardText(rollout));
   if (loaded && a.trial.is_of_eval()) {
     fmt::print("  episode    {} of eval: {}\n", a.trial.episode,
                JudgementText(*loaded->policy, config.env));
@@ -119,7 +120,8 @@ void AddSimulate(CommandLine& line) {
       "Columns: t [s], qpos0, qpos1 [rad], qvel0, qvel1 [rad/s], torque [N·m], energy [J],\n"
       "height of the tip [m], inverted (0 or 1), the reward and its five terms. The torque\n"
       "is what the motor applies over the next 0.02 s, after its delay and within its\n"
-      "limit. The reward is that of the row's state and torque.\n\n"
+      "limit. The reward is that of these 0.02 s: of this torque and the next row's state, 0\n"
+      "in the last row. The rewards of the first 10 s add up to the return of `eval`.\n\n"
       "Examples:\n"
       "  ./upswing simulate runs/d3qn-seed1 --csv rollout.csv\n"
       "  ./upswing simulate --torque torques.csv --start 0.1,-0.05,0,0 --seconds 10\n"

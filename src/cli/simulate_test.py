@@ -52,8 +52,9 @@ def tilt(angle):
     return abs(math.remainder(angle - math.pi, 2 * math.pi))
 
 
-def expected_terms(plant, row):
-    """Energy, height, inverted and the five reward terms, from their definitions."""
+def expected_terms(plant, row, torque=0):
+    """Energy, height, inverted and the five reward terms of a state that a torque led to, from their
+    definitions."""
     target = (plant["mass1"] * plant["gravity"] * plant["length1"] / 2
               + plant["mass2"] * plant["gravity"] * (plant["length1"] + plant["length2"] / 2))
     e = energy(plant, row)
@@ -69,7 +70,7 @@ def expected_terms(plant, row):
         "height_reward": (h / (plant["length1"] + plant["length2"]) + 1) / 2,
         "balance_reward": 5.0 if inverted else 0.0,
         "velocity_penalty": -0.01 * speeds if inverted else 0.0,
-        "torque_penalty": -(0.05 if inverted else 0.01) * row["torque"]**2,
+        "torque_penalty": -(0.05 if inverted else 0.01) * torque**2,
     }
 
 
@@ -82,12 +83,15 @@ class SimulateTest(ProgramTest):
         return self.simulate("--torque", REFERENCE, "--start", "0.1,-0.05,0,0", *more)
 
     def assert_terms(self, plant, rows):
-        for row in rows:
+        """The terms of a row are those of the step that begins there: of the next row's state."""
+        for row, after in zip(rows, rows[1:]):
             expected = expected_terms(plant, row)
-            for name, value in expected.items():
+            rewards = expected_terms(plant, after, row["torque"])
+            for name, value in (expected | {name: rewards[name] for name in COLUMNS[10:]}).items():
                 self.assertAlmostEqual(row[name], value, delta=1e-12 * max(1, abs(value)), msg=name)
             self.assertAlmostEqual(row["reward"], sum(row[name] for name in COLUMNS[10:]),
                                    delta=1e-12)
+        self.assertEqual({rows[-1][name] for name in COLUMNS[9:]}, {0})
 
     # ---- Physics and reward.
 
@@ -241,7 +245,10 @@ class SimulateTest(ProgramTest):
 
     def test_seconds_may_be_shorter_than_the_schedule(self):
         short = self.reference_rollout("--seconds", 1)
-        self.assertEqual(short, self.reference_rollout()[:51])
+        long = self.reference_rollout()
+        self.assertEqual(short[:50], long[:50])
+        state = COLUMNS[:9]  # the last row has no reward, because no step follows
+        self.assertEqual([short[50][name] for name in state], [long[50][name] for name in state])
 
 
 class PolicyRolloutTest(ProgramTest):
@@ -320,12 +327,14 @@ class PolicyRolloutTest(ProgramTest):
                          ["goal of link 1", "goal of link 2"])
         self.assertIn(" motion, 2 for the goal, 3 for the last step\n",
                       self.succeed("info", "poses"))
-        # The reward of a row at rest in its goal: all of energy, height and balance.
+        # The reward of a step at rest in its goal: all of energy, height and balance.
         for start, goal in (("0,0,0,0", "down-down"), (f"{math.pi},{math.pi},0,0", "up-down")):
             row = numbers(parse(self.succeed("simulate", "poses", "--start", start, "--goal", goal,
                                              "--seconds", 0.1))[0])
             self.assertEqual(row["inverted"], 1)
-            self.assertAlmostEqual(row["reward"], 7 - 0.05 * row["torque"]**2, 12)
+            self.assertAlmostEqual(row["energy_reward"] + row["height_reward"], 2, delta=0.1)
+            self.assertEqual(row["balance_reward"], 5)
+            self.assertAlmostEqual(row["torque_penalty"], -0.05 * row["torque"]**2, 12)
         # `eval` draws the goals, `--episode` has the same ones.
         report = json.loads(self.succeed("eval", "poses", "--episodes", 40, "--json",
                                          "--episodes-csv", "episodes.csv"))

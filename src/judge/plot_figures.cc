@@ -118,7 +118,10 @@ Panel Rewards(const Rows& rows) {
   for (size_t k = 0; k < kRewardTermNames.size(); ++k) {
     std::string name = kRewardTermNames[k];
     std::ranges::replace(name, '_', ' ');
-    lines.push_back(Held(name, rows, [k](const RolloutRow& row) { return row.terms[k]; }));
+    Line line = Held(name, rows, [k](const RolloutRow& row) { return row.terms[k]; });
+    line.x.pop_back();  // no step begins in the last row
+    line.y.pop_back();
+    lines.push_back(std::move(line));
   }
   return PanelOf("reward per step", std::move(lines));
 }

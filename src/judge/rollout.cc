@@ -39,16 +39,6 @@ void AddEstimates(const Policy& policy, Matrix<const float> obs, Policy::Memory&
   policy.Spread(obs, {&row.spread->low, 1, 1}, {&row.spread->high, 1, 1}, memory);
 }
 
-/// Sets the reward for the state and torque of a row.
-void RewardRow(const Rollout& rollout, RolloutRow& row) {
-  const auto& [rows, plant, disturbance, goal] = rollout;
-  row.terms = goal ? RewardTerms(plant, row.state, row.torque, *goal)
-                   : RewardTerms(plant, row.state, row.torque);
-  row.reward = 0;
-  for (const double term : row.terms) row.reward += term;
-  row.inverted = Inverted(SeenFrom(goal.value_or(Pose()), row.state));
-}
-
 }  // namespace
 
 int64_t RolloutSteps(double seconds) { return std::llround(seconds * kStepsPerSecond); }
@@ -79,11 +69,13 @@ void Episode::Step(const std::array<double, 2>& push) {
   RolloutRow row;
   row.t = static_cast<double>(step) / kStepsPerSecond;
   row.state = env_->state(0);
+  row.inverted = Inverted(SeenFrom(rollout_.goal.value_or(Pose()), row.state));
   row.chosen = torque;
   if (config_.estimates) AddEstimates(*config_.policy, env_->obs(), *memory_, row);
   env_->Step({&torque, 1}, result_);
   row.torque = result_.torque[0];
-  RewardRow(rollout_, row);
+  row.reward = result_.reward[0];
+  std::copy_n(result_.reward_terms.begin(), kRewardTerms, row.terms.begin());
   rollout_.rows.push_back(std::move(row));
   if (result_.terminated[0] == 0) return;
   throw Failure(
@@ -112,7 +104,10 @@ Rollout RunRollout(const RolloutConfig& config) {
   // last state.
   const int64_t steps = RolloutSteps(config.seconds);
   while (episode.steps() <= steps && !episode.done()) episode.Step();
-  return episode.rollout();
+  Rollout rollout = episode.rollout();
+  rollout.rows.back().reward = 0;
+  rollout.rows.back().terms = {};
+  return rollout;
 }
 
 std::string TorqueText(const Rollout& rollout) {
@@ -131,6 +126,20 @@ std::string TorqueText(const Rollout& rollout) {
   if (!tally.has_goal_steps()) return text;
   return text +
          fmt::format(", once {} {:.4g} N·m/s", Reached(rollout.goal.has_value()), e.goal_variation);
+}
+
+std::string RewardText(const Rollout& rollout) {
+  const auto& rows = rollout.rows;
+  const auto sum = [&](size_t steps) {
+    double reward = 0;
+    for (size_t k = 0; k < steps; ++k) reward += rows[k].reward;
+    return reward;
+  };
+  const size_t steps = rows.size() - 1;
+  const auto counted = static_cast<size_t>(RolloutSteps(kReturnSeconds));
+  std::string text = fmt::format("{:.6g} in {:g} s", sum(steps), rows.back().t);
+  if (steps <= counted) return text;
+  return text + fmt::format(", {:.6g} in the first {:g} s", sum(counted), kReturnSeconds);
 }
 
 std::string RolloutCsv(const Rollout& rollout) {

@@ -19,8 +19,9 @@ struct RolloutRow {
   double t = 0;  // s
   PendulumState state;
   double torque = 0;  // applied by the motor, delayed and limited; N·m
-  // For the state and torque of this row:
-  bool inverted = false;
+  bool inverted = false;  // in this state, or at the goal
+  // Of the control step that begins here: for this torque and the next row's state, as `eval` adds
+  // it up. 0 in the last row of a finished rollout, because no step follows.
   double reward = 0;  // sum of the terms
   std::array<double, kRewardTerms> terms{};
   // Only if requested, and if the policy estimates them:
@@ -89,6 +90,10 @@ Rollout RunRollout(const RolloutConfig& config);
 /// The motor's torques over a rollout, with the figures that `eval` computes for an episode:
 /// `peak 5 N·m, rms 1.2 N·m, variation 34 N·m/s, once upright 2 N·m/s`.
 std::string TorqueText(const Rollout& rollout);
+
+/// The sum of a rollout's rewards, and of the part that `eval` counts: `7100 in 20 s, 2595 in the
+/// first 10 s`.
+std::string RewardText(const Rollout& rollout);
 
 /// A rollout as CSV, one row for each state: t, state, torque, energy, height, whether it is
 /// inverted, reward and its terms.
