@@ -4,11 +4,13 @@
 #include <cmath>
 
 #include "pendulum/sensors.h"
+#include "pendulum/timestep.h"
 
 namespace upswing::machine {
 
 SimulatedMachine::SimulatedMachine(const Twin& twin, const PendulumState& start)
     : twin_(twin), body_(BodyOf(twin)), drive_(twin.actuator.delay, twin.actuator.lag) {
+  CheckTimestep(twin.plant, "twin", kMotionStep);
   moments_.push_back({0, start, body_.Acceleration(start, {})});
 }
 

@@ -27,7 +27,8 @@ struct TimedReading : MachineReading {
 /// its moment. With a negative delay a torque acts before the moment in which it is sent.
 class SimulatedMachine {
  public:
-  /// Begins at time 0 in a state, whose angles are true ones, without torque.
+  /// Begins at time 0 in a state, whose angles are true ones, without torque. Throws BadInput if
+  /// steps of kMotionStep are unstable for the twin.
   SimulatedMachine(const Twin& twin, const PendulumState& start);
 
   /// Lets time pass until `time`, s.

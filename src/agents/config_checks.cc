@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "base/format.h"
 #include "base/text.h"
+#include "pendulum/timestep.h"
 
 namespace upswing {
 namespace {
@@ -43,6 +44,7 @@ void CheckSettings(Config& config, const std::string& where) {
       throw BadInput("start_policy: expected an agent of dqn or sac, got one of ppo");
     }
     if (!config.reward.expression.empty()) (void)OwnReward(config.reward.expression);
+    CheckTimestep(config.plant, config.randomization, "plant");
   } catch (const Error& error) {
     throw BadInput(Concat(where, where.empty() ? "" : ": ", error.what()));
   }

@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "control/linearize.h"
+#include "pendulum/timestep.h"
 #include "pendulum/upright_modes.h"
 
 namespace upswing {
@@ -17,14 +18,6 @@ Error NoGain(const LqrConfig& config, const Plant& plant) {
   const UprightModes modes = ModesOf(plant);
   if (std::max({config.q1, config.q2, config.w1, config.w2}) == 0) {
     return BadInput("lqr: expected a weight above 0 for q1, q2, w1 or w2, got only 0");
-  }
-  // Rate beyond which a Runge-Kutta step no longer decays: Hairer, Wanner, "Solving Ordinary
-  // Differential Equations II" (1996), section IV.2.
-  constexpr double kLargestDecay = 2.785 / kPhysicsTimestep;
-  if (modes.decay > kLargestDecay) {
-    return BadInput(Concat("lqr: expected a plant whose damping decays at no more than ",
-                           Rounded(kLargestDecay), "/s, so that time steps of ", kPhysicsTimestep,
-                           " s are stable, got ", Rounded(modes.decay), "/s"));
   }
   if (std::abs(modes.delta) > 1e-3) {
     return BadInput(Concat(
@@ -47,6 +40,7 @@ Eigen::Matrix4d WeightsOf(const LqrConfig& config) {
 }
 
 Lqr SolveLqr(const LqrConfig& config, const Plant& plant) {
+  CheckTimestep(plant, "design plant");
   const LinearModel model = Discretize(LinearizeUpright(plant), kPhysicsTimestep, kPhysicsSteps);
   const auto lqr = SolveDiscreteLqr(model, WeightsOf(config), config.torque);
   if (!lqr) throw NoGain(config, plant);

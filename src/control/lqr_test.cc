@@ -239,8 +239,9 @@ TEST(Lqr, RefusesAPlantThatTheStepsCannotFollow) {
   plant.damping2 = 100;
   EXPECT_EQ(
       MessageOf(LqrConfig(), plant),
-      "lqr: expected a plant whose damping decays at no more than 557/s, so that time steps of "
-      "0.005 s are stable, got 3111/s");
+      "design plant: expected friction that stops the joints at a rate of at most 557/s, because "
+      "time steps of 0.005 s are unstable beyond it, got 3111.25/s: damping2 = 100 N·m·s/rad and "
+      "coulomb2 = 0 N·m act on 0.0321477 kg·m²");
 }
 
 TEST(Lqr, RefusesWeightsOfNothing) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/text.h"
+#include "pendulum/timestep.h"
 
 namespace upswing {
 namespace {
@@ -22,6 +23,12 @@ std::optional<Disturber> MakeDisturber(const PendulumEnvConfig& config) {
   if (!largest.any()) return std::nullopt;
   return Disturber(config.disturbances, config.num_envs, largest, config.seed,
                    NoiseStream(config.stream), config.first_index);
+}
+
+/// The settings, if their time step is stable for all plants. Throws BadInput.
+const PendulumEnvConfig& Checked(const PendulumEnvConfig& config) {
+  for (const Plant& plant : config.plants) CheckTimestep(plant, config.randomization, "plant");
+  return config;
 }
 
 /// The settings of the physics, which judges by the built-in terms that an expression may use.
@@ -57,7 +64,7 @@ EnvSpec PendulumSpec(const PendulumEnvConfig& config) {
 }
 
 PendulumEnv::PendulumEnv(const PendulumEnvConfig& config)
-    : config_(config),
+    : config_(Checked(config)),
       spec_(PendulumSpec(config)),
       physics_(config.engine->make(PhysicsOf(config))),
       episode_steps_(std::max<int64_t>(1, std::llround(config_.episode_seconds / kControlPeriod))),
@@ -114,7 +121,10 @@ void PendulumEnv::Randomize(int env) {
   plant_seeds_[i] = plant_rngs_[i];
   plants_[i] = random.Draw(config_.plant(env), plant_rngs_[i]);
   Disturbance disturbance = random.Draw(config_.disturbance(env), plant_rngs_[i]);
-  if (posterior_) posterior_->Deviate(plants_[i], disturbance, plant_rngs_[i]);
+  if (posterior_) {
+    posterior_->Deviate(plants_[i], disturbance, plant_rngs_[i]);
+    CheckTimestep(plants_[i], "plant drawn from the posterior");
+  }
   physics_->SetPlant(env, plants_[i]);
   if (disturber_) disturber_->Set(env, disturbance);
 }

@@ -62,7 +62,8 @@ EnvSpec PendulumSpec(const PendulumEnvConfig& config);
 /// and goal use the true state.
 class PendulumEnv : public VectorEnv {
  public:
-  /// Throws BadInput under the same conditions as Engine::make.
+  /// Throws BadInput under the same conditions as Engine::make, and as CheckTimestep does for the
+  /// plants.
   explicit PendulumEnv(const PendulumEnvConfig& config);
 
   const EnvSpec& spec() const override { return spec_; }

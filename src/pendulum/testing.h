@@ -4,17 +4,30 @@
 #include <numbers>
 #include <variant>
 
+#include "base/error.h"
 #include "base/options.h"
 #include "base/rng.h"
 #include "pendulum/plant.h"
+#include "pendulum/timestep.h"
 
 /// Helpers that the tests of the double pendulum share.
 namespace upswing {
 
 inline constexpr double kPi = std::numbers::pi;
 
-/// A plant with parameters drawn from their whole ranges, without rotors and dry friction.
-/// Parameters are uniform on a logarithmic scale, or in the cube root where a range begins at 0.
+/// Whether the physics' steps are stable for a plant.
+inline bool IsStable(const Plant& plant) {
+  try {
+    CheckTimestep(plant, "plant");
+  } catch (const Error&) {
+    return false;
+  }
+  return true;
+}
+
+/// A plant with parameters drawn from their whole ranges, without rotors and dry friction, for
+/// which the physics' steps are stable. Parameters are uniform on a logarithmic scale, or in the
+/// cube root where a range begins at 0.
 inline Plant RandomPlant(Rng& rng) {
   Plant plant;
   const Options options = OptionsOf(plant);
@@ -27,7 +40,7 @@ inline Plant RandomPlant(Rng& rng) {
     if (option.step > 0)
       *std::get<double*>(option.target) = std::round(*std::get<double*>(option.target));
   }
-  return plant;
+  return IsStable(plant) ? plant : RandomPlant(rng);
 }
 
 /// A RandomPlant with rotors and dry friction, both small enough for the physics' steps. It has its
@@ -45,7 +58,7 @@ inline Plant RandomMachine(Rng& rng) {
   plant.center2 = often(rng.Uniform(0.2, 1.2) * plant.length2);
   plant.inertia1 = often(rng.Uniform(0.02, 0.3) * plant.mass1 * plant.length1 * plant.length1);
   plant.inertia2 = often(rng.Uniform(0.02, 0.3) * plant.mass2 * plant.length2 * plant.length2);
-  return plant;
+  return IsStable(plant) ? plant : RandomMachine(rng);
 }
 
 }  // namespace upswing

@@ -59,10 +59,7 @@ UprightModes ModesOf(const Manipulator& plant, int actuated_joint) {
   // Division by (λ - fast): c3 λ³ + c2 λ² + c1 λ + c0
   const double c3 = k4, c2 = k3 + fast * c3, c1 = k2 + fast * c2, c0 = k1 + fast * c1;
   const double slow = newton(fast, 0, c3, c2, c1, c0);
-  // Division of the cubic by (λ - slow): c3 λ² + e1 λ + e0
-  const double e1 = c2 + slow * c3, e0 = c1 + slow * e1;
-  const double decay = (e1 + std::sqrt(e1 * e1 - 4 * c3 * e0)) / (2 * c3);
-  UprightModes modes{fast, slow, decay, 0, 0};
+  UprightModes modes{fast, slow, 0, 0};
   SetPassiveJoint(plant, actuated_joint, modes);
   return modes;
 }

@@ -9,7 +9,6 @@ namespace upswing {
 /// The quantities that decide whether one motor can hold both links upright.
 struct UprightModes {
   double faster, slower;  // rates of growth of the two unstable modes, 1/s
-  double decay;           // rate of the mode that decays fastest, 1/s
   // Rate at which the joint without a motor falls while the other joint is held still, 1/s.
   double pole;
   // (z - pole) / (z + pole), where z is the zero of the passive joint's response to the other

@@ -35,6 +35,7 @@ interface Exports {
   ): void;
   numbers(): number;
   pendulum_at(): void;
+  pendulum_check(): number;
   pendulum_step(): void;
   identifier_open(): number;
   identifier_close(identifier: number): void;

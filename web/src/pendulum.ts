@@ -195,6 +195,13 @@ export function rewardTerms(
   return [...at(plant, s, tau, goal).subarray(13, 18)];
 }
 
+/// Why the physics is not stable for a plant; empty if it is.
+export function plantProblem(plant: Plant): string {
+  let stable = 0;
+  core().formula(plantNumbers(plant), () => (stable = core().exports.pendulum_check()));
+  return stable === 0 ? core().text : '';
+}
+
 /// The model as MJCF, with all digits of the plant's numbers. Contacts and constraints are off: a
 /// step takes less time and the trajectory is the same.
 export function mjcf(plant: Plant): string {

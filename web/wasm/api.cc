@@ -17,6 +17,7 @@
 #include "pendulum/mjcf.h"
 #include "pendulum/observation.h"
 #include "pendulum/sensors.h"
+#include "pendulum/timestep.h"
 #include "rl/softmax.h"
 #include "web/wasm/learner.h"
 #include "web/wasm/step.h"
@@ -175,6 +176,7 @@ UPSWING_EXPORT(policy_open) Controller* PolicyOpen(const std::byte* file, size_t
           "expected a policy for links that are solid capsules and the usual armature, as in the "
           "page, got others");
     }
+    CheckTimestep(controller->loaded.plant, "plant");
     SetText(About(*controller, tensors.metadata));
     return controller.release();
   });
@@ -315,6 +317,14 @@ UPSWING_EXPORT(pendulum_at) void PendulumAt() {
            .out;
   std::ranges::copy(
       any_pose ? RewardTerms(plant, s, in.torque, goal) : RewardTerms(plant, s, in.torque), to);
+}
+
+/// Input: plant (8). 1 if the physics is stable for it.
+UPSWING_EXPORT(pendulum_check) int PendulumCheck() {
+  return Guarded([] {
+    CheckTimestep(PlantAt(number.data()), "plant");
+    return 1;
+  });
 }
 
 /// One physics step. Output: the state after it (4).

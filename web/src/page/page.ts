@@ -1,7 +1,7 @@
 import { core } from '../core';
 import { History } from '../history';
 import { LearnPanel } from '../learn/panel';
-import { GOALS } from '../pendulum';
+import { GOALS, plantProblem } from '../pendulum';
 import type { GoalName, State } from '../pendulum';
 import type { Mujoco } from '../mujoco';
 import { Scene, TRAIL_SECONDS } from '../view/scene';
@@ -148,6 +148,11 @@ export class Page {
       learns || writes
         ? { shared: {}, problems: [] }
         : decode(returns ? this.laboratory : hash, RANGES, (id) => this.agents.has(id));
+    const unstable = shared.plant ? plantProblem(shared.plant) : '';
+    if (unstable) {
+      delete shared.plant;
+      problems.push(unstable);
+    }
     // A policy learned in the page stays on the stage.
     const isAsked = shared.agent && !returns;
     if ((learns || this.tour.number > 0) && this.learn.keeps && !isAsked) {

@@ -1,10 +1,11 @@
 import { DISTURBANCE_LIMITS } from '../disturbance';
 import type { Disturbance } from '../disturbance';
-import { CONTROL_PERIOD, NOMINAL, PLANT_LIMITS } from '../pendulum';
+import { CONTROL_PERIOD, NOMINAL, PLANT_LIMITS, plantProblem } from '../pendulum';
 import type { Parameter, Plant, Range } from '../pendulum';
 import type { Policy } from '../policy';
 import type { World } from '../world';
 import { element } from './dom';
+import { warn } from './message';
 import { Slider } from './sliders';
 import type { SliderSpec } from './sliders';
 
@@ -123,7 +124,13 @@ export class Settings {
     for (const row of PLANT) {
       const spec = { ...row, limits: PLANT_LIMITS[row.name], initial: NOMINAL[row.name] };
       const slider = new Slider(spec, (value) => {
-        world.plant = { ...world.plant, [row.name]: value };
+        const plant = { ...world.plant, [row.name]: value };
+        const problem = plantProblem(plant);
+        if (problem) {
+          slider.value = world.plant[row.name];
+          return warn(`${problem}.`);
+        }
+        world.plant = plant;
         onChange();
       });
       this.plant.set(row.name, slider);
