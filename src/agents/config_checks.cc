@@ -61,6 +61,13 @@ std::vector<std::string> Warnings(const Config& config) {
       std::ranges::all_of(config.reward.weight, [](double weight) { return weight == 0; })) {
     warnings.emplace_back("every reward weight is 0: the agent learns nothing");
   }
+  const Options options = OptionsOf(config);
+  const std::string asymmetry =
+      options.Get("mirror")->text() == "false" ? RewardAsymmetry(config.Environments()) : "";
+  if (!asymmetry.empty()) {
+    warnings.push_back(
+        Concat("mirror is off, because mirrored states have another reward: ", asymmetry));
+  }
   return warnings;
 }
 

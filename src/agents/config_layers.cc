@@ -117,6 +117,26 @@ void FitToForeign(const Options& options, bool decay_given, Config& config) {
   config.ppo.actions = "levels";
 }
 
+/// The place of the setting `mirror` for messages; empty if neither file nor flags set it.
+std::string PlaceOfMirror(const toml::table& file, const std::string& file_name,
+                          const std::vector<FlagValue>& flags) {
+  std::string place = FindEarly("agent", "mirror", file, file_name, flags).where;
+  const auto* node = file["agent"]["mirror"].node();
+  if (place.empty() && node != nullptr) place = Concat(PlaceOf(*node, file_name), ": mirror");
+  return place;
+}
+
+/// Turns `mirror` off for a reward that is not symmetric. Throws BadInput if the user set it, at
+/// `place`.
+void FitToReward(const Options& options, const std::string& place, const Config& config) {
+  if (options.Get("mirror")->text() == "false") return;
+  const std::string asymmetry = RewardAsymmetry(config.Environments());
+  if (asymmetry.empty()) return;
+  if (place.empty()) return options.Set("mirror", "false", "reward");
+  throw BadInput(Concat(place, ": expected false with this reward, which is ", asymmetry,
+                        ", got true"));
+}
+
 }  // namespace
 
 Options KnownOptions(Config& config) {
@@ -176,6 +196,7 @@ Config ParseConfig(std::string_view text, const std::string& where,
     FitToForeign(options, decay_in_file || !decay.where.empty(), config);
   }
   CheckSettings(config, where);
+  FitToReward(options, PlaceOfMirror(table, where, flags), config);
   return config;
 }
 

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Tests of --reward: a training by a reward of your own."""
 
+import re
 import unittest
 
 from testing import ProgramTest, read_csv, read_tensors, small
@@ -34,6 +35,51 @@ class RewardTest(ProgramTest):
         self.succeed("train", "--resume", "run", "--steps", "4000")
         self.succeed(*small(steps=4000, reward=REWARD, episode_seconds=1.5, out="never-stopped"))
         self.assert_same_run("run", "never-stopped")
+
+    def mirrors(self, run):
+        """Whether the settings of a run mirror its minibatches."""
+        found = re.search(r"(?m)^mirror = (\w+)", (self.folder / run / "config.toml").read_text("utf-8"))
+        return found[1] == "true"
+
+    def test_a_reward_without_symmetry_is_not_mirrored(self):
+        self.assertIn("Warning: mirror is off, because mirrored states have another reward: ",
+                      self.succeed(*small(steps=2000, reward="0.2*w1")))
+        self.assertFalse(self.mirrors("run"))
+        # The same as without the setting, and after a stop.
+        self.succeed(*small(steps=4000, reward="0.2*w1", mirror=False, out="never-stopped"))
+        self.succeed("train", "--resume", "run", "--steps", "4000")
+        self.assert_same_run("run", "never-stopped")
+        self.assertNotIn("mirror", self.succeed(*small(steps=2000, reward="a: w1 + E; b: -w1", out="symmetric")))
+        self.assertTrue(self.mirrors("symmetric"))
+        # A plant that only some episodes have.
+        self.succeed(*small(steps=1000, reward="mass2 > 1.2 ? w2 : E", out="nominal"))
+        self.succeed(*small(steps=1000, reward="mass2 > 1.2 ? w2 : E", out="random"), "--randomize", 0.3)
+        self.assertEqual([self.mirrors(run) for run in ("nominal", "random")], [True, False])
+
+    def test_mirror_that_is_asked_for_is_refused_without_symmetry(self):
+        self.refuse(small(reward="tau", mirror=True), "--mirror: expected false with this reward, which is ",
+                    " at the mirror image, got true")
+        self.write("mine.toml", 'mirror = true'.join(("[agent]\n", "\n")))
+        self.refuse(["train", "--config", "mine.toml", "--reward", "tau"], "mine.toml:2: mirror: expected false")
+
+    def test_a_study_does_the_same(self):
+        self.write("study.toml", """seeds = 1
+
+[settings]
+agent = "fast"
+steps = 1000
+eval_every = 1000
+eval_episodes = 2
+
+[variants.plain]
+reward = "E"
+
+[variants.lean]
+reward = "E + 0.1*w1"
+""")
+        output = self.succeed("study", "study.toml", "--out", "study")
+        self.assertIn("Warning: lean: mirror is off", output)
+        self.assertEqual([self.mirrors(f"study/{name}/seed1") for name in ("plain", "lean")], [True, False])
 
     def test_files_keep_the_reward(self):
         self.succeed(*small(steps=2000, reward=REWARD))

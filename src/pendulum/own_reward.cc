@@ -4,12 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <numbers>
 #include <utility>
 
 #include "base/error.h"
 #include "base/steps.h"
 #include "base/text.h"
+#include "pendulum/goal.h"
 #include "pendulum/task.h"
 
 namespace upswing {
@@ -24,6 +27,75 @@ constexpr std::string_view kInNames = "0123456789_", kOperators = " .,;:?()+-*/^
 constexpr size_t kNone = std::string_view::npos;
 // Columns of episodes.csv, in which each term has one, too.
 const std::vector<std::string> kTaken{"step", "episode", "return", "length", "terminated"};
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+/// a and b; NaN if one of them that decides is NaN.
+double And(double a, double b) {
+  if (std::isnan(a) || a == 0) return a;
+  return std::isnan(b) ? b : b != 0;
+}
+double Or(double a, double b) {
+  if (std::isnan(a)) return a;
+  if (a != 0) return 1;
+  return std::isnan(b) ? b : b != 0;
+}
+
+/// A comparison; NaN if an operand is.
+template <typename Comparison>
+double Compare(double a, double b) {
+  return std::isnan(a) || std::isnan(b) ? kNaN : static_cast<double>(Comparison()(a, b));
+}
+
+/// aᵇ; a square is the product, which is exact to rounding and fast.
+double Power(double a, double b) { return b == 2 ? a * a : std::pow(a, b); }
+
+/// Thrown while an expression is evaluated: the condition of ?: is NaN.
+struct ConditionIsNaN {};
+
+/// The operator that stands between a condition and its `?`; users cannot type it.
+constexpr const char* kCheck = "#";
+double CheckCondition(double condition, double /*unused*/) {
+  if (std::isnan(condition)) throw ConditionIsNaN();
+  return condition;
+}
+
+/// x within low … high; NaN if an argument is.
+double Clamp(double x, double low, double high) {
+  if (std::isnan(low) || std::isnan(high)) return kNaN;
+  if (x < low) return low;
+  return x > high ? high : x;
+}
+
+/// Defines the operators of an expression in place of muParser's own. Those evaluate constants by
+/// other rules than variables (0.5 && 1 is 0), and NaN is true.
+void DefineOperators(mu::Parser& parser) {
+  struct Operator {
+    const char* name;
+    double (*function)(double, double);
+    int precedence;
+  };
+  constexpr Operator kOperators[] = {
+      {kCheck, CheckCondition, 0},
+      {"||", Or, mu::prLOR},
+      {"&&", And, mu::prLAND},
+      {"<", Compare<std::less<>>, mu::prCMP},
+      {"<=", Compare<std::less_equal<>>, mu::prCMP},
+      {">", Compare<std::greater<>>, mu::prCMP},
+      {">=", Compare<std::greater_equal<>>, mu::prCMP},
+      {"==", Compare<std::equal_to<>>, mu::prCMP},
+      {"!=", Compare<std::not_equal_to<>>, mu::prCMP},
+      {"+", [](double a, double b) { return a + b; }, mu::prADD_SUB},
+      {"-", [](double a, double b) { return a - b; }, mu::prADD_SUB},
+      {"*", [](double a, double b) { return a * b; }, mu::prMUL_DIV},
+      {"/", [](double a, double b) { return a / b; }, mu::prMUL_DIV},
+  };
+  parser.EnableBuiltInOprt(false);
+  for (const auto& [name, function, precedence] : kOperators) {
+    parser.DefineOprt(name, function, static_cast<unsigned>(precedence));
+  }
+  parser.DefineOprt("^", Power, mu::prPOW, mu::oaRIGHT);
+}
 
 /// Defines the functions and constants of an expression in place of muParser's own, and returns
 /// their names.
@@ -40,11 +112,7 @@ std::vector<std::string> DefineFunctions(mu::Parser& parser) {
       {"atan2", std::atan2},
       {"min", [](double a, double b) { return std::isnan(a) || a < b ? a : b; }},
       {"max", [](double a, double b) { return std::isnan(a) || a > b ? a : b; }}};
-  constexpr std::pair<const char*, Three> kThree[] = {{"clamp",
-                                                       [](double x, double low, double high) {
-                                                         return x < low ? low : x > high ? high : x;
-                                                       }},
-                                                      {"fma", std::fma}};
+  constexpr std::pair<const char*, Three> kThree[] = {{"clamp", Clamp}, {"fma", std::fma}};
   parser.ClearFun();
   parser.ClearConst();
   parser.DefineConst("pi", std::numbers::pi);
@@ -111,6 +179,19 @@ struct OwnReward::Parsed {
 
   /// Adds a term. Throws BadInput that begins with `where`.
   void Add(std::string_view text, const std::string& where);
+  /// The value of a term for the present variables; NaN if a condition in it is NaN.
+  double Value(size_t term) const;
+  /// The sum of all terms for the present variables, and of their absolute values.
+  struct Sum {
+    double reward = 0, size = 0;
+  };
+  Sum Total() const;
+  /// Sets the variables to a random moment of a random episode.
+  void Draw(const Plant& drawn, Rng& rng);
+  /// Negates angles, velocities and torques.
+  void Mirror();
+  /// The values of the variables, such as `q1 = 0.1, q2 = …`.
+  std::string Values() const;
   /// The message about the value of a term for the present variables; empty if it is in range.
   std::string Problem(double value, const std::string& name) const;
 
@@ -128,6 +209,7 @@ struct OwnReward::Parsed {
 
 void OwnReward::Parsed::Add(std::string_view text, const std::string& where) {
   mu::Parser& parser = terms.emplace_back();
+  DefineOperators(parser);
   std::vector<std::string> names = DefineFunctions(parser);
   const auto define = [&](const std::string& name, double* variable) {
     parser.DefineVar(name, variable);
@@ -140,9 +222,14 @@ void OwnReward::Parsed::Add(std::string_view text, const std::string& where) {
   try {
     parser.SetExpr(std::string(text));
     parser.Eval();
-    if (parser.GetNumResults() == 1) return;
-    throw BadInput(Concat(where, "expected one expression, got ", parser.GetNumResults(),
-                          " with commas between them; a semicolon separates terms"));
+    if (parser.GetNumResults() != 1) {
+      throw BadInput(Concat(where, "expected one expression, got ", parser.GetNumResults(),
+                            " with commas between them; a semicolon separates terms"));
+    }
+    // Messages about the text above quote it as it is. Now each condition gets its check.
+    std::string checked;
+    for (const char c : text) checked += c == '?' ? Concat(kCheck, "0?") : std::string(1, c);
+    parser.SetExpr(checked);
   } catch (const mu::ParserError& error) {
     const std::string& token = error.GetToken();
     if (error.GetCode() == mu::ecUNASSIGNABLE_TOKEN && kLetters.find(token[0]) != kNone) {
@@ -155,14 +242,66 @@ void OwnReward::Parsed::Add(std::string_view text, const std::string& where) {
   }
 }
 
-std::string OwnReward::Parsed::Problem(double value, const std::string& name) const {
-  if (std::abs(value) <= kLargest) return "";
+double OwnReward::Parsed::Value(size_t term) const {
+  try {
+    return terms[term].Eval();
+  } catch (const ConditionIsNaN&) {
+    return kNaN;
+  }
+}
+
+OwnReward::Parsed::Sum OwnReward::Parsed::Total() const {
+  Sum sum;
+  for (size_t k = 0; k < terms.size(); ++k) {
+    const double value = Value(k);
+    sum.reward += value;
+    sum.size += std::abs(value);
+  }
+  return sum;
+}
+
+void OwnReward::Parsed::Draw(const Plant& drawn, Rng& rng) {
+  plant = drawn;
+  // Half of the states are near a pose at rest. Magnitudes spread over several decades.
+  const auto spread = [&](double lowest, double highest) {
+    const double share = std::log(highest / lowest) * rng.Uniform();
+    return rng.Uniform(-1, 1) * lowest * std::exp(share);
+  };
+  const PendulumState pose = RestIn(kPoses[rng.Below(4)]);
+  const bool near = rng.Below(2) == 0;
+  const double turn = 2 * std::numbers::pi;
+  const auto angle = [&](double at_rest) {
+    const double turns = rng.Below(4) == 0 ? std::floor(rng.Uniform(-3, 4)) : 0;
+    return turn * turns + (near ? at_rest + spread(0.01, 0.5) : rng.Uniform(-turn / 2, turn / 2));
+  };
+  s = {angle(pose.q1), angle(pose.q2), spread(0.01, 50), spread(0.01, 50)};
+  const double limit = plant.torque_limit;
+  const auto torque = [&] { return std::clamp(rng.Uniform(-1.2, 1.2) * limit, -limit, limit); };
+  tau = torque();
+  dtau = tau - torque();
+  const auto built_in = RewardTerms(plant, s, tau);
+  E = built_in[0];
+  h = built_in[1];
+  inverted = static_cast<double>(rng.Below(2));
+  upright = inverted * kControlPeriod * std::round(std::abs(spread(1, 1000)));
+}
+
+void OwnReward::Parsed::Mirror() {
+  for (double* number : {&s.q1, &s.q2, &s.w1, &s.w2, &tau, &dtau}) *number = -*number;
+}
+
+std::string OwnReward::Parsed::Values() const {
   std::vector<std::string> values;
   for (const auto& [variable, number] : step) {
     values.push_back(Concat(variable, " = ", FormatNumber(*number)));
   }
+  return Join(values, ", ");
+}
+
+std::string OwnReward::Parsed::Problem(double value, const std::string& name) const {
+  if (std::abs(value) <= kLargest) return "";
   return Concat("reward: ", name, ": expected a number within ±1e9, got ",
-                std::isnan(value) ? "nan" : FormatNumber(value), " at ", Join(values, ", "));
+                std::isnan(value) ? "nan" : FormatNumber(value), " at ", Values());
 }
 
 OwnReward::OwnReward(const std::string& expression, int num_envs)
@@ -177,7 +316,7 @@ OwnReward::OwnReward(const std::string& expression, int num_envs)
     }
     names_.push_back(name);
     parsed_->Add(term, Concat("reward: ", name, ": "));
-    const std::string problem = parsed_->Problem(parsed_->terms.back().Eval(), name);
+    const std::string problem = parsed_->Problem(parsed_->Value(names_.size() - 1), name);
     if (!problem.empty()) throw BadInput(problem);
   }
   const auto n = static_cast<size_t>(num_envs);
@@ -187,6 +326,28 @@ OwnReward::OwnReward(const std::string& expression, int num_envs)
 }
 
 OwnReward::~OwnReward() = default;
+
+std::string OwnReward::Asymmetry(const std::function<Plant(Rng&)>& draw) {
+  constexpr int kMoments = 4096;
+  constexpr double kRounding = 1e-9, kSmallest = 1e-12;
+  Rng rng(1, "reward: mirror");
+  Parsed& now = *parsed_;
+  for (int i = 0; i < kMoments; ++i) {
+    now.Draw(draw(rng), rng);
+    const Parsed::Sum here = now.Total();
+    now.Mirror();
+    const Parsed::Sum there = now.Total();
+    now.Mirror();
+    const bool known = here.size <= kLargest, known_there = there.size <= kLargest;
+    if (!known && !known_there) continue;
+    const double rounding = kRounding * (here.size + there.size) + kSmallest;
+    if (known && known_there && std::abs(here.reward - there.reward) <= rounding) continue;
+    return Concat(here.reward, " at q1 = ", now.s.q1, ", q2 = ", now.s.q2, ", w1 = ", now.s.w1,
+                  ", w2 = ", now.s.w2, ", tau = ", now.tau, ", but ", there.reward,
+                  " at the mirror image");
+  }
+  return "";
+}
 
 void OwnReward::Begin(int env) {
   last_torque_[static_cast<size_t>(env)] = 0;
@@ -209,7 +370,7 @@ void OwnReward::Judge(int env, const Plant& plant, const PendulumState& s, StepR
   const size_t K = names_.size();
   result.reward[i] = 0;
   for (size_t k = 0; k < K; ++k) {
-    const double value = now.terms[k].Eval();
+    const double value = now.Value(k);
     if (!(std::abs(value) <= kLargest)) throw Failure(now.Problem(value, names_[k]));
     result.reward_terms[i * K + k] = value;
     result.reward[i] += value;

@@ -1,12 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "base/archive.h"
 #include "base/env.h"
+#include "base/rng.h"
 #include "pendulum/plant.h"
 
 namespace upswing {
@@ -25,6 +27,11 @@ class OwnReward {
 
   /// The names of the terms (K); a term without a name is called `term1`, by its place.
   const std::vector<std::string>& names() const { return names_; }
+
+  /// Compares the reward at random states and torques with the reward at their mirror images, in
+  /// which angles, velocities and torques have the other sign. `draw` draws a plant. Returns the
+  /// first difference as a text such as `0.2 at q1 = …, but -0.2 at the mirror image`; empty: none.
+  std::string Asymmetry(const std::function<Plant(Rng&)>& draw);
 
   /// Begins an episode of an environment.
   void Begin(int env);

@@ -43,7 +43,7 @@ TEST(OwnReward, OtherTextIsRefusedInOneLine) {
       {"E, h", "got 2 with commas"},
       {"E;", "reward: term2: expected an expression"},
       {"E +", "Unexpected end"},
-      {"E -> 1", "Unexpected operator"},
+      {"E -> 1", "Unexpected token"},
       {"min(E)", "Too few"},
       {"1e999", "expected an expression, got \"1e999\""},
       {"1/0", "reward: term1: expected a number within ±1e9, got inf at q1 = 0, q2 = 0, w1 = 0"},
@@ -106,6 +106,78 @@ TEST(OwnReward, KnowsStatePlantAndHistory) {
   EXPECT_DOUBLE_EQ(Judge(reward, s, 4, true), 0 + 2);
   reward.Begin(0);
   EXPECT_DOUBLE_EQ(Judge(reward, s, 3, true), 3 + 2);
+}
+
+TEST(OwnReward, ConstantsAreEvaluatedLikeVariables) {
+  const std::pair<const char*, double> kValues[] = {
+      {"0.5 && 1", 1},     {"1 && 0.3", 1},       {"0.2 || 0", 1},
+      {"0 || 0.2", 1},     {"0.5 && 0", 0},       {"pi && 0.1", 1},
+      {"0.5 ? 2 : 3", 2},  {"(0.5 && 1) + 1", 2}, {"2 + 3*4 - 6/3", 12},
+      {"2^3^2", 512},      {"-2^2", -4},          {"2^-1", 0.5},
+      {"8/4/2", 1},        {"5 - 3 - 1", 1},      {"1 < 2 && 2 <= 2 && 3 > 2 && 3 >= 3", 1},
+      {"1 == 1 != 0", 1},  {"1 + 1 == 2", 1},     {"0 || 1 && 0", 0},
+      {"1 ? 0 ? 1 : 2 : 3", 2}, {"0 ? 1 : 0 ? 2 : 3", 3},
+      {"1 + (0 ? 1 : 2)*3", 7}, {"max(0 ? 1 : 2, 1 ? 3 : 4)", 3},
+      {"0 && 0/0", 0},     {"1 || 0/0", 1},       {"1 ? 1 : 0/0", 1}};
+  for (const auto& [text, value] : kValues) {
+    OwnReward constants(text);
+    EXPECT_EQ(Judge(constants, {}, 0, false), value) << text;
+    // The same numbers as variables.
+    std::string variables(text);
+    for (const auto& [number, name] : {std::pair("0.5", "w1"), {"0.3", "w2"}, {"0.2", "q1"}}) {
+      const size_t at = variables.find(number);
+      if (at != std::string::npos) variables.replace(at, 3, name);
+    }
+    OwnReward reward(variables);
+    EXPECT_EQ(Judge(reward, {0.2, 0, 0.5, 0.3}, 0, false), value) << variables;
+  }
+}
+
+TEST(OwnReward, NaNIsNeverTrueOrFalse) {
+  for (const char* text :
+       {"0/0 ? 1 : 2", "0/0 < 1", "1 >= 0/0", "0/0 == 0/0", "0/0 != 1", "0/0 && 0", "1 && 0/0",
+        "0/0 || 1", "0 || 0/0", "1 + (sqrt(-1) ? 1 : 2)", "1 ? (0/0 > 1 ? 2 : 3) : 4",
+        "clamp(1, 0/0, 2)", "clamp(1, 0, 0/0)", "min(1, 0/0)", "max(0/0, 1)"}) {
+    const std::string message = MessageOf([&] { OwnReward reward(text); });
+    EXPECT_NE(message.find("expected a number within ±1e9, got nan at"), std::string::npos)
+        << text << ": " << message;
+  }
+  OwnReward reward("sqrt(1 - w1) > 0 ? 1 : 2");
+  EXPECT_EQ(Judge(reward, {0, 0, -3, 0}, 1, false), 1);
+  EXPECT_NE(MessageOf([&] { Judge(reward, {0, 0, 3, 0}, 1, false); }).find("got nan at q1 = 0"),
+            std::string::npos);
+  // Another evaluation works again.
+  EXPECT_EQ(Judge(reward, {0, 0, 1, 0}, 1, false), 2);
+}
+
+TEST(OwnReward, KnowsWhetherMirrorImagesHaveTheSameReward) {
+  const auto asymmetry = [](const std::string& text) {
+    return OwnReward(text).Asymmetry([](Rng& /*rng*/) { return Plant(); });
+  };
+  for (const char* text :
+       {"E + h + 5*inverted", "-0.01*tau^2", "w1*w2", "w1*tau", "abs(dtau)", "sin(q1)*w1",
+        "a: w1; b: -w1", "a: 2 + w1; b: tau; c: -w1 - tau", "cos(q1 - pi) + cos(q1 + q2 - pi)",
+        "wrap(q1 - pi)^2", "w1 < 0 ? -w1 : w1", "exp(-w1^2) + upright", "1e8 + w1*w1",
+        "1 - cos(q1 - 2*pi)", "max(w1, -w1)"}) {
+    EXPECT_EQ(asymmetry(text), "") << text;
+  }
+  for (const char* text :
+       {"0.2*w1", "E + 0.001*w2", "q1", "tau", "dtau", "tau > 4.9", "sin(q1)", "w1^3", "w1 > 0",
+        "inverted*w1", "inverted && upright > 5 ? w1 : 0", "E > 1.4 ? w2 : 0", "5 + 1e-6*q2",
+        "abs(q1 - 3) < 0.05 ? 1 : 0", "a: w1; b: -w2", "exp(w1/10)", "q1 > 7 ? 1 : 0",
+        "tau == torque_limit ? 1 : 0", "atan2(q1, q2 + 1)", "wrap(q1 - 1)^2"}) {
+    EXPECT_NE(asymmetry(text), "") << text;
+  }
+  const std::string example = asymmetry("0.2*w1");
+  EXPECT_NE(example.find(" at q1 = "), std::string::npos) << example;
+  EXPECT_NE(example.find(" at the mirror image"), std::string::npos) << example;
+  // A difference of some drawn plants only.
+  EXPECT_NE(OwnReward("mass1 > 1.2 ? w1 : 0").Asymmetry([](Rng& rng) {
+    Plant plant;
+    plant.mass1 = rng.Uniform(0.75, 1.25);
+    return plant;
+  }),
+            "");
 }
 
 TEST(OwnReward, AValueThatIsNotFiniteShowsItsState) {

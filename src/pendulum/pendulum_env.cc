@@ -40,6 +40,18 @@ PhysicsConfig PhysicsOf(const PendulumEnvConfig& config) {
 
 }  // namespace
 
+std::string RewardAsymmetry(const PendulumEnvConfig& config) {
+  const std::string& reward = config.reward.expression;
+  if (reward.empty()) return "";
+  const std::optional<Posterior> posterior = config.randomization.MakePosterior();
+  return OwnReward(reward).Asymmetry([&](Rng& rng) {
+    Plant plant = config.randomization.Draw(config.plants[rng.Below(config.plants.size())], rng);
+    Disturbance unused;
+    if (posterior) posterior->Deviate(plant, unused, rng);
+    return plant;
+  });
+}
+
 EnvSpec PendulumSpec(const PendulumEnvConfig& config) {
   EnvSpec spec;
   spec.task = kDoublePendulum;
@@ -58,6 +70,7 @@ EnvSpec PendulumSpec(const PendulumEnvConfig& config) {
   }
   if (config.any_pose) spec.mirror_signs.insert(spec.mirror_signs.end(), kGoalSize, 1.0F);
   spec.mirror_signs.resize(static_cast<size_t>(spec.obs_size), -1.0F);
+  if (!RewardAsymmetry(config).empty()) spec.mirror_signs.clear();
   spec.bodies = 2;
   spec.evaluation = {kEvaluationSeconds, kReturnSeconds, kHoldSeconds, 0};
   return spec;

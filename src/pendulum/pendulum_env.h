@@ -48,9 +48,13 @@ struct PendulumEnvConfig : PhysicsConfig {
   }
 };
 
+/// States in which the reward differs from the reward in their mirror image, with both rewards, for
+/// messages. Empty: the reward is symmetric, so that mirrored transitions are true.
+std::string RewardAsymmetry(const PendulumEnvConfig& config);
+
 /// The specification of the task "double-pendulum" with these settings. An evaluation episode lasts
 /// 20 s and its return counts the first 10 s. It succeeds if both links are inverted throughout the
-/// last 10 s.
+/// last 10 s. It has mirror signs if the reward is symmetric.
 EnvSpec PendulumSpec(const PendulumEnvConfig& config);
 
 /// N double pendulums and their episodes. Reaching the time limit truncates; only a numerical

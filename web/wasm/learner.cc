@@ -1,5 +1,6 @@
 #include "web/wasm/learner.h"
 
+#include "agents/config_checks.h"
 #include "base/error.h"
 #include "base/safetensors.h"
 #include "base/text.h"
@@ -36,6 +37,7 @@ Config ConfigOf(const std::vector<FlagValue>& flags) { return ParseConfig("", ""
 
 Learner::Learner(const std::vector<FlagValue>& flags) : training_(InClosedForm(flags), ThisPage()) {
   training_.AddObserver(*this);
+  warnings_ = Warnings(training_.config());
   Report();  // begins the lists
 }
 
@@ -57,6 +59,7 @@ json Learner::Report() {
               {"bestStep", s.best_step},
               {"bestSuccess", s.best_success_rate},
               {"terms", training_.env().spec().term_names},
+              {"warnings", warnings_},
               {"episodes", std::move(episodes_)},
               {"evaluations", std::move(evaluations_)}};
   episodes_ = evaluations_ = json::array();

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <string>
 #include <vector>
 
 #include "agents/training.h"
@@ -40,6 +41,7 @@ class Learner : private TrainObserver {
   void OnBest(const TrainState& state, const Policy& policy) override;
 
   std::vector<std::byte> best_;
+  std::vector<std::string> warnings_;      // about the settings
   nlohmann::json episodes_, evaluations_;  // since the last report
   Training training_;                      // last, as it tells of itself
 };

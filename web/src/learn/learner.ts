@@ -11,6 +11,7 @@ export interface Report {
   bestStep: number; // of the best evaluation; 0: none
   bestSuccess: number;
   terms: string[]; // names of the reward's terms (K)
+  warnings: string[]; // about the settings
   episodes: { step: number; return: number; terms: number[] }[]; // with the sum of each term
   evaluations: Test[];
 }

@@ -37,10 +37,12 @@ export class RewardPanel {
     if (reward) this.text.closest('details')!.open = true;
   }
 
-  /// Shows the terms of a training, or why its reward was refused.
+  /// Shows the terms of a training, or why its reward was refused, or the
+  /// warnings about it.
   show(session: Session | null): void {
     const reason = session?.state === 'failed' ? session.reason : '';
-    write(element('reward-problem'), reason.startsWith('reward:') ? `${reason}.` : '');
+    const problems = reason.startsWith('reward:') ? [reason] : (session?.last?.warnings ?? []);
+    write(element('reward-problem'), problems.map((problem) => `${problem}.`).join(' '));
     const sums = session ? session.terms : [];
     this.canvas.element.hidden = sums.length === 0;
     this.canvas.element.style.height = `${ROW * sums.length}px`;
