@@ -107,6 +107,20 @@ test('a training by a reward of your own', () => {
   );
 });
 
+test('a reward that prefers a side is not mirrored, which a warning says', () => {
+  const warnings = (settings: LearnSettings) => {
+    const learner = new Learner(core(), 'fast', 1, settings);
+    const { warnings: found } = learner.report();
+    learner.close();
+    return found;
+  };
+  expect(warnings({ reward: 'w1 + E; -w1' })).toEqual([]);
+  expect(warnings({ reward: '0.2*w1' })).toEqual([
+    expect.stringMatching(/^mirror is off, because mirrored states have another reward: /),
+  ]);
+  expect(() => warnings({ reward: '0.2*w1', mirror: 'true' })).toThrow(/^mirror: expected false/);
+});
+
 test("the settings of an agent, with the program's descriptions", () => {
   const settings = agentSettings(core(), 'fast');
   expect(settings.get('learning_rate')).toMatchObject({ value: '0.002', low: 0, high: 10 });
