@@ -115,18 +115,19 @@ def reward_terms(q1, q2, w1, w2, tau, m1=1, m2=1, l1=0.5, l2=0.5, g=9.81):
 
 class Task(ProgramTest):
     def test_reward(self):
-        rows = self.succeed("simulate", ROOT / "web/public/agents/d3qn.safetensors", "--seconds",
+        text = self.succeed("simulate", ROOT / "web/public/agents/d3qn.safetensors", "--seconds",
                             5, "--physics", "closed-form")
         seen = set()
         names = first_column(text_of("docs/reference/task.md").split("## Reward")[1].split("##")[0])
-        for row in csv.DictReader(io.StringIO(rows)):
-            x = {name: float(text) for name, text in row.items()}
-            # A row's torque acts from its state on, and the reward's terms use both.
-            terms = reward_terms(x["qpos0"], x["qpos1"], x["qvel0"], x["qvel1"], x["torque"])
+        rows = [{name: float(cell) for name, cell in row.items()}
+                for row in csv.DictReader(io.StringIO(text))]
+        for row, x in zip(rows, rows[1:]):
+            # A row's torque leads to the next row's state, and the reward's terms use both.
+            terms = reward_terms(x["qpos0"], x["qpos1"], x["qvel0"], x["qvel1"], row["torque"])
             self.assertEqual(names, list(terms))
             for name in names:
                 column = name if name.endswith("penalty") else f"{name}_reward"
-                self.assertAlmostEqual(terms[name], x[column], delta=1e-9, msg=(name, row))
+                self.assertAlmostEqual(terms[name], row[column], delta=1e-9, msg=(name, row))
             seen.add(terms["balance"])
         self.assertEqual(seen, {0, 5})
 
