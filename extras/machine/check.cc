@@ -163,6 +163,14 @@ bool LogCheck::faulty() const {
       findings, [](const Finding& finding) { return finding.severity == Severity::kFault; });
 }
 
+bool IsStuck(const Findings& findings, int joint) {
+  return std::ranges::any_of(findings, [&](const Finding& finding) {
+    return finding.aspect == Aspect::kAngle && finding.joint == joint + 1 &&
+           (finding.text.starts_with("the encoder sticks") ||
+            finding.text.starts_with("saturates"));
+  });
+}
+
 LogCheck CheckLog(const std::string& name, Pieces pieces) {
   LogCheck check{name, 0, static_cast<int>(pieces.size()), 0, {}};
   for (const MachineLog& piece : pieces) {
@@ -172,8 +180,9 @@ LogCheck CheckLog(const std::string& name, Pieces pieces) {
   CheckClock(pieces, check.findings);
   CheckAngles(pieces, check.findings);
   CheckVelocities(pieces, check.findings);
-  CheckTorques(pieces, check.findings);
-  CheckMotion(pieces, check.findings);
+  const std::vector<MachineLog> without_rotors = WithoutRotors(pieces);
+  CheckTorques(without_rotors, check.findings);
+  CheckMotion(without_rotors, check.findings);
   return check;
 }
 

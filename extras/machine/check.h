@@ -99,12 +99,21 @@ void CheckVelocities(Pieces pieces, Findings& findings);
 void CheckTorques(Pieces pieces, Findings& findings);
 /// Joints that do not move, motion that grows without torque, rest where nothing holds it.
 void CheckMotion(Pieces pieces, Findings& findings);
+/// Encoders that stick, by the equations of motion.
+void CheckStuck(Pieces pieces, Findings& findings);
 /// Signs, zeros, units and joints of angles and torques, by the equations of motion.
 void CheckEquations(Pieces pieces, Findings& findings);
+
+/// Whether there is a fault that the encoder of a joint (0 or 1) sticks or saturates.
+bool IsStuck(const Findings& findings, int joint);
 
 /// Whether the motor of a joint (0 or 1) reports torques without a command: more than idle motors
 /// do, including motors whose rotors the other joint accelerates.
 bool ActsWithoutCommand(Pieces pieces, int joint);
+
+/// The pieces, with the measured torques less those that accelerate the rotors of idle motors: an
+/// idle motor reports such a torque in the rows without a command. It must follow the acceleration.
+std::vector<MachineLog> WithoutRotors(Pieces pieces);
 
 /// Rows `first` to `last` (indices) of a piece as rows of the file.
 LogRows RangeOf(const MachineLog& piece, int first, int last);

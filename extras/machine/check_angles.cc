@@ -11,11 +11,11 @@
 namespace upswing::machine {
 namespace {
 
-/// |speed| of a joint from row k - 1 to row k, rad/s; 0 beyond the piece's ends and if the clock
-/// stands still.
-double SpeedTo(const MachineLog& log, int joint, int k) {
+/// |speed| of a joint from row k - 1 to row k, rad/s; 0 beyond the piece's ends. A row that comes
+/// early after a late one counts as a usual `cycle` (s).
+double SpeedTo(const MachineLog& log, int joint, int k, double cycle) {
   if (k < 1 || k >= log.rows()) return 0;
-  const double seconds = log.time[k] - log.time[k - 1];
+  const double seconds = std::max(log.time[k] - log.time[k - 1], cycle);
   return seconds > 0 ? std::abs(log.angle[k][joint] - log.angle[k - 1][joint]) / seconds : 0;
 }
 
@@ -28,18 +28,29 @@ struct Repeat {
   bool catches_up;     // whether the angle then jumps to where the joint is, or the piece ends
 };
 
-/// All repeats of at least five rows.
+/// Whether row k repeats the whole reading before it: a bus that is slower than the log.
+bool IsSameReading(const MachineLog& log, int k) {
+  const auto repeats = [&](const std::vector<Joints>& values) {
+    return values.empty() || values[k] == values[k - 1];
+  };
+  return log.angle[k] == log.angle[k - 1] && repeats(log.velocity) && repeats(log.measured) &&
+         !(log.velocity.empty() && log.measured.empty());
+}
+
+/// All repeats of at least five readings.
 std::vector<Repeat> RepeatsOf(Pieces pieces, int joint) {
-  constexpr int kRows = 5;
+  constexpr int kReadings = 5;
+  const double cycle = UsualCycle(pieces);
   std::vector<Repeat> repeats;
   for (const MachineLog& piece : pieces) {
-    const auto difference = [&](int k) { return SpeedTo(piece, joint, k); };
+    const auto difference = [&](int k) { return SpeedTo(piece, joint, k, cycle); };
     for (int first = 0; first < piece.rows();) {
-      int last = first;
+      int last = first, readings = 1;
       while (last + 1 < piece.rows() && piece.angle[last + 1][joint] == piece.angle[first][joint]) {
         ++last;
+        if (!IsSameReading(piece, last)) ++readings;
       }
-      if (last - first + 1 >= kRows) {
+      if (readings >= kReadings) {
         constexpr double kJump = 2.5;  // cycles of the motion that follows
         // The change of speed may fall into two cycles.
         repeats.push_back(
@@ -103,7 +114,7 @@ double SpeedAt(const MachineLog& log, int joint, int row, bool ends) {
   std::vector<double> speeds;
   for (int k = ends ? row - 2 : row + 1; k <= (ends ? row : row + 3); ++k) {
     if (k < 1 || k >= log.rows()) continue;
-    if (log.time[k] > log.time[k - 1]) speeds.push_back(SpeedTo(log, joint, k));
+    if (log.time[k] > log.time[k - 1]) speeds.push_back(SpeedTo(log, joint, k, 0));
   }
   return QuartilesOf(std::move(speeds)).median;
 }

@@ -8,48 +8,14 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
+#include <utility>
 
 #include "extras/machine/check.h"
+#include "extras/machine/check_terms.h"
 
 namespace upswing::machine {
 namespace {
-
-/// Angles (rad), velocities (rad/s) and torques (N·m) at a row, which stands for `seconds`.
-struct Sample {
-  double seconds;
-  Joints q, w, tau;
-};
-using Window = std::vector<Sample>;
-
-/// The rows `first` to `last` of a log; empty if a cycle is lost in them. Velocities are
-/// differences of the angles `span` rows before and after.
-Window WindowAt(const MachineLog& log, int first, int last, int span, double cycle) {
-  Window window;
-  for (int k = first; k <= last; ++k) {
-    const double before = k > first ? log.time[k] - log.time[k - 1] : 0;
-    const double after = k < last ? log.time[k + 1] - log.time[k] : 0;
-    const double apart = log.time[k + span] - log.time[k - span];
-    if (std::max(before, after) > 5 * cycle || !(apart > 0)) return {};
-    Sample s{(before + after) / 2, log.angle[k], {}, {}};
-    for (const int j : {0, 1}) {
-      s.w[j] = (log.angle[k + span][j] - log.angle[k - span][j]) / apart;
-      if (!log.measured.empty()) {
-        s.tau[j] = log.measured[k][j];
-      } else {
-        s.tau[j] = (log.commanded.empty() ? 0 : log.commanded[k][j]) +
-                   (log.push.empty() ? 0 : log.push[k][j]);
-      }
-    }
-    window.push_back(s);
-  }
-  return window;
-}
-
-/// Rows of a difference of angles to either side.
-int SpanOf(double cycle) {
-  constexpr double kSpan = 0.01;  // s
-  return std::max(1, static_cast<int>(std::lround(kSpan / cycle)));
-}
 
 std::vector<Window> WindowsOf(Pieces pieces, double cycle) {
   constexpr double kLength = 0.08;  // s
@@ -69,72 +35,7 @@ std::vector<Window> WindowsOf(Pieces pieces, double cycle) {
   return windows;
 }
 
-/// A way to read the columns of the angles.
-struct Reading {
-  Joints sign{1, 1}, unit{1, 1};  // rad
-  double link1 = 0;  // angles of joint 1 that are in those of joint 2; 1: against the vertical
-  bool swapped = false;
-
-  Joints Of(const Joints& x) const {
-    Joints y{sign[0] * unit[0] * x[swapped ? 1 : 0], sign[1] * unit[1] * x[swapped ? 0 : 1]};
-    y[1] -= link1 * y[0];
-    return y;
-  }
-};
-
-/// Terms of an equation of motion, integrated over a window: changes of momenta, and torques.
-enum Term {
-  kInertia,
-  kOther,
-  kCoupling,
-  kTurnedCoupling,
-  kLink2,
-  kTurnedLink2,
-  kLink1,
-  kTurnedLink1,
-  kDamping,
-  kFriction,
-  kTorque1,
-  kTorque2,
-  kTerms
-};
-using Terms = Eigen::Matrix<double, kTerms, 1>;
 using Gram = Eigen::Matrix<double, kTerms, kTerms>;
-
-/// The terms of the equations of both joints over a window. Each sum equals the joint's torque.
-///
-/// Joint 1: d/dt [(J1 + J2) w1 + J2 w2 + b cos q2 (2 w1 + w2)] + G1 sin q1 + G2 sin(q1 + q2) + …
-///
-/// Joint 2: d/dt [J2 (w1 + w2) + a w2 + b cos q2 w1] + b sin q2 w1 (w1 + w2) + G2 sin(q1 + q2) + …
-///
-/// The turned terms are those with the angles a quarter turn ahead.
-std::array<Terms, 2> TermsOf(const Window& window, const Reading& reading) {
-  std::array<Terms, 2> both{Terms::Zero(), Terms::Zero()};
-  for (const Sample& sample : window) {
-    const Joints q = reading.Of(sample.q), w = reading.Of(sample.w);
-    const double dt = sample.seconds;
-    const double end = &sample == &window.back() ? 1 : &sample == &window.front() ? -1 : 0;
-    const double s1 = std::sin(q[0]), c1 = std::cos(q[0]), s2 = std::sin(q[1]), c2 = std::cos(q[1]);
-    for (const int row : {0, 1}) {
-      Terms& terms = both[row];
-      const double coupled = row == 0 ? 2 * w[0] + w[1] : w[0];
-      const double force = row == 0 ? 0 : w[0] * (w[0] + w[1]) * dt;
-      terms[kInertia] += end * (row == 0 ? w[0] : w[0] + w[1]);
-      terms[kOther] += end * w[1];
-      terms[kCoupling] += end * c2 * coupled + s2 * force;
-      terms[kTurnedCoupling] += -end * s2 * coupled + c2 * force;
-      terms[kLink2] += (s1 * c2 + c1 * s2) * dt;
-      terms[kTurnedLink2] += (c1 * c2 - s1 * s2) * dt;
-      terms[kLink1] += row == 0 ? s1 * dt : 0;
-      terms[kTurnedLink1] += row == 0 ? c1 * dt : 0;
-      terms[kDamping] += w[row] * dt;
-      terms[kFriction] += std::tanh(10 * w[row]) * dt;
-      terms[kTorque1] += sample.tau[0] * dt;
-      terms[kTorque2] += sample.tau[1] * dt;
-    }
-  }
-  return both;
-}
 
 /// Products of all terms of the equation of each joint, summed over the windows.
 std::array<Gram, 2> GramsOf(const std::vector<Window>& windows, const Reading& reading) {
@@ -347,6 +248,25 @@ double NoiseOf(Pieces pieces, const std::vector<Window>& windows, double cycle) 
   return most;
 }
 
+/// Whether no motor drives the machine, if the log is right: it has no torques, or all commands are
+/// 0. (Idle motors report torques, too.)
+bool IsFree(Pieces pieces) {
+  const bool pushed = std::ranges::any_of(pieces, [](const MachineLog& log) {
+    return HasTorque(log.push, 0) || HasTorque(log.push, 1);
+  });
+  if (pushed) return false;
+  if (!pieces.front().commanded.empty()) return !HasCommands(pieces);
+  return std::ranges::none_of(pieces, [](const MachineLog& log) {
+    return HasTorque(log.measured, 0) || HasTorque(log.measured, 1);
+  });
+}
+
+void DropTorques(std::vector<Window>& windows) {
+  for (Window& window : windows) {
+    for (Sample& sample : window) sample.tau = {};
+  }
+}
+
 void Report(const Explanation& e, bool in_proportion, Findings& findings) {
   const auto add = [&](Aspect aspect, int joint, const std::string& text) {
     Reporter{findings, aspect, joint}(
@@ -383,6 +303,28 @@ void Report(const Explanation& e, bool in_proportion, Findings& findings) {
   }
 }
 
+/// The best explanation of all ways to read the columns. `range` of both angles, rad.
+Explanation BestOf(const std::vector<Window>& windows, const Joints& range, double noise,
+                   const std::array<bool, 2>& has_torque) {
+  std::vector<Explanation> all;
+  for (const Reading& reading : Readings(range)) {
+    const Equations equations{GramsOf(windows, reading)};
+    for (const Explanation& e : equations.Explain({reading, noise}, has_torque)) all.push_back(e);
+  }
+  return *std::ranges::min_element(all, {}, &Explanation::cost);
+}
+
+/// Reports a driven machine whose log has no torques.
+void ReportDriven(Pieces pieces, Findings& findings) {
+  const bool zero = !pieces.front().commanded.empty() || !pieces.front().measured.empty();
+  Reporter{findings, Aspect::kTorque}(
+      Severity::kFault,
+      fmt::format("{}, but no free pendulum moves like this: suspect {} columns "
+                  "(keys commanded1, commanded2) or a hand",
+                  zero ? "all torques of the motors are 0" : "the log has no torque",
+                  zero ? "wrong" : "missing"));
+}
+
 }  // namespace
 
 void CheckEquations(Pieces pieces, Findings& findings) {
@@ -395,28 +337,29 @@ void CheckEquations(Pieces pieces, Findings& findings) {
   if (range[0] < kMoving || range[1] < kMoving) return;
   const double cycle = UsualCycle(pieces);
   if (!(cycle > 0)) return;
-  const std::vector<Window> windows = WindowsOf(pieces, cycle);
+  std::vector<Window> windows = WindowsOf(pieces, cycle);
   if (windows.size() < kEnough) return;
+  const double noise = NoiseOf(pieces, windows, cycle);
+  const double most = std::max(kDriven, kNoisy * noise);  // unexplained, of a free pendulum
+  std::optional<Explanation> unpowered_best;
+  const bool free = IsFree(pieces);
+  if (free || pieces.front().commanded.empty()) {
+    std::vector<Window> unpowered = windows;
+    DropTorques(unpowered);
+    const Explanation found = BestOf(unpowered, range, noise, {});
+    const bool is_free = std::max(found.unexplained[0], found.unexplained[1]) <= most;
+    if (free && !is_free) return ReportDriven(pieces, findings);
+    if (is_free) {  // idle motors report torques that have nothing to do with the motion
+      windows = std::move(unpowered);
+      unpowered_best = found;
+    }
+  }
   const std::array<bool, 2> has_torque = DrivenJoints(pieces, windows);
   const bool in_proportion = InProportion(windows);
   if (in_proportion && !has_torque[0] && !has_torque[1]) return;
-  const double noise = NoiseOf(pieces, windows, cycle);
-  std::vector<Explanation> all;
-  for (const Reading& reading : Readings(range)) {
-    const Equations equations{GramsOf(windows, reading)};
-    for (const Explanation& e : equations.Explain({reading, noise}, has_torque)) all.push_back(e);
-  }
-  const Explanation best = *std::ranges::min_element(all, {}, &Explanation::cost);
+  const Explanation best =
+      unpowered_best ? *unpowered_best : BestOf(windows, range, noise, has_torque);
   const double unexplained = std::max(best.unexplained[0], best.unexplained[1]);
-  const bool torques = std::ranges::any_of(pieces, [](const MachineLog& log) {
-    return !log.commanded.empty() || !log.measured.empty() || !log.push.empty();
-  });
-  if (!torques && unexplained > std::max(kDriven, kNoisy * noise)) {
-    return Reporter{findings, Aspect::kTorque}(
-        Severity::kFault,
-        "the log has no torque, but no free pendulum moves like this: suspect missing columns "
-        "(keys commanded1, commanded2) or a hand");
-  }
   if (best.changes() > kMostChanges || unexplained > kGood) return;
   // Torques that have nothing to do with the motion are no evidence.
   if (best.torque_misfit > -1.0 * (has_torque[0] + has_torque[1])) return;

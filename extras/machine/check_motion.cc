@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "extras/machine/check.h"
@@ -29,10 +30,17 @@ struct Rows {
 /// The longest rows of a piece in which all known torques are zero.
 Rows LongestUnpowered(const MachineLog& piece) {
   constexpr double kSensor = 0.05;  // measured torque that may be noise, N·m
+  constexpr double kShare = 0.05;   // of the largest one, where no command tells
+  double noise = kSensor;
+  if (piece.commanded.empty()) {
+    double largest = 0;
+    for (int k = 0; k < piece.rows(); ++k) largest = std::max(largest, TorqueAt(piece.measured, k));
+    noise = std::min(kSensor, kShare * largest);
+  }
   Rows best;
   int first = 0;
   for (int k = 0; k < piece.rows(); ++k) {
-    if (IsPowered(piece, k) || TorqueAt(piece.measured, k) > kSensor) first = k + 1;
+    if (IsPowered(piece, k) || TorqueAt(piece.measured, k) > noise) first = k + 1;
     if (k - first > best.last - best.first) best = {first, k};
   }
   return best;
@@ -121,21 +129,68 @@ bool CheckRest(const MachineLog& piece, const Reporter& report) {
   return true;
 }
 
+/// Largest change of a joint's torques, N·m, apart from noise: the range of their means over 0.3 s.
+/// 0 if it is not clear of the noise.
+double TorqueChange(const MachineLog& piece, const std::vector<Joints>& torque, int joint) {
+  constexpr double kMean = 0.3, kClear = 5;  // s, standard deviations of the noise
+  if (torque.empty()) return 0;
+  double least = std::numeric_limits<double>::infinity(), most = -least, sum = 0, squares = 0;
+  int rows = 0;
+  double begin = piece.time[0];
+  for (int k = 0; k < piece.rows(); ++k) {
+    sum += torque[k][joint];
+    ++rows;
+    if (k > 0) squares += std::pow(torque[k][joint] - torque[k - 1][joint], 2);
+    if (piece.time[k] - begin < kMean) continue;
+    least = std::min(least, sum / rows);
+    most = std::max(most, sum / rows);
+    begin = piece.time[k];
+    sum = 0;
+    rows = 0;
+  }
+  const double noise = std::sqrt(squares / 2 / piece.rows());
+  return most - least > kClear * noise ? most - least : 0;
+}
+
+/// Reports a log in which no angle ever changes although torques do.
+void CheckNoMotion(Pieces pieces, Findings& findings) {
+  constexpr double kRounding = 1e-9;  // rad
+  if (AngleRange(pieces, 0) > kRounding || AngleRange(pieces, 1) > kRounding) return;
+  double change = 0;
+  for (const MachineLog& piece : pieces) {
+    for (const int joint : {0, 1}) {
+      change = std::max({change, TorqueChange(piece, piece.commanded, joint),
+                         TorqueChange(piece, piece.measured, joint)});
+    }
+  }
+  if (!(change > 0)) return;
+  Reporter{findings, Aspect::kMotion}(
+      Severity::kFault,
+      fmt::format("no angle ever changes although the torques change by {:.2g} N·m: both encoders "
+                  "are dead, the motors are off, or dry friction holds both joints",
+                  change),
+      {}, {{"change", change}});
+}
+
 }  // namespace
 
 void CheckMotion(Pieces pieces, Findings& findings) {
+  CheckStuck(pieces, findings);
   for (const int joint : {0, 1}) {
     constexpr double kStill = 0.01;  // rad
     if (AngleRange(pieces, joint) > kStill || AngleRange(pieces, 1 - joint) < kMoves) continue;
+    if (IsStuck(findings, joint)) continue;
     Reporter{findings, Aspect::kMotion, joint + 1}(
         Severity::kWarning, fmt::format("does not move although joint {} does: dry friction holds "
                                         "it, or its encoder is dead",
                                         2 - joint));
   }
+  CheckNoMotion(pieces, findings);
   const Reporter report{findings, Aspect::kMotion};
   for (const MachineLog& piece : pieces) CheckGrowth(piece, report);
   (void)std::ranges::any_of(pieces, [&](const auto& piece) { return CheckRest(piece, report); });
-  CheckEquations(pieces, findings);
+  // The equations of motion do not hold for an encoder that sticks.
+  if (!IsStuck(findings, 0) && !IsStuck(findings, 1)) CheckEquations(pieces, findings);
 }
 
 }  // namespace upswing::machine

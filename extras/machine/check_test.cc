@@ -1,5 +1,6 @@
 #include "extras/machine/check.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -200,7 +201,7 @@ TEST(MachineCheck, UnitsAndSignOfTorques) {
   OnlyFinding(Times(&MachineLog::commanded, 0, 1000), "commanded torque in mN·m");
   OnlyFinding(Times(&MachineLog::measured, 1, 0.166), "the unit or a gear");
   OnlyFinding(Times(&MachineLog::measured, 1, -1), "opposite sign");
-  OnlyFinding(Times(&MachineLog::measured, 1, 0), "never changes", Severity::kWarning);
+  OnlyFinding(Times(&MachineLog::measured, 1, 0), "never changes");
   OnlyFinding(
       [](MachineLog& log) {
         log.measured.clear();
@@ -258,12 +259,12 @@ TEST(MachineCheck, StuckEncoder) {
   ASSERT_TRUE(stuck.rows);
   EXPECT_EQ(stuck.rows->first, 2200);
   EXPECT_EQ(stuck.rows->last, 2212);
-  OnlyFinding(
+  OnlyFinding(  // no pendulum with a joint moves like this
       [](MachineLog& log) {
         for (Joints& q : log.angle) q[1] = 0.25;
         log.velocity.clear();
       },
-      "does not move although joint 1 does", Severity::kWarning);
+      "the encoder sticks at 0.25 rad: joint 1 moves as it does only if this joint moves");
 }
 
 TEST(MachineCheck, ACoarseEncoderDoesNotStick) {
@@ -470,6 +471,191 @@ TEST(MachineCheck, AMotorWithoutTorquesInTheLogIsAFault) {
   EXPECT_EQ(FaultsOf(log), "");
   log.commanded.clear();
   EXPECT_NE(FaultsOf(log).find("the log has no torque"), std::string::npos);
+}
+
+/// Torques at joint 1 that swing both links.
+double SwingTorque(double t) { return 3 * std::sin(3 * t) + 2 * std::sin(7 * t); }
+
+/// Each `stride`-th row of a log, with angles in steps of an encoder.
+MachineLog Sampled(const MachineLog& log, int stride, double counts) {
+  const double step = 2 * std::numbers::pi / counts;
+  MachineLog sampled;
+  for (int k = 0; k < log.rows(); k += stride) {
+    const Joints& q = log.angle[k];
+    sampled.time.push_back(log.time[k]);
+    sampled.angle.push_back({step * std::round(q[0] / step), step * std::round(q[1] / step)});
+    sampled.commanded.push_back(log.commanded[k]);
+  }
+  return sampled;
+}
+
+/// The first row after `time` (s) at which a joint turns round: an encoder that sticks from there
+/// on makes no jump.
+int TurningRow(const MachineLog& log, double time, int joint) {
+  int k = 2;
+  while (log.time[k] < time || (log.angle[k + 1][joint] - log.angle[k][joint]) *
+                                       (log.angle[k][joint] - log.angle[k - 1][joint]) >
+                                   0) {
+    ++k;
+  }
+  return k;
+}
+
+/// Lets the encoders of joints stick from row `first` to before row `last`.
+void Freeze(MachineLog& log, const std::vector<int>& joints, int first, int last) {
+  for (int k = first; k < last; ++k) {
+    for (const int joint : joints) log.angle[k][joint] = log.angle[first][joint];
+  }
+}
+
+TEST(MachineCheck, AnEncoderThatFreezesWhereItsJointTurnsRound) {
+  const MachineLog exact = Simulated({}, SwingTorque, 12);
+  for (const int stride : {1, 5, 10}) {  // 500, 100 and 50 Hz
+    for (const double counts : {16384, 1000}) {
+      const MachineLog good = Sampled(exact, stride, counts);
+      EXPECT_EQ(FaultsOf(good), "");
+      for (const int joint : {0, 1}) {
+        const int turn = TurningRow(good, 5, joint), second = 500 / stride;
+        const std::string expected = fmt::format("angle {}: the encoder sticks at {:.4g} rad",
+                                                 joint + 1, good.angle[turn][joint]);
+        for (const int last : {good.rows(), turn + 3 * second}) {
+          MachineLog log = good;
+          Freeze(log, {joint}, turn, last);
+          EXPECT_NE(FaultsOf(log).find(expected), std::string::npos)
+              << stride << " rows, " << counts << " counts, until row " << last << "\n"
+              << FaultsOf(log);
+        }
+        MachineLog log = good;  // from the beginning on
+        Freeze(log, {joint}, 0, good.rows());
+        EXPECT_NE(FaultsOf(log).find("the encoder sticks at 0 rad"), std::string::npos);
+      }
+    }
+  }
+}
+
+TEST(MachineCheck, TheSizeOfTheMachineChangesNoVerdictOnAnEncoder) {
+  for (const double scale : {0.001, 1000.0}) {
+    Plant plant;
+    plant.mass1 *= scale, plant.mass2 *= scale;
+    plant.damping1 *= scale, plant.damping2 *= scale, plant.armature *= scale;
+    MachineLog log = Sampled(Simulated(
+                                 {}, [&](double t) { return scale * SwingTorque(t); }, 10, plant),
+                             1, 4096);
+    EXPECT_EQ(FaultsOf(log).find("encoder"), std::string::npos);
+    Freeze(log, {1}, TurningRow(log, 5, 1), log.rows());
+    EXPECT_NE(FaultsOf(log).find("angle 2: the encoder sticks"), std::string::npos)
+        << scale << "\n"
+        << FaultsOf(log);
+  }
+}
+
+/// A log as of Simulated in which something holds a joint from `held_from` (s) on.
+MachineLog WithHeldJoint(int joint, double held_from, double seconds) {
+  MachineLog log = Simulated({}, SwingTorque, held_from);
+  const Manipulator plant = ManipulatorOf(Plant{});
+  const Joints last = log.angle.back(), before = log.angle[log.rows() - 2];
+  double w = (last[1 - joint] - before[1 - joint]) / 0.002, q = last[1 - joint];
+  for (int k = log.rows(); k < seconds * 500; ++k) {
+    const double t = 0.002 * k;
+    constexpr int kSteps = 20;
+    for (int i = 0; i < kSteps; ++i) {  // Euler's method
+      const PendulumState s =
+          joint == 0 ? PendulumState{last[0], q, 0, w} : PendulumState{q, last[1], w, 0};
+      const ManipulatorTerms terms = plant.At(s);
+      const double force = joint == 0 ? -terms.h2 : SwingTorque(t) - terms.h1;
+      w += 0.002 / kSteps * force / (joint == 0 ? terms.M22 : terms.M11);
+      q += 0.002 / kSteps * w;
+    }
+    log.time.push_back(t);
+    log.angle.push_back(joint == 0 ? Joints{last[0], q} : Joints{q, last[1]});
+    log.commanded.push_back({SwingTorque(t), 0});
+  }
+  return log;
+}
+
+TEST(MachineCheck, AHeldJointIsNoStuckEncoder) {
+  for (const int joint : {0, 1}) {
+    for (const double held_from : {0.0, 5.0}) {
+      const MachineLog exact = WithHeldJoint(joint, std::max(held_from, 0.004), held_from + 6);
+      for (const int stride : {1, 5}) {
+        for (const double counts : {16384, 1000}) {
+          const std::string faults = FaultsOf(Sampled(exact, stride, counts));
+          EXPECT_EQ(faults.find("sticks"), std::string::npos)
+              << "joint " << joint + 1 << ", " << counts << " counts\n"
+              << faults;
+        }
+      }
+    }
+  }
+}
+
+TEST(MachineCheck, BothEncodersFreeze) {
+  MachineLog log = Sampled(Simulated({}, SwingTorque, 12), 1, 4096);
+  Freeze(log, {0, 1}, TurningRow(log, 5, 0), log.rows());
+  EXPECT_NE(FaultsOf(log).find("angle 1: the encoder sticks"), std::string::npos) << FaultsOf(log);
+  // Only the measured torque tells.
+  std::swap(log.commanded, log.measured);
+  EXPECT_NE(FaultsOf(log).find("angle 1: the encoder sticks"), std::string::npos) << FaultsOf(log);
+
+  Freeze(log, {0, 1}, 0, log.rows());
+  EXPECT_EQ(FaultsOf(log).find("motion: no angle ever changes although the torques change by"), 0U);
+  // Links hang, and the measured torque has noise.
+  Rng rng(4, "noise");
+  for (Joints& u : log.measured) u = {0.01 * rng.Normal(), 0.01 * rng.Normal()};
+  EXPECT_EQ(FaultsOf(log), "");
+}
+
+TEST(MachineCheck, LinksThatComeToRestAreNoStuckEncoders) {
+  Plant plant;
+  plant.damping1 = plant.damping2 = 1;
+  const auto ends = [](double t) { return t < 6 ? SwingTorque(t) : 0.0; };
+  MachineLog log = Sampled(Simulated({}, ends, 16, plant), 1, 2048);
+  EXPECT_EQ(FaultsOf(log), "");
+}
+
+TEST(MachineCheck, ARowThatComesEarlyIsNoStuckEncoder) {
+  MachineLog log = GoodLog();
+  log.velocity.clear();
+  // Dry friction holds joint 2 for ten rows after a late row and an early one.
+  const double step = 2 * std::numbers::pi / 16384;
+  for (Joints& q : log.angle) q[1] = step * std::round(q[1] / step / 100);
+  const int k = 2200;
+  log.time[k] = log.time[k + 1] - 1e-5;
+  for (int i = k + 1; i < k + 11; ++i) log.angle[i][1] = log.angle[k][1] + step;
+  EXPECT_EQ(FaultsOf(log).find("sticks"), std::string::npos) << FaultsOf(log);
+}
+
+TEST(MachineCheck, AMotorThatOnlyBrakesAtTheEnd) {
+  MachineLog log = Simulated({}, SwingTorque, 10);
+  // Motor 2 reports the torque that accelerates its rotor. At the end it brakes.
+  const auto acceleration = [&](int k) {
+    return (log.angle[k + 1][1] - 2 * log.angle[k][1] + log.angle[k - 1][1]) / 4e-6;
+  };
+  log.measured = log.commanded;
+  for (int k = 1; k + 1 < log.rows(); ++k) log.measured[k][1] = -0.003 * acceleration(k);
+  EXPECT_EQ(FaultsOf(log), "");
+  for (int k = log.rows() - 100; k + 1 < log.rows(); ++k) {
+    log.commanded[k][1] = -0.1 * (log.angle[k][1] - log.angle[k - 1][1]) / 0.002;
+    log.measured[k][1] += log.commanded[k - 2][1];
+  }
+  EXPECT_EQ(FaultsOf(log), "");
+}
+
+TEST(MachineCheck, TorquesOfZeros) {
+  const MachineLog good = Simulated({1, -0.5, 0, 0}, SwingTorque, 10);
+  const std::string text = "torque: all torques of the motors are 0, but no free pendulum moves";
+  MachineLog log = good;
+  for (Joints& u : log.commanded) u = {};
+  EXPECT_EQ(FaultsOf(log).find(text), 0U) << FaultsOf(log);
+  log.measured = good.commanded;
+  EXPECT_NE(FaultsOf(log), "");
+  log.measured = log.commanded;
+  EXPECT_EQ(FaultsOf(log).find(text), 0U) << FaultsOf(log);
+  log.commanded = good.commanded;
+  EXPECT_NE(FaultsOf(log).find("torque 1: measured torque never changes"), std::string::npos);
+  MachineLog swing = Simulated(
+      {1, -0.5, 0, 0}, [](double) { return 0; }, 10);
+  EXPECT_EQ(FaultsOf(swing), "");
 }
 
 TEST(MachineCheck, WrappedAnglesWrongSamplesAndSlips) {

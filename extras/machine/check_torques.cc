@@ -19,6 +19,16 @@ struct Response {
   double residual() const { return 1 - std::pow(pairs.correlation(), 2); }
 };
 
+/// Acceleration of a joint at row k from the angles `span` rows before and after, rad/s²; 0 if the
+/// clock stands still.
+double AccelerationAt(const MachineLog& log, int k, int joint, int span) {
+  const double before = log.time[k] - log.time[k - span], after = log.time[k + span] - log.time[k];
+  if (!(before > 0) || !(after > 0)) return 0;
+  const double slower = (log.angle[k][joint] - log.angle[k - span][joint]) / before;
+  const double faster = (log.angle[k + span][joint] - log.angle[k][joint]) / after;
+  return 2 * (faster - slower) / (before + after);
+}
+
 constexpr double kMostPairs = 1e5;  // rows of a fit; more would only take longer
 
 /// Command of joint `from`, delayed and lagged, against the measured torque of joint `to`.
@@ -86,12 +96,45 @@ bool CheckTorqueGain(const Response& best, const Reporter& report) {
   return true;
 }
 
-/// Root mean square of a joint's measured torque, N·m.
-double RmsMeasured(Pieces pieces, int joint) {
+/// Root mean square of a joint's torques, N·m.
+double RmsOf(Pieces pieces, std::vector<Joints> MachineLog::*quantity, int joint) {
   double squares = 0;
-  const std::vector<double> torques = ValuesOf(pieces, &MachineLog::measured, joint);
+  const std::vector<double> torques = ValuesOf(pieces, quantity, joint);
   for (const double torque : torques) squares += torque * torque;
   return torques.empty() ? 0 : std::sqrt(squares / static_cast<double>(torques.size()));
+}
+
+/// Time in which a joint has a command or a push, s.
+double CommandedSeconds(Pieces pieces, int joint) {
+  double seconds = 0;
+  for (const MachineLog& piece : pieces) {
+    for (int k = 0; k + 1 < piece.rows(); ++k) {
+      const bool acts =
+          piece.commanded[k][joint] != 0 || (!piece.push.empty() && piece.push[k][joint] != 0);
+      if (acts) seconds += piece.time[k + 1] - piece.time[k];
+    }
+  }
+  return seconds;
+}
+
+/// Whether the command of a joint is more than a rounding error of the other joint's.
+bool IsDriven(Pieces pieces, int joint) {
+  constexpr double kShare = 0.02;
+  return HasCommand(pieces, joint) && RmsOf(pieces, &MachineLog::commanded, joint) >
+                                          kShare * RmsOf(pieces, &MachineLog::commanded, 1 - joint);
+}
+
+/// Pairs of a joint's acceleration (rad/s²) and its measured torque in the rows without a command.
+Pairs IdlePairs(Pieces pieces, int joint, int span) {
+  Pairs pairs;
+  for (const MachineLog& piece : pieces) {
+    for (int k = span; k + span < piece.rows(); ++k) {
+      const bool idle = piece.commanded[k - 1][joint] == 0 && piece.commanded[k][joint] == 0 &&
+                        (piece.push.empty() || piece.push[k][joint] == 0);
+      if (idle) pairs.Add(AccelerationAt(piece, k, joint, span), piece.measured[k][joint]);
+    }
+  }
+  return pairs;
 }
 
 void CheckTorque(Pieces pieces, int joint, const Reporter& report) {
@@ -106,12 +149,16 @@ void CheckTorque(Pieces pieces, int joint, const Reporter& report) {
   if (!(best.pairs.Sxx() > 1e-9 * best.pairs.n)) {
     if (ActsWithoutCommand(pieces, joint)) {
       add(Severity::kFault, fmt::format("measured torque of {:.2g} N·m (rms) without a command",
-                                        RmsMeasured(pieces, joint)));
+                                        RmsOf(pieces, &MachineLog::measured, joint)));
     }
     return;
   }
+  constexpr double kLongEnough = 0.1;  // s; a shorter command says nothing
+  if (CommandedSeconds(pieces, joint) < kLongEnough) return;
   if (!(best.pairs.Syy() > 1e-9 * best.pairs.n)) {
-    return add(Severity::kWarning, "measured torque never changes");
+    return add(IsDriven(pieces, joint) ? Severity::kFault : Severity::kWarning,
+               "measured torque never changes: suspect a column without a measurement (leave it "
+               "out by --columns)");
   }
   if (r < kClear) {
     const Response other = BestOf(ResponsesOf(pieces, 1 - joint, joint));
@@ -180,10 +227,35 @@ void CheckTorqueSize(Pieces pieces, int joint, const Reporter& report) {
 }  // namespace
 
 bool ActsWithoutCommand(Pieces pieces, int joint) {
-  constexpr double kActs = 0.5;   // N·m, rms
+  constexpr double kActs = 0.5;   // N·m, rms, of a machine without any command
   constexpr double kShare = 0.5;  // of the other joint's
-  return !HasCommand(pieces, joint) &&
-         RmsMeasured(pieces, joint) > std::max(kActs, kShare * RmsMeasured(pieces, 1 - joint));
+  if (HasCommand(pieces, joint)) return false;
+  const double own = RmsOf(pieces, &MachineLog::measured, joint);
+  const double other = std::max(RmsOf(pieces, &MachineLog::measured, 1 - joint),
+                                RmsOf(pieces, &MachineLog::commanded, 1 - joint));
+  return own > (HasCommand(pieces, 1 - joint) ? kShare * other : std::max(kActs, kShare * other));
+}
+
+std::vector<MachineLog> WithoutRotors(Pieces pieces) {
+  constexpr double kIdle = 0.2, kFollows = 0.5;  // share of the rows, correlation
+  std::vector<MachineLog> logs(pieces.begin(), pieces.end());
+  if (logs.front().commanded.empty() || logs.front().measured.empty()) return logs;
+  const double cycle = UsualCycle(pieces);
+  if (!(cycle > 0)) return logs;
+  const int span = std::max(1, static_cast<int>(std::lround(0.01 / cycle)));
+  double rows = 0;
+  for (const MachineLog& log : logs) rows += log.rows();
+  for (const int joint : {0, 1}) {
+    if (!HasCommand(pieces, joint)) continue;
+    const Pairs idle = IdlePairs(pieces, joint, span);
+    if (idle.n < kIdle * rows || idle.correlation() > -kFollows) continue;
+    for (MachineLog& log : logs) {
+      for (int k = span; k + span < log.rows(); ++k) {
+        log.measured[k][joint] -= idle.gain() * AccelerationAt(log, k, joint, span);
+      }
+    }
+  }
+  return logs;
 }
 
 void CheckTorques(Pieces pieces, Findings& findings) {

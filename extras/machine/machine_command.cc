@@ -181,6 +181,14 @@ void ShowErrors(const MachineArguments& a, std::span<const MachineLog> logs,
 
 constexpr std::array kHorizons{0.2, 0.5, 1.0};
 
+/// Reads the logs. Says a line about each one with faults, and then sets `is_faulty`.
+std::vector<MachineLog> ReadAndWarn(const MachineArguments& a, bool& is_faulty) {
+  return ReadCheckedLogs(a.logs, a.columns, [&](const std::string& fault) {
+    SayError(fault);
+    is_faulty = true;
+  });
+}
+
 int RunValidate(const MachineArguments& a) {
   const std::string& file = a.twin;
   if (file.ends_with(".csv") || file.ends_with(".csv.gz")) {
@@ -189,7 +197,8 @@ int RunValidate(const MachineArguments& a) {
   }
   const Twin twin = ReadTwin(file, "machine validate");
   const std::vector<Twin> others = ReadOthers(a);
-  const std::vector<MachineLog> logs = ReadCheckedLogs(a.logs, a.columns, SayError);
+  bool is_faulty = false;
+  const std::vector<MachineLog> logs = ReadAndWarn(a, is_faulty);
   std::vector<Predictor> predictors{PredictorOf(twin.name, twin, logs)};
   AddOthers(others, a, logs, predictors);
   ThreadPool pool(ResolveThreads(a.threads));
@@ -206,7 +215,7 @@ int RunValidate(const MachineArguments& a) {
   }
   if (!a.csv.empty()) WriteNamedFile(a.csv, MotionCsv(logs, predictors));
   ShowErrors(a, logs, predictors, rows, {}, pool);
-  return 0;
+  return is_faulty ? 1 : 0;
 }
 
 void PrintTwin(const Identification& found) {
@@ -295,11 +304,7 @@ int RunIdentify(const MachineArguments& a) {
   const Twin first = adapts ? ReadTwin(a.twin, "machine adapt") : ReadTwin(a.plant, "--plant");
   const std::vector<Twin> others = ReadOthers(a);
   bool is_faulty = false;
-  const std::vector<MachineLog> logs =
-      ReadCheckedLogs(a.logs, a.columns, [&](const std::string& fault) {
-        SayError(fault);
-        is_faulty = true;
-      });
+  const std::vector<MachineLog> logs = ReadAndWarn(a, is_faulty);
   IdentifyConfig config;
   config.folds = adapts ? 0 : static_cast<int>(a.folds);
   config.one_body = a.one_body;
@@ -431,7 +436,8 @@ void AddValidate(CommandLine& line) {
             "CSV file to write, measured and predicted angles of 1 s of each log");
   AddPredictions(line, a);
   line.Footer(
-      "Prints the median error of predictions over 0.2, 0.5 and 1 s, by session.\n\n"
+      "Prints the median error of predictions over 0.2, 0.5 and 1 s, by session.\n"
+      "Exit code: 0, or 1 if the logs have faults; see machine check.\n\n"
       "Examples:\n"
       "  ./upswing machine validate twin.toml new/*.csv --against realaigym-c1\n");
 }

@@ -225,7 +225,8 @@ class Machine(ProgramTest):
         self.write("plant.toml", "[plant]\nmass1 = 0.5\n")
         self.write("log.csv", log(scaled(vel_meas2=-1)))
         done = self.run_here("machine", "validate", "plant.toml", "log.csv")
-        self.assertEqual(done.returncode, 0)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("median error of the angles", done.stdout)
         self.assertRegex(done.stderr, r"\Aupswing: warning: log.csv: velocity 2: .*opposite sign"
                                       r"; machine check lists all faults\n\Z")
         # A twin of such logs is written, and marked.
@@ -233,6 +234,30 @@ class Machine(ProgramTest):
         self.assertEqual(done.returncode, 1)
         self.assertIn("upswing: today.toml: not to be trusted, because its logs have faults\n",
                       done.stderr)
+
+    def test_torques_of_zeros(self):
+        self.write("plant.toml", "[plant]\nmass1 = 0.5\n")
+        self.assertEqual(self.faults(log(scaled(tau_meas1=0))),
+                         {"torque 1": "measured torque never changes: suspect a column without a "
+                                      "measurement (leave it out by --columns)"})
+
+        def driven(k, row):  # as no free pendulum moves
+            t = row[0]
+            return [t, math.sin(3 * t) + 0.8 * math.sin(7 * t),
+                    0.8 * math.sin(5 * t) + 0.5 * math.sin(11 * t),
+                    3 * math.cos(3 * t) + 5.6 * math.cos(7 * t) + 0.01 * (-1) ** k,
+                    4 * math.cos(5 * t) + 5.5 * math.cos(11 * t) + 0.01 * (-1) ** k, 0, 0, 0, 0]
+
+        text = log(driven)
+        self.assertIn("all torques of the motors are 0, but no free pendulum moves like this",
+                      self.faults(text)["torque"])
+        for arguments in (["validate", "plant.toml", "log.csv"],
+                          ["adapt", "plant.toml", "log.csv", "--out", "today.toml"],
+                          ["identify", "log.csv", "--plant", "plant.toml", "--out", "twin.toml",
+                           "--folds", "0"]):
+            done = self.run_here("machine", *arguments)
+            self.assertEqual(done.returncode, 1, done.stderr)
+            self.assertIn("all torques of the motors are 0", done.stderr)
 
     def test_a_table_of_measured_and_predicted_angles(self):
         self.write("plant.toml", "[plant]\nmass1 = 0.5\n")
@@ -290,10 +315,10 @@ class Machine(ProgramTest):
         no_command = [*NAMES[:5], "x", "y", *NAMES[7:]]
         measured = self.write("measured.csv", log(names=no_command))
         one_command = self.write("some.csv", log(names=[*NAMES[:5], "x", *NAMES[6:]]))
-        for file in (measured, one_command):
+        for file, code in ((measured, 2), (one_command, 1)):  # 1: a fault that check finds
             done = self.run_here("machine", "identify", file, "--plant", "plant.toml", "--out",
                                  "twin.toml", "--folds", "0")
-            self.assertEqual(done.returncode, 2)
+            self.assertEqual(done.returncode, code)
             self.assertIn("joint 1: expected commanded torques", done.stderr)
             self.assertIn("got none", done.stderr)
         def errors(file):

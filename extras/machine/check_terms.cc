@@ -1,0 +1,78 @@
+#include "extras/machine/check_terms.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace upswing::machine {
+
+int SpanOf(double cycle) {
+  constexpr double kSpan = 0.01;  // s
+  return std::max(1, static_cast<int>(std::lround(kSpan / cycle)));
+}
+
+Window WindowAt(const MachineLog& log, int first, int last, int span, double cycle) {
+  Window window;
+  for (int k = first; k <= last; ++k) {
+    const double before = k > first ? log.time[k] - log.time[k - 1] : 0;
+    const double after = k < last ? log.time[k + 1] - log.time[k] : 0;
+    const double apart = log.time[k + span] - log.time[k - span];
+    if (std::max(before, after) > 5 * cycle || !(apart > 0)) return {};
+    Sample s{(before + after) / 2, 0, log.angle[k], {}, {}};
+    for (const int j : {0, 1}) {
+      s.w[j] = (log.angle[k + span][j] - log.angle[k - span][j]) / apart;
+      if (!log.measured.empty()) {
+        s.tau[j] = log.measured[k][j];
+      } else {
+        s.tau[j] = (log.commanded.empty() ? 0 : log.commanded[k][j]) +
+                   (log.push.empty() ? 0 : log.push[k][j]);
+      }
+    }
+    window.push_back(s);
+  }
+  window.front().momentum = -1;
+  window.back().momentum = 1;
+  return window;
+}
+
+Window SmoothWindowAt(const MachineLog& log, int first, int last, int span, double cycle) {
+  Window window = WindowAt(log, first, last, span, cycle);
+  const double begin = log.time[first], length = log.time[last] - begin;
+  for (size_t k = 0; k < window.size(); ++k) {
+    const double phase = std::numbers::pi * (log.time[first + k] - begin) / length;
+    Sample& s = window[k];
+    // ∫ φ d/dt p = -∫ φ' p for a weight φ that is 0 at both ends.
+    s.momentum = -s.force * std::numbers::pi / length * std::sin(2 * phase);
+    s.force *= std::pow(std::sin(phase), 2);
+  }
+  return window;
+}
+
+std::array<Terms, 2> TermsOf(const Window& window, const Reading& reading) {
+  std::array<Terms, 2> both{Terms::Zero(), Terms::Zero()};
+  for (const Sample& sample : window) {
+    const Joints q = reading.Of(sample.q), w = reading.Of(sample.w);
+    const double dt = sample.force, end = sample.momentum;
+    const double s1 = std::sin(q[0]), c1 = std::cos(q[0]), s2 = std::sin(q[1]), c2 = std::cos(q[1]);
+    for (const int row : {0, 1}) {
+      Terms& terms = both[row];
+      const double coupled = row == 0 ? 2 * w[0] + w[1] : w[0];
+      const double force = row == 0 ? 0 : w[0] * (w[0] + w[1]) * dt;
+      terms[kInertia] += end * (row == 0 ? w[0] : w[0] + w[1]);
+      terms[kOther] += end * w[1];
+      terms[kCoupling] += end * c2 * coupled + s2 * force;
+      terms[kTurnedCoupling] += -end * s2 * coupled + c2 * force;
+      terms[kLink2] += (s1 * c2 + c1 * s2) * dt;
+      terms[kTurnedLink2] += (c1 * c2 - s1 * s2) * dt;
+      terms[kLink1] += row == 0 ? s1 * dt : 0;
+      terms[kTurnedLink1] += row == 0 ? c1 * dt : 0;
+      terms[kDamping] += w[row] * dt;
+      terms[kFriction] += std::tanh(10 * w[row]) * dt;
+      terms[kTorque1] += sample.tau[0] * dt;
+      terms[kTorque2] += sample.tau[1] * dt;
+    }
+  }
+  return both;
+}
+
+}  // namespace upswing::machine
