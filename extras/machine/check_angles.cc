@@ -24,7 +24,7 @@ struct Repeat {
   const MachineLog* piece;
   int first, last;     // row indices
   double entry, exit;  // |changes of speed| at both ends, rad/s per cycle; 0 at the piece's ends
-  double step;         // its first cycle, s
+  double cycle;        // usual one, s
   bool catches_up;     // whether the angle then jumps to where the joint is, or the piece ends
 };
 
@@ -55,8 +55,7 @@ std::vector<Repeat> RepeatsOf(Pieces pieces, int joint) {
         // The change of speed may fall into two cycles.
         repeats.push_back(
             {&piece, first, last, std::max(difference(first), difference(first - 1) / 2),
-             std::max(difference(last + 1), difference(last + 2) / 2),
-             piece.time[first + 1] - piece.time[first],
+             std::max(difference(last + 1), difference(last + 2) / 2), cycle,
              last + 2 >= piece.rows() || difference(last + 1) > kJump * difference(last + 2)});
       }
       first = last + 1;
@@ -70,8 +69,8 @@ std::vector<Repeat> RepeatsOf(Pieces pieces, int joint) {
 bool IsSudden(const Repeat& repeat, double quantum) {
   constexpr double kSpeed = 0.5, kAcceleration = 300;  // rad/s, rad/s²
   const double speed = std::max(repeat.entry, repeat.exit);
-  return speed > kSpeed && speed > kAcceleration * repeat.step &&
-         speed * repeat.step > 4.5 * quantum;
+  return speed > kSpeed && speed > kAcceleration * repeat.cycle &&
+         speed * repeat.cycle > 4.5 * quantum;
 }
 
 /// Finds repeats within motion: at the end of the range the encoder saturates, elsewhere it sticks.

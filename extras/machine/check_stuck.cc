@@ -72,10 +72,18 @@ using NormalMatrix = Eigen::Matrix<double, kCoefficients, kCoefficients>;
 
 struct Equation {
   Vector terms;
-  double still;             // weight of the rows in which the joint does not move, s
+  double unknown;           // weight of dry friction that the velocities leave unknown, s
   int first = 0, last = 0;  // row indices
 };
 using EquationList = std::vector<Equation>;
+
+/// The unknown part of dry friction at a velocity (rad/s), as a share of the friction of fast
+/// motion. At rest, friction is any torque up to a limit; how it grows in slow motion differs.
+double UnknownFriction(double w) {
+  constexpr double kAtRest = 1.2, kSlow = 0.5, kFast = 0.15;  // shares, rad/s
+  if (std::abs(w) < kRounding) return kAtRest;
+  return std::abs(w) < kFast ? kSlow : 0;
+}
 
 /// The equations of joint `row` over windows within the rows `first` to `last`, `hop` (s) apart.
 EquationList EquationsWithin(const MachineLog& log, int first, int last, int row, double hop,
@@ -98,7 +106,7 @@ EquationList EquationsWithin(const MachineLog& log, int first, int last, int row
     e.terms[kOwnInertia] = terms[kInertia];
     for (const Sample& s : window) {
       e.terms[kConstant] += s.force;
-      if (std::abs(s.w[row]) < kRounding) e.still += s.force;
+      e.unknown += s.force * UnknownFriction(s.w[row]);
     }
     equations.push_back(e);
   }
@@ -140,10 +148,9 @@ Vector Solve(const NormalMatrix& gram) {
 /// The sum of squares that coefficients leave unexplained. At rest, dry friction is any torque up
 /// to a limit.
 double Remainder(const EquationList& equations, const Vector& x) {
-  constexpr double kAtRest = 1.2;  // largest friction at rest, of that in motion
   double sum = 0;
   for (const Equation& e : equations) {
-    const double rest = std::abs(e.terms.dot(x)) - kAtRest * x[kDry] * e.still;
+    const double rest = std::abs(e.terms.dot(x)) - x[kDry] * e.unknown;
     sum += std::pow(std::max(0.0, rest), 2);
   }
   return sum;
@@ -179,7 +186,7 @@ bool MovesClearly(const EquationList& equations, double noise) {
 /// motions count the same. Adds the share that is noise (a variance) to `noise_share`.
 EquationList Scaled(const EquationList& equations, const Vector& x, double noise,
                     double& noise_share) {
-  constexpr double kClear = 4;  // times the noise that a term needs to count fully
+  constexpr double kClear = 30;  // times the noise that a term needs to count fully
   const double n = static_cast<double>(equations.size());
   EquationList scaled;
   for (const Equation& e : equations) {
@@ -187,7 +194,7 @@ EquationList Scaled(const EquationList& equations, const Vector& x, double noise
         std::pow(e.terms.cwiseProduct(x).cwiseAbs().maxCoeff(), 2) + kClear * noise;
     if (!(square > 0)) continue;
     const double divisor = std::sqrt(square * n);
-    scaled.push_back({e.terms / divisor, e.still / divisor});
+    scaled.push_back({e.terms / divisor, e.unknown / divisor});
     noise_share += noise / (square * n);
   }
   return scaled;
@@ -196,8 +203,8 @@ EquationList Scaled(const EquationList& equations, const Vector& x, double noise
 /// Whether no common coefficients explain the motion of a joint in `live` windows, in which the
 /// encoder of the other joint changes, and in `stuck` ones, in which it does not.
 bool Contradicts(EquationList live, EquationList stuck, double noise) {
-  constexpr double kLeast = 0.005;  // unexplained share
-  constexpr double kInexact = 2;    // of the unexplained share of the live windows
+  constexpr double kLeast = 0.006;  // unexplained share
+  constexpr double kInexact = 1.5;  // of the unexplained share of the live windows
   const double all = InertiaIn(live);
   if (!(all > 0)) return false;
   const Vector first = Solve(MatrixOf(live) / all);
@@ -244,23 +251,32 @@ bool MustMove(const EquationList& live, const EquationList& stuck) {
   return (most - least) / 2 > kAtRest * x[kDry] + kSigmas * inexact;
 }
 
-/// The equations of joint `row` in windows outside of the given stretches.
-EquationList LiveOf(Pieces pieces, const std::vector<Stretch>& stretches, int row, double cycle) {
+/// Removes the windows in which a stretch of a piece is.
+void Drop(const std::vector<Stretch>& stretches, const MachineLog& piece, int span,
+          EquationList& equations) {
+  std::erase_if(equations, [&](const Equation& e) {
+    return std::ranges::any_of(stretches, [&](const Stretch& s) {
+      return s.piece == &piece && e.first - span <= s.last && e.last + span >= s.first;
+    });
+  });
+}
+
+/// The equations of joint `row` in windows in which both encoders change.
+EquationList LiveOf(Pieces pieces, int row, double cycle) {
   constexpr double kMost = 1000;  // windows; more would only take longer
+  std::vector<Stretch> stretches = StretchesOf(pieces, {0});
+  const std::vector<Stretch> second = StretchesOf(pieces, {1});
+  stretches.insert(stretches.end(), second.begin(), second.end());
   double seconds = 0;
   for (const MachineLog& piece : pieces) seconds += piece.time.back();
   const double hop = std::max(kWindow / 2, seconds / kMost);
-  const int span = SpanOf(cycle);
   EquationList live;
   for (const MachineLog& piece : pieces) {
-    for (Equation& e : EquationsWithin(piece, 0, piece.rows() - 1, row, hop, cycle)) {
-      const bool overlaps = std::ranges::any_of(stretches, [&](const Stretch& s) {
-        return s.piece == &piece && e.first - span <= s.last && e.last + span >= s.first;
-      });
-      e.terms[kConstant] = 0;
-      if (!overlaps) live.push_back(e);
-    }
+    EquationList all = EquationsWithin(piece, 0, piece.rows() - 1, row, hop, cycle);
+    Drop(stretches, piece, SpanOf(cycle), all);
+    live.insert(live.end(), all.begin(), all.end());
   }
+  for (Equation& e : live) e.terms[kConstant] = 0;
   return live;
 }
 
@@ -298,11 +314,13 @@ std::vector<Stretch> FindByMotion(Pieces pieces, int joint, double cycle) {
   const int other = 1 - joint;
   const std::vector<Stretch> stretches = StretchesOf(pieces, {joint});
   if (stretches.empty()) return {};
-  const EquationList live = LiveOf(pieces, stretches, other, cycle);
+  const EquationList live = LiveOf(pieces, other, cycle);
+  const std::vector<Stretch> still = StretchesOf(pieces, {other});
   const double noise = StepNoise(pieces, other);
   std::vector<Stretch> found;
   for (const Stretch& stretch : LongestOf(stretches)) {
-    const EquationList stuck = StuckOf(stretch, other, cycle);
+    EquationList stuck = StuckOf(stretch, other, cycle);
+    Drop(still, *stretch.piece, SpanOf(cycle), stuck);
     if (!MovesClearly(stuck, noise)) continue;
     const bool moves =
         live.size() < kEnough ? NeedsTwoJoints(stuck, noise) : Contradicts(live, stuck, noise);
@@ -316,10 +334,7 @@ std::vector<Stretch> FindByTorque(Pieces pieces, int joint, double cycle) {
   constexpr size_t kEnough = 12;  // live windows
   const std::vector<Stretch> both = StretchesOf(pieces, {0, 1});
   if (both.empty()) return {};
-  std::vector<Stretch> all = StretchesOf(pieces, {0});
-  const std::vector<Stretch> second = StretchesOf(pieces, {1});
-  all.insert(all.end(), second.begin(), second.end());
-  const EquationList live = LiveOf(pieces, all, joint, cycle);
+  const EquationList live = LiveOf(pieces, joint, cycle);
   if (live.size() < kEnough) return {};
   std::vector<Stretch> found;
   for (const Stretch& stretch : LongestOf(both)) {
