@@ -32,7 +32,7 @@ class AdverseLink : public MachineLink {
       : choose_(std::move(choose)),
         limit_(limit),
         rarity_(rarity),
-        machine_(twin, {}, {}),
+        machine_(twin, {}, {.line = {}, .machine = AnyWiring()}),
         protocol_(/*datagrams=*/choose_(2) == 0),
         clock_(choose_(5)) {}
 
@@ -67,10 +67,35 @@ class AdverseLink : public MachineLink {
   bool enabled() const { return enabled_; }
   /// Whether the encoders report the motion.
   bool honest() const {
-    return offset_ == Joints{} && sign_ == Joints{1, 1} && !stuck_[0] && !stuck_[1];
+    return wired_ && offset_ == Joints{} && sign_ == Joints{1, 1} && !stuck_[0] && !stuck_[1];
   }
 
  private:
+  /// Faults of motors and encoders from the beginning, in half of the runs.
+  MachineFaults AnyWiring() {
+    MachineFaults faults;
+    if (choose_(2) == 0) return faults;
+    wired_ = false;
+    const size_t j = choose_(2);
+    switch (choose_(5)) {
+      case 0:
+        faults.stuck_after[j] = 0;
+        break;
+      case 1:
+        faults.stuck_after = {0, 0};
+        break;
+      case 2:
+        faults.crossed = true;
+        break;
+      case 3:
+        faults.encoder_scale[j] = std::array{-1.0, 0.5, 2.0}[choose_(3)];
+        break;
+      default:
+        faults.motor_scale[j] = std::array{-1.0, 0.0, 2.0}[choose_(3)];
+    }
+    return faults;
+  }
+
   void Violate(const std::string& what) {
     if (violation_.empty()) violation_ = what;
   }
@@ -185,7 +210,8 @@ class AdverseLink : public MachineLink {
       0.0245;  // of a reading behind a torque: --max-age, 2 cycles
 
   Chooser choose_;
-  Joints limit_;  // N·m
+  bool wired_ = true;  // whether motors and encoders work at the beginning
+  Joints limit_;       // N·m
   uint32_t rarity_;
   FakeMachine machine_;
   LinkProtocol protocol_;
@@ -219,14 +245,19 @@ struct AdverseRun {
   int64_t cycles = 0;
   std::string reason;     // of the supervisor; empty: no fault
   std::string violation;  // the first broken promise; empty: none
+  double energy = 0;      // largest one of the true motion; see Limits
 };
+
+/// Largest energy that a machine with faults may get: twice the limit, because torques act for some
+/// cycles until a fault shows.
+inline constexpr double kMostEnergy = 8;
 
 /// Runs the control loop on an adverse machine for at most `most` cycles.
 inline AdverseRun RunAdversely(bool with_twin, uint32_t rarity, int64_t most,
                                const Chooser& choose) {
   LoopBench bench;
   bench.config.seconds = 0.2 + 0.3 * choose(7);
-  bench.differences = !with_twin;
+  bench.has_twin = with_twin;
   if (choose(4) > 0) {
     bench.machine_controller = WildController(choose);
   }
@@ -234,15 +265,23 @@ inline AdverseRun RunAdversely(bool with_twin, uint32_t rarity, int64_t most,
   const auto& link = dynamic_cast<const AdverseLink&>(*bench.link);
   bench.Make();
   AdverseRun run;
+  const Manipulator body = BodyOf(bench.twin);
+  const double hanging = -body.At({}).energy;
   int adding = 0;  // cycles in a row in which braking adds energy
   for (bool goes_on = true; goes_on && run.cycles < most && link.violation().empty();) {
     goes_on = bench.loop->Cycle();
     ++run.cycles;
     const PendulumState& s = link.machine().state();
+    run.energy = std::max(run.energy, 1 + body.At(s).energy / hanging);
+    if (with_twin && run.energy > kMostEnergy) {
+      return {run.cycles, bench.supervisor->reason(), "torque was not earned", run.energy};
+    }
     const bool brakes = bench.supervisor->state() == LoopState::kBraking && link.honest();
     const double power = link.torque()[0] * s.w1 + link.torque()[1] * s.w2;
     adding = brakes && power > 0 ? adding + 1 : 0;
-    if (adding > 2) return {run.cycles, bench.supervisor->reason(), "braking adds energy"};
+    if (adding > 2) {
+      return {run.cycles, bench.supervisor->reason(), "braking adds energy", run.energy};
+    }
   }
   run.reason = bench.supervisor->reason();
   bench.loop->SwitchOff();

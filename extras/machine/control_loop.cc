@@ -55,6 +55,7 @@ CycleFacts ControlLoop::FactsOf(double now, const std::optional<LinkReading>& re
   facts.state = estimator_.now();
   facts.ahead = estimator_.ahead();
   facts.energy = estimator_.energy();
+  facts.expected = estimator_.expectation();
   const bool over = running_cycle_ > 0 && static_cast<double>(cycle_ - running_cycle_) * period_ >=
                                               config_.seconds - period_ / 2;
   facts.stop = over || (config_.stop && config_.stop());
@@ -104,7 +105,9 @@ bool ControlLoop::Cycle() {
   torque_ = supervisor_.Torque(wanted, facts);
   const LoopState after = supervisor_.state();
   enabled_ = state != LoopState::kIdle && after != LoopState::kFault;
-  summary_.moving += after == LoopState::kRunning || after == LoopState::kBraking ? 1 : 0;
+  const bool moves = after == LoopState::kRunning || after == LoopState::kBraking ||
+                     after == LoopState::kProbing;
+  summary_.moving += moves ? 1 : 0;
   if (reading) {
     const LoopRow row{reading->time, reading->angle,  {facts.state.w1, facts.state.w2},
                       torque_,       reading->torque, static_cast<int>(after),

@@ -33,7 +33,7 @@ struct LoopSummary {
   static constexpr double kOnTime = 0.0002;  // s
 
   int64_t cycles = 0;
-  int64_t moving = 0;      // cycles in which the controller drove or the loop braked
+  int64_t moving = 0;      // cycles in which the loop probed, drove or braked
   int64_t on_time = 0;     // cycles that began within kOnTime of their deadlines
   int64_t missed = 0;      // cycles that were left out because others took too long
   int64_t unanswered = 0;  // cycles without a new reading, once there were readings

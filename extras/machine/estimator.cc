@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 namespace upswing::machine {
 namespace {
@@ -21,6 +22,8 @@ constexpr double kLeastNoise = 1e-6;       // of the measured angles, rad
 constexpr double kKept = 0.1;              // time for which sent torques are kept, s
 constexpr double kLongestGap = 0.1;        // s; after it the filter begins again
 constexpr int kMostKept = 512;             // torques sent in kKept and the longest delay, at 1 kHz
+constexpr double kStiction = 1.5;          // friction of a joint without motion, of dry friction
+constexpr double kLongestUnseen = 0.4;     // time for which a motion is predicted without sight, s
 
 double Square(double x) { return x * x; }
 
@@ -30,26 +33,34 @@ PendulumState StateOf(const Eigen::Matrix<double, 8, 1>& x) { return {x[0], x[1]
 
 Estimator::Estimator(const MachineSensors& sensors, double period)
     : sensors_(sensors), period_(period), velocity_(sensors) {
-  x_[kZero] = sensors.zero1;
-  x_[kZero + 1] = sensors.zero2;
+  track_.x[kZero] = sensors.zero1;
+  track_.x[kZero + 1] = sensors.zero2;
 }
 
-Estimator::Estimator(const Twin& twin, double period) : Estimator(twin.sensors, period) {
+Estimator::Estimator(const Twin& twin, double period, StateSource source)
+    : Estimator(twin.sensors, period) {
+  source_ = source;
   const Actuator& motor = twin.actuator;
-  model_.emplace(Model{BodyOf(twin), Drive(motor.delay, motor.lag), motor.delay + motor.lag, 0});
+  const Drive drive(motor.delay, motor.lag);
+  model_.emplace(Model{BodyOf(twin), drive, drive, motor.delay + motor.lag, 0});
   model_->hanging = -model_->body.At({}).energy;
-  // The drive's memory grows now, not in the loop.
+  // The drives' memory grows now, not in the loop.
   for (int i = kMostKept; i > 0; --i) model_->drive.Add(-1 - i * 1e-3, {});
+  model_->silent = model_->drive;
 
-  x_[kFriction] = model_->body.f1;
-  x_[kFriction + 1] = model_->body.f2;
+  Vector& x = track_.x;
+  Matrix& P = track_.P;
+  x[kFriction] = model_->body.f1;
+  x[kFriction + 1] = model_->body.f2;
+  shown_friction_ = friction();
   constexpr std::array kNames{"zero1", "zero2", "coulomb1", "coulomb2"};
   for (int i = 0; i < 4; ++i) {
-    for (int j = 0; j < 4; ++j) P_(kZero + i, kZero + j) = CovarianceOf(twin, kNames[i], kNames[j]);
+    for (int j = 0; j < 4; ++j) P(kZero + i, kZero + j) = CovarianceOf(twin, kNames[i], kNames[j]);
   }
 }
 
-Estimator::Vector Estimator::Follow(Vector x, double begin, double seconds) const {
+Estimator::Vector Estimator::Follow(const Drive& drive, Vector x, double begin,
+                                    double seconds) const {
   const int steps = MotionSteps(seconds);
   const double h = seconds / steps;
   if (h <= 0) return x;
@@ -58,9 +69,9 @@ Estimator::Vector Estimator::Follow(Vector x, double begin, double seconds) cons
   body.f2 = x[kFriction + 1];
   PendulumState state = StateOf(x);
   int cursor = 0;
-  Joints acceleration = body.Acceleration(state, model_->drive.At(begin, cursor));
+  Joints acceleration = body.Acceleration(state, drive.At(begin, cursor));
   for (int i = 0; i < steps; ++i) {
-    state = StepMotion(body, model_->drive, state, begin + i * h, h, cursor, acceleration);
+    state = StepMotion(body, drive, state, begin + i * h, h, cursor, acceleration);
   }
   x.head<4>() << state.q1, state.q2, state.w1, state.w2;
   return x;
@@ -72,105 +83,189 @@ double Estimator::AngleNoise() const {
 }
 
 void Estimator::Begin(const Joints& angle, double moment) {
-  begin_ = time_ = disturbed_until_ = moment;
+  Vector& x = track_.x;
+  Matrix& P = track_.P;
+  begin_ = track_.time = disturbed_until_ = moment;
   mean_innovation_.setZero();
   // Angle = measured angle - zero, so their errors are opposite.
-  for (int j = 0; j < 2; ++j) x_[kAngle + j] = angle[j] - x_[kZero + j];
-  x_.segment<2>(kVelocity).setZero();
-  P_.topRows<4>().setZero();
-  P_.leftCols<4>().setZero();
-  P_.topRows<2>() = -P_.middleRows<2>(kZero);
-  P_.leftCols<2>() = -P_.middleCols<2>(kZero);
-  P_.diagonal().head<2>().array() += Square(AngleNoise());
-  P_.diagonal().segment<2>(kVelocity).setConstant(Square(kFirstVelocity));
+  for (int j = 0; j < 2; ++j) x[kAngle + j] = angle[j] - x[kZero + j];
+  x.segment<2>(kVelocity).setZero();
+  P.topRows<4>().setZero();
+  P.leftCols<4>().setZero();
+  P.topRows<2>() = -P.middleRows<2>(kZero);
+  P.leftCols<2>() = -P.middleCols<2>(kZero);
+  P.diagonal().head<2>().array() += Square(AngleNoise());
+  P.diagonal().segment<2>(kVelocity).setConstant(Square(kFirstVelocity));
 }
 
-void Estimator::Predict(double seconds) {
-  const Vector next = Follow(x_, time_, seconds);
+void Estimator::Predict(Track& track, double seconds, double noise) const {
+  const Drive& drive = model_->drive;
+  const Vector next = Follow(drive, track.x, track.time, seconds);
   // The zeros have no effect on the motion: their columns are those of the identity.
   Matrix F = Matrix::Identity();
   constexpr double kStep = 1e-6;
   for (const int i : {0, 1, 2, 3, kFriction, kFriction + 1}) {
-    Vector other = x_;
+    Vector other = track.x;
     other[i] += kStep;
-    F.col(i) = (Follow(other, time_, seconds) - next) / kStep;
+    F.col(i) = (Follow(drive, other, track.time, seconds) - next) / kStep;
   }
-  P_ = F * P_ * F.transpose();
-  const bool disturbed = time_ < disturbed_until_ || Slow();
-  const double noise = disturbed ? kDisturbedNoise : kVelocityNoise;
-  P_.diagonal().segment<2>(kVelocity).array() += Square(noise) * seconds;
-  x_ = next;
-  time_ += seconds;
+  track.P = F * track.P * F.transpose();
+  track.P.diagonal().segment<2>(kVelocity).array() += Square(noise) * seconds;
+  track.x = next;
+  track.time += seconds;
 }
 
-void Estimator::Correct(const Joints& angle, double seconds) {
+Eigen::Vector2d Estimator::Correct(Track& track, const Joints& angle, const Encoders& encoders,
+                                   double limit) const {
+  Vector& x = track.x;
+  Matrix& P = track.P;
   Eigen::Matrix<double, 2, kStates> H = Eigen::Matrix<double, 2, kStates>::Zero();
-  H(0, kAngle) = H(1, kAngle + 1) = H(0, kZero) = H(1, kZero + 1) = 1;
-  const Eigen::Vector2d innovation = Eigen::Vector2d(angle[0], angle[1]) - H * x_;
-  Eigen::Matrix2d S = H * P_ * H.transpose();
+  Eigen::Vector2d innovation = Eigen::Vector2d::Zero();
+  for (int j = 0; j < 2; ++j) {
+    if (!encoders[j]) continue;  // a row of zeros corrects nothing
+    H(j, kAngle + j) = H(j, kZero + j) = 1;
+    innovation[j] = angle[j] - H.row(j) * x;
+  }
+  Eigen::Matrix2d S = H * P * H.transpose();
   S.diagonal().array() += Square(AngleNoise());
   const Eigen::LLT<Eigen::Matrix2d> factor(S);
-  const Eigen::Matrix<double, kStates, 2> K = factor.solve(H * P_).transpose();
-  // Readings with a wrong time have large innovations. At the beginning, so have right ones.
-  const double limit = time_ < *begin_ + kInnovationTime ? 1e9 : kOutlier;
+  const Eigen::Matrix<double, kStates, 2> K = factor.solve(H * P).transpose();
   const Eigen::Vector2d normalized =
       factor.matrixL().solve(innovation).cwiseMin(limit).cwiseMax(-limit);
-  x_ += K * (factor.matrixL() * normalized);
-  x_.tail<2>() = x_.tail<2>().cwiseMax(0);  // friction never drives
-  P_ -= K * H * P_;
-  P_ = (0.5 * (P_ + P_.transpose())).eval();
+  x += K * (factor.matrixL() * normalized);
+  x.tail<2>() = x.tail<2>().cwiseMax(0);  // friction never drives
+  P -= K * H * P;
+  P = (0.5 * (P + P.transpose())).eval();
+  return normalized;
+}
 
+void Estimator::NoticePush(const Eigen::Vector2d& normalized, double seconds) {
   // While the model holds, normalized innovations are white. A push gives many of them the same
   // sign, so their mean exceeds that of white ones, whose variance is weight / (2 - weight).
   const double weight = std::min(seconds / kInnovationTime, 1.0);
   mean_innovation_ += weight * (normalized - mean_innovation_);
   if (mean_innovation_.squaredNorm() > Square(kLargestMean) * weight / (2 - weight)) {
-    disturbed_until_ = time_ + kInnovationTime;
+    disturbed_until_ = track_.time + kInnovationTime;
   }
 }
 
-bool Estimator::Slow() const { return x_.segment<2>(kVelocity).cwiseAbs().maxCoeff() < kMoving; }
+bool Estimator::Slow(const Track& track) {
+  return track.x.segment<2>(kVelocity).cwiseAbs().maxCoeff() < kMoving;
+}
 
 void Estimator::Take(const TimedReading& reading, bool driven) {
-  const double seconds = reading.time - time_;
+  const double seconds = reading.time - track_.time;
+  expectation_.innovation = {};
+  expectation_.gap = 0;
   if (!begin_ || std::abs(seconds) > kLongestGap) {
     Begin(reading.angle, reading.time);
     return;
   }
   if (seconds <= 0) return;
-  const Vector x = x_;
-  const Matrix P = P_;
-  Predict(seconds);
-  Correct(reading.angle, seconds);
-  if (driven || !Slow()) return;
+  const Track before = track_;
+  const bool disturbed = track_.time < disturbed_until_ || Slow(track_);
+  Predict(track_, seconds, disturbed ? kDisturbedNoise : kVelocityNoise);
+  for (int j = 0; j < 2; ++j) {
+    expectation_.innovation[j] = reading.angle[j] - track_.x[kAngle + j] - track_.x[kZero + j];
+  }
+  expectation_.gap = seconds;
+  // Readings with a wrong time have large innovations. At the beginning, so have right ones.
+  const double limit = track_.time < *begin_ + kInnovationTime ? 1e9 : kOutlier;
+  NoticePush(Correct(track_, reading.angle, {true, true}, limit), seconds);
+  if (driven || !Slow(track_)) return;
   // Links may rest for minutes, held off their equilibrium: nothing is learned.
-  x_ = x;
-  P_ = P;
+  track_ = before;
   Begin(reading.angle, reading.time);
 }
 
+void Estimator::BeginUnseen(int joint, double angle) {
+  unseen_[joint] = track_;
+  unseen_[joint].x[kFriction + joint] = kStiction * shown_friction_[joint];
+  unseen_begin_[joint] = track_.time;
+  unseen_angle_[joint] = track_.x[kAngle + joint] + track_.x[kZero + joint];
+  shown_[joint] = angle;
+}
+
+void Estimator::ExpectUnseen(const TimedReading& reading) {
+  Encoders visible{};
+  for (int j = 0; j < 2; ++j) {
+    const bool begins =
+        track_.time == *begin_ || track_.time > unseen_begin_[j] + kLongestUnseen;
+    visible[j] = std::abs(reading.angle[j] - shown_[j]) > kVisibleSteps * AngleNoise();
+    // A filter that sees no motion takes it for friction.
+    if (visible[j]) shown_friction_[j] = friction()[j];
+    if (begins || visible[j]) BeginUnseen(j, reading.angle[j]);
+  }
+  for (int j = 0; j < 2; ++j) {
+    Track& track = unseen_[j];
+    const double seconds = reading.time - track.time;
+    if (seconds > 0) {
+      // Static friction may hold slow links. An encoder that shows no motion either proves nothing.
+      Predict(track, seconds, Slow(track) ? kDisturbedNoise : kVelocityNoise);
+      Encoders others = visible;
+      others[j] = false;
+      Correct(track, reading.angle, others, kOutlier);
+    }
+    const int q = kAngle + j, z = kZero + j;
+    const Matrix& P = track.P;
+    expectation_.unseen[j] = track.x[q] + track.x[z] - unseen_angle_[j];
+    expectation_.deviation[j] = std::sqrt(std::max(P(q, q) + 2 * P(q, z) + P(z, z), 0.0));
+  }
+}
+
+void Estimator::ExpectResponse(const TimedReading& reading, bool driven) {
+  if (!driven) {
+    driven_ = coasting_ = track_.x;
+    response_begin_ = response_time_ = track_.time;
+    response_angle_ = reading.angle;
+    model_->silent = model_->drive;
+  }
+  const double seconds = reading.time - response_time_;
+  if (seconds > 0 && reading.time < response_begin_ + kResponseSeconds) {
+    driven_ = Follow(model_->drive, driven_, response_time_, seconds);
+    coasting_ = Follow(model_->silent, coasting_, response_time_, seconds);
+    response_time_ = reading.time;
+  }
+  for (int j = 0; j < 2; ++j) {
+    expectation_.measured[j] = reading.angle[j] - response_angle_[j];
+    expectation_.driven[j] = driven_[kAngle + j] + driven_[kZero + j] - response_angle_[j];
+    expectation_.coasting[j] = coasting_[kAngle + j] + coasting_[kZero + j] - response_angle_[j];
+  }
+}
+
+Joints Estimator::zero() const {
+  if (source_ == StateSource::kDifferences) return {sensors_.zero1, sensors_.zero2};
+  return {track_.x[kZero], track_.x[kZero + 1]};
+}
+
 void Estimator::Update(double time, const Joints& sent, const TimedReading* reading) {
-  if (!model_) {
-    if (reading == nullptr) return;
-    const Joints q{reading->angle[0] - x_[kZero], reading->angle[1] - x_[kZero + 1]};
+  if (source_ == StateSource::kDifferences && reading != nullptr) {
+    const Joints q{reading->angle[0] - sensors_.zero1, reading->angle[1] - sensors_.zero2};
     const Joints w = velocity_.Update(reading->time, q);
     now_ = ahead_ = {q[0], q[1], w[0], w[1]};
-    return;
   }
+  if (!model_) return;
   model_->drive.Forget(time - kKept);
   model_->drive.Add(time, sent);
   if (reading != nullptr && std::isfinite(reading->angle[0] + reading->angle[1])) {
-    Take(*reading, sent != Joints{});
+    const bool driven = sent != Joints{};
+    Take(*reading, driven);
+    ExpectUnseen(*reading);
+    ExpectResponse(*reading, driven);
+    expectation_.known = true;
+    for (int j = 0; j < 2; ++j) expectation_.friction[j] = std::numbers::pi / 2 * shown_friction_[j];
   }
-  if (!begin_) return;
-  const Vector now = Follow(x_, time_, std::clamp(time - time_, 0.0, kKept));
+  if (!begin_ || source_ == StateSource::kDifferences) return;
+  const Drive& drive = model_->drive;
+  const Vector now =
+      Follow(drive, track_.x, track_.time, std::clamp(time - track_.time, 0.0, kKept));
   now_ = StateOf(now);
-  ahead_ = StateOf(Follow(now, time, period_ + model_->horizon));
+  ahead_ = StateOf(Follow(drive, now, time, period_ + model_->horizon));
 }
 
 Joints Estimator::CompensationTorque(double share) const {
-  return {DryFriction(share * x_[kFriction], ahead_.w1),
-          DryFriction(share * x_[kFriction + 1], ahead_.w2)};
+  return {DryFriction(share * friction()[0], ahead_.w1),
+          DryFriction(share * friction()[1], ahead_.w2)};
 }
 
 double Estimator::energy() const {

@@ -30,8 +30,7 @@ void ParseStuck(const std::string& text, MachineFaults& faults) {
     throw BadInput(
         Concat("--stuck: expected JOINT@SECONDS such as 2@3.5, got \"", Printable(text), "\""));
   }
-  faults.stuck_joint = static_cast<int>(*joint);
-  faults.stuck_after = *seconds;
+  faults.stuck_after[static_cast<size_t>(*joint - 1)] = *seconds;
 }
 
 int RunFake(const FakeArguments& a) {
@@ -84,6 +83,7 @@ void AddFake(CommandLine& line) {
   line.Text("--stuck", a.stuck, "JOINT@SECONDS", "encoder that sticks from a time on");
   line.Arguments(OptionsOf(a.config));
   AddSeed(line, a.seed, "the line's faults and of --draw");
+  line.Flag("--crossed", a.config.machine.crossed, "swap the encoders of the joints");
   line.Flag("--draw", a.draw, "play a machine drawn from the twin's covariance");
   line.Flag("--quiet", a.quiet, "print no line per second");
   line.Footer(

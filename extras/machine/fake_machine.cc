@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "extras/machine/link.h"
 
@@ -19,6 +20,14 @@ void FakeConfig::Describe(Options& o) {
   o.Section("machine");
   o.Add(&machine.saturate, "saturate", {0.01, 1e9}, "rad", "angle at which the encoders saturate")
       .usual = "never";
+  o.Add(&machine.encoder_scale[0], "encoder_scale1", {-10, 10}, "",
+        "angle that the encoder of joint 1 shows, of the true one; -1: the wrong sign");
+  o.Add(&machine.encoder_scale[1], "encoder_scale2", {-10, 10}, "",
+        "angle that the encoder of joint 2 shows, of the true one");
+  o.Add(&machine.motor_scale[0], "motor_scale1", {-10, 10}, "",
+        "torque of the motor of joint 1, of the commanded one; 0: a motor without power");
+  o.Add(&machine.motor_scale[1], "motor_scale2", {-10, 10}, "",
+        "torque of the motor of joint 2, of the commanded one");
   o.Add(&machine.nan_after, "nan_after", {0, 1e9}, "s",
         "time after which the angles are not numbers")
       .usual = "never";
@@ -68,7 +77,8 @@ FakeMachine::FakeMachine(const Twin& twin, const PendulumState& start, const Fak
 
 void FakeMachine::Apply(const Joints& torque) {
   torque_ = torque;
-  machine_.Command(torque);
+  const Joints& scale = config_.machine.motor_scale;
+  machine_.Command({scale[0] * torque[0], scale[1] * torque[1]});
 }
 
 void FakeMachine::Advance(double now) {
@@ -87,11 +97,15 @@ MachineReading FakeMachine::Measure(double now) {
   const MachineFaults& faults = config_.machine;
   MachineReading reading = machine_.Read();
   const double since = now - enabled_since_;  // negative infinity before
-  for (double& angle : reading.angle) angle = std::clamp(angle, -faults.saturate, faults.saturate);
-  if (faults.stuck_joint > 0 && since >= faults.stuck_after) {
-    double& angle = reading.angle[faults.stuck_joint - 1];
-    if (!stuck_) stuck_ = angle;
-    angle = *stuck_;
+  if (faults.crossed) std::swap(reading.angle[0], reading.angle[1]);
+  for (int j = 0; j < 2; ++j) {
+    double& angle = reading.angle[j];
+    angle = std::clamp(faults.encoder_scale[j] * angle, -faults.saturate, faults.saturate);
+  }
+  for (int j = 0; j < 2; ++j) {
+    if (since < faults.stuck_after[j]) continue;
+    if (!stuck_[j]) stuck_[j] = reading.angle[j];
+    reading.angle[j] = *stuck_[j];
   }
   if (since >= faults.nan_after) reading.angle.fill(std::nan(""));
   return reading;

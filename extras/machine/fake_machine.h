@@ -27,8 +27,10 @@ struct LineFaults {
 struct MachineFaults {
   static constexpr double kNever = 1e9;
 
-  int stuck_joint = 0;           // joint whose encoder sticks, 1 or 2; 0: none
-  double stuck_after = kNever;   // s
+  Joints stuck_after{kNever, kNever};  // time after which the encoder of each joint sticks, s
+  // The encoder of each joint shows its angle, and its motor gives its torque, times these.
+  Joints encoder_scale{1, 1}, motor_scale{1, 1};
+  bool crossed = false;          // whether each encoder shows the other joint
   double saturate = kNever;      // angle at which the encoders saturate, rad
   double nan_after = kNever;     // time after which the angles are NaN, s
   double silent_after = kNever;  // time after which the machine sends nothing, s
@@ -102,7 +104,7 @@ class FakeMachine {
   // Whether the motors stay off until a command without kEnabled: at first, and after the watchdog.
   bool locked_ = true;
   Joints torque_{};              // applied, N·m
-  std::optional<double> stuck_;  // rad
+  std::array<std::optional<double>, 2> stuck_;  // rad
 };
 
 /// Serves a machine on a channel in real time until `stop` returns true. Calls `report` once a

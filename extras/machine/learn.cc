@@ -127,8 +127,9 @@ class Learner {
     const Pieces last(&logs_.back(), 1);
     const double range = std::max(AngleRange(last, 0), AngleRange(last, 1));
     if (range > kLeast) return;
-    throw Ended{fmt::format("the links moved by {:.3f} rad only: raise --max-torque ({:g} N·m)",
-                            range, c_.limits.torque)};
+    throw Ended{fmt::format(
+        "the links moved by {:.3f} rad only under torques up to {:g} N·m: does anything hold them?",
+        range, c_.limits.torque)};
   }
 
   /// Runs work that computes, and counts its processor time.
@@ -151,8 +152,9 @@ class Learner {
     const Manipulator body = BodyOf(twin_);
     const double hanging = -body.At({}).energy;
     const auto level = [=, velocity = kLimitShare * l.velocity](const PendulumState& s) {
-      const double motion = std::max(Larger(Wrapped(s.q1), Wrapped(s.q1 + s.q2)) / lean,
-                                     Larger(s.w1, s.w2) / velocity);
+      // Lean and velocity add up as energies do: links that lean and move go on to lean further.
+      const double motion = std::hypot(Larger(Wrapped(s.q1), Wrapped(s.q1 + s.q2)) / lean,
+                                       Larger(s.w1, s.w2) / velocity);
       return has_twin ? std::max(motion, (1 + body.At(s).energy / hanging) / energy) : motion;
     };
     say_(fmt::format("excite: torques grow until the links lean {:.2f} rad, {:g} s", lean,
@@ -188,6 +190,8 @@ class Learner {
                     "{:.2f} N·m{}",
                     rules.log, run.motion, angle[0], angle[1], torque[0], torque[1],
                     run.reason.empty() ? "" : "; " + run.reason));
+    // A machine that does not answer gets no more torque.
+    if (run.faulty) throw Ended{run.reason};
     const Joints& last = logs_.back().angle.back();
     if (Larger(last[0], last[1]) > c_.limits.angle) {
       throw Ended{"the links hang beyond --max-angle: turn them back, or raise it"};

@@ -12,6 +12,7 @@
 #include "base/error.h"
 #include "extras/machine/excitation.h"
 #include "extras/machine/first_twin.h"
+#include "extras/machine/loop_testing.h"
 #include "extras/machine/testing.h"
 #include "os/testing.h"
 
@@ -128,13 +129,42 @@ TEST(Learn, ExcitationsStayWithinTheLimits) {
   EXPECT_GT(link.largest, 0.5);
 }
 
+TEST(Learn, AMachineThatDoesNotAnswerGetsNoMoreTorque) {
+  constexpr double kNever = MachineFaults::kNever;
+  const auto learn = [](const MachineFaults& faults) {
+    const TempFolder folder;
+    FakeConfig fault;
+    fault.machine = faults;
+    FakeLink link(StrangeTwin(), fault);
+    LearnConfig config = ConfigFor(2);
+    config.limits.velocity = 15;
+    double fastest = 0;
+    const LearnResult result = LearnOn(link, config, folder.path(), [&] {
+      const PendulumState& s = link.machine().state();
+      fastest = std::max({fastest, std::abs(s.w1), std::abs(s.w2)});
+      return false;
+    });
+    EXPECT_LT(fastest, config.limits.velocity) << result.reason;
+    EXPECT_EQ(result.reason.find("raise"), std::string::npos) << result.reason;
+    EXPECT_FALSE(link.enabled());
+    return result.reason;
+  };
+  for (const Joints& dead : {Joints{0, 0}, {0, kNever}, {kNever, 0}}) {
+    EXPECT_NE(learn({.stuck_after = dead}).find("does not answer"), std::string::npos);
+  }
+  for (const MachineFaults& wrong :
+       {MachineFaults{.encoder_scale = {-1, 1}}, {.motor_scale = {-1, 1}}, {.crossed = true}}) {
+    EXPECT_NE(learn(wrong).find("the sign"), std::string::npos);
+  }
+}
+
 TEST(Learn, EndsWithoutMotion) {
   const TempFolder folder;
   Twin stuck = StrangeTwin();
   stuck.plant.coulomb1 = stuck.plant.coulomb2 = 10;
   WatchedLink link(stuck);
   const LearnResult result = LearnOn(link, ConfigFor(2), folder.path());
-  EXPECT_NE(result.reason.find("motion"), std::string::npos) << result.reason;
+  EXPECT_NE(result.reason.find("no motion"), std::string::npos) << result.reason;
   EXPECT_EQ(result.tries, 0);
 }
 

@@ -13,6 +13,9 @@ RunOutcome RunCycles(const LearnConfig& c, const RunRules& rules, const MachineS
   motor[c.actuated_joint - 1] = c.limits.torque;
   Supervisor supervisor({.limits = rules.limits,
                          .motor_limit = motor,
+                         .actuated_joint = c.actuated_joint,
+                         // Excitations make the twin that predicts the motion of a try.
+                         .trust = rules.is_try ? TwinTrust::kInRun : TwinTrust::kNever,
                          .angle_range = sensors.angle_range,
                          .quantum = sensors.quantum,
                          .period = 1 / c.hz});
@@ -41,7 +44,8 @@ RunOutcome RunCycles(const LearnConfig& c, const RunRules& rules, const MachineS
   };
   std::async(std::launch::async, run).get();
   log.Finish();
-  return {loop.summary(), static_cast<double>(summary->moving) / c.hz, supervisor.reason()};
+  return {loop.summary(), static_cast<double>(summary->moving) / c.hz, supervisor.reason(),
+          supervisor.faulty()};
 }
 
 }  // namespace upswing::machine

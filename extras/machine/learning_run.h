@@ -26,8 +26,9 @@ struct RunRules {
 
 struct RunOutcome {
   LoopSummary summary;
-  double motion = 0;   // time in which the controller drove or the loop braked, s
-  std::string reason;  // of the supervisor; empty: no fault
+  double motion = 0;    // time in which the loop probed, drove or braked, s
+  std::string reason;   // of the supervisor; empty: none
+  bool faulty = false;  // whether the reason is a fault, not a limit
 };
 
 /// Runs the control loop until it ends. A run in real time has its own thread, because fits with

@@ -2,10 +2,12 @@
 
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include "extras/machine/control_loop.h"
+#include "extras/machine/fake_machine.h"
 #include "extras/machine/testing.h"
 
 /// Helpers for tests of control loops.
@@ -16,15 +18,55 @@ inline double SineTorque(int64_t step, const PendulumState& /*state*/) {
   return 1.5 * std::sin(6 * kControlPeriod * static_cast<double>(step));
 }
 
+/// A FakeMachine behind faulty lines in simulated time.
+class FakeLink : public MachineLink {
+ public:
+  FakeLink(const Twin& twin, const FakeConfig& config, uint64_t seed = 1)
+      : machine_(twin, {}, config), out_(config.line, seed, "out"), in_(config.line, seed, "in") {}
+
+  double Now() const override { return now_; }
+  void WaitUntil(double time) override { now_ = time; }
+  bool simulated() const override { return true; }
+  std::optional<LinkReading> Exchange(const Joints& torque, bool enabled,
+                                      double /*until*/) override {
+    enabled_ = enabled;
+    torque_ = torque;
+    out_.Send(*Decode(protocol_.Command(torque, enabled, now_)), now_);
+    while (const auto frame = out_.Receive(now_)) {
+      if (const auto answer = machine_.Answer(*frame, now_)) in_.Send(*answer, now_);
+    }
+    machine_.Advance(now_);
+    std::optional<LinkReading> newest;
+    while (const auto frame = in_.Receive(now_)) {
+      if (const auto reading = protocol_.Take(Encode(*frame), now_)) newest = reading;
+    }
+    return newest;
+  }
+
+  const FakeMachine& machine() const { return machine_; }
+  bool enabled() const { return enabled_; }
+  const Joints& torque() const { return torque_; }
+
+ private:
+  FakeMachine machine_;
+  FaultyLine out_, in_;
+  LinkProtocol protocol_{/*datagrams=*/true};
+  double now_ = 0;
+  bool enabled_ = false;
+  Joints torque_{};
+};
+
 /// A loop on a link, cycle by cycle.
 struct LoopBench {
   Twin twin = TestTwin();
   Limits limits;
   LoopConfig config{.seconds = 2};
   MachineController machine_controller = SineTorque;
+  PendulumState start{};
+  bool has_twin = true;      // else the loop knows only the encoders
   std::unique_ptr<MachineLink> link;
   std::string log_path;
-  bool differences = false;  // whether the estimator goes without the twin
+  StateSource source = StateSource::kTwin;
   std::unique_ptr<Estimator> estimator;
   std::unique_ptr<Supervisor> supervisor;
   std::unique_ptr<LogWriter> log;
@@ -32,11 +74,13 @@ struct LoopBench {
 
   void Make() {
     const double period = 1.0 / static_cast<double>(config.hz);
-    estimator = differences ? std::make_unique<Estimator>(twin.sensors, period)
-                            : std::make_unique<Estimator>(twin, period);
+    estimator = has_twin ? std::make_unique<Estimator>(twin, period, source)
+                         : std::make_unique<Estimator>(twin.sensors, period);
     supervisor =
         std::make_unique<Supervisor>(SupervisorConfig{.limits = limits,
+                                                      .start = start,
                                                       .motor_limit = {5, 0.5},
+                                                      .actuated_joint = config.actuated_joint,
                                                       .angle_range = twin.sensors.angle_range,
                                                       .quantum = twin.sensors.quantum,
                                                       .period = period});

@@ -30,6 +30,26 @@ struct RunArguments {
 
 std::unique_ptr<MachineLink> g_link;  // global for signal handlers, which may come until the end
 
+/// Says how the plant that a policy was made for differs from the twin: times and torques that decide
+/// how the machine answers. The controllers of `run` are made for the twin itself.
+void CompareWithTwin(const LoadedPolicy& policy, const Twin& twin) {
+  constexpr double kSimilar = 0.2;  // relative difference that a policy usually withstands
+  const Manipulator own = ManipulatorOf(policy.plant), body = BodyOf(twin);
+  std::string text;
+  const auto compare = [&](const char* what, double made_for, double is, const char* unit) {
+    if (std::abs(made_for - is) <= kSimilar * std::abs(is)) return;
+    text += fmt::format("{}{} {:.3g} {} (twin {:.3g})", text.empty() ? "" : ", ", what, made_for,
+                        unit, is);
+  };
+  // Upright at rest, with straight links: inertia about joint 1 and its moment of gravity.
+  compare("inertia", own.Mass(1).M11, body.Mass(1).M11, "kg·m²");
+  compare("moment of gravity", own.G1 + own.G2, body.G1 + body.G2, "N·m");
+  compare("inertia of link 2", own.J2, body.J2, "kg·m²");
+  compare("torque limit", policy.plant.torque_limit, twin.plant.torque_limit, "N·m");
+  if (text.empty()) return;
+  fmt::print(stderr, "warning: {} was made for another plant: {}\n", Printable(policy.name), text);
+}
+
 /// Throws BadInput if a serial line is too slow for a frame per cycle in each direction.
 void CheckBaud(const LinkAddress& link, int64_t hz) {
   constexpr int64_t kBitsPerByte = 10;  // start, 8 bits, stop
@@ -70,9 +90,9 @@ int Drive(const RunArguments& a, const MachinePolicy& policy, const std::optiona
   // A first call of another controller touches memory that is not there yet.
   ControllerOf(policy)(0, {});
   MachineController controller = ControllerOf(policy);
-  Estimator estimator = twin && !a.differences
-                            ? Estimator(*twin, period)
-                            : Estimator(twin ? twin->sensors : a.sensors, period);
+  const StateSource source = a.differences ? StateSource::kDifferences : StateSource::kTwin;
+  Estimator estimator =
+      twin ? Estimator(*twin, period, source) : Estimator(a.sensors, period);
 
   Joints motor{a.passive_torque, a.passive_torque};
   motor[joint - 1] = twin ? twin->plant.torque_limit : a.limits.torque;
@@ -80,6 +100,7 @@ int Drive(const RunArguments& a, const MachinePolicy& policy, const std::optiona
   Supervisor supervisor({.limits = a.limits,
                          .start = start,
                          .motor_limit = motor,
+                         .actuated_joint = joint,
                          .angle_range = sensors.angle_range,
                          .quantum = sensors.quantum,
                          .period = period});
@@ -112,7 +133,12 @@ int Drive(const RunArguments& a, const MachinePolicy& policy, const std::optiona
   if (log.dropped() > 0) fmt::print("  log      {} rows left out\n", log.dropped());
   if (!a.log.empty()) fmt::print("written {}\n", Printable(a.log));
   if (!supervisor.reason().empty()) throw Failure(supervisor.reason());
-  return StopSignal() == 0 ? 0 : 128 + StopSignal();
+  if (StopSignal() != 0) return 128 + StopSignal();
+  // Without torque the loop only reads.
+  if (a.limits.torque > 0 && loop.summary().upright == 0) {
+    throw Failure("the links were not upright at the end of the run");
+  }
+  return 0;
 }
 
 int RunRun(const RunArguments& a) {
@@ -134,7 +160,9 @@ int RunRun(const RunArguments& a) {
     throw BadInput("--draw: expected a twin with [covariance] as --link, got none");
   if (!twin && a.compensation > 0)
     throw BadInput("--compensation: expected --twin with it, got none");
-  return Drive(a, GetMachinePolicy(a.policy, a.robot, twin), twin, address);
+  const MachinePolicy policy = GetMachinePolicy(a.policy, a.robot, twin);
+  if (twin) CompareWithTwin(*policy, *twin);
+  return Drive(a, policy, twin, address);
 }
 
 }  // namespace
@@ -176,12 +204,14 @@ void AddRun(CommandLine& line) {
             "with a twin as --link: play a machine drawn from the twin's covariance");
   line.Excludes("--compensation", {"--differences"}, ", which estimates no friction");
   line.Footer(
-      "The loop waits for readings (idle), then for the start state (armed), then the\n"
+      "The loop waits for readings (idle), then for the start state (armed). From hanging links, a\n"
+      "pulse of the motor then has to move both joints (probing). Then the\n"
       "controller drives (running). Afterwards, at Ctrl-C and beyond a limit it brakes until\n"
       "the links hang; a second Ctrl-C switches the motors off at once. So does a fault: no\n"
       "reading for --max-age, a reading that is no number, an angle that jumps, an encoder that\n"
       "sticks or saturates (docs/howto/protection.md).\n"
-      "Exit code: 0, or 1 with the reason in a line after a fault or beyond a limit.\n\n"
+      "Exit code: 0 if the links are upright at the end (with --max-torque 0: in any case), or 1\n"
+      "with the reason in a line.\n\n"
       "A controller is designed for the twin without dry friction. --made-for changes this\n"
       "plant.\n"
       "Read docs/howto/real-machine.md before you switch on motors.\n\n"

@@ -24,8 +24,12 @@ constexpr double kOldest = 0.001;       // age of an angle when its command come
 constexpr double kShortest = 1e-4;      // time between two measurements, s
 constexpr double kLeastError = 0.002;   // of the change between two angles, rad
 constexpr int kErrorSteps = 4;          // of the encoder, in this change
-constexpr double kUnknownStep = 0.006;  // rad; 1024 steps per turn
 constexpr double kLargestError = 0.2;   // of the estimate at a slow joint, rad
+
+// Angle after lost readings, less its prediction: most, and most for each second and each step of
+// the encoder. With readings of real machines left out for 20 ms it is at most 0.025 rad.
+constexpr double kSlip = 0.012, kSlipRate = 1, kSlipSteps = 6;  // rad, rad/s, steps
+constexpr double kLostCycles = 1.5;
 
 // Braking that does not work ends with motors off.
 constexpr double kBrakeShare = 1.5;                      // of the limits of velocity and energy
@@ -60,29 +64,55 @@ void Limits::Describe(Options& o) {
 }
 
 const char* NameOf(LoopState state) {
-  constexpr std::array kNames{"idle", "armed", "running", "braking", "fault"};
+  constexpr std::array kNames{"idle", "armed", "running", "braking", "fault", "probing"};
   return kNames[static_cast<size_t>(state)];
 }
 
-Supervisor::Supervisor(const SupervisorConfig& config) : config_(config) {
-  for (double& limit : config_.motor_limit) {
-    limit = std::min(limit, config_.limits.torque);
-    // Frames have singles, and their rounding must not exceed the limit.
+namespace {
+
+/// The largest torque of each joint that a single, as frames have it, does not round up.
+Joints SingleLimits(const SupervisorConfig& config) {
+  Joints limits = config.motor_limit;
+  for (double& limit : limits) {
+    limit = std::min(limit, config.limits.torque);
     const auto single = static_cast<float>(limit);
     if (single > limit) limit = std::nextafter(single, 0.0F);
   }
+  return limits;
+}
+
+bool Hangs(const PendulumState& s) {
+  return s.q1 == 0 && s.q2 == 0 && s.w1 == 0 && s.w2 == 0;
+}
+
+}  // namespace
+
+Supervisor::Supervisor(const SupervisorConfig& config)
+    : config_(config),
+      earned_({.limit = SingleLimits(config)[config.actuated_joint == 1 ? 0 : 1],
+               .actuated_joint = config.actuated_joint,
+               .trust = config.trust,
+               .hangs = Hangs(config.start),
+               .quantum = config.quantum,
+               .period = config.period}) {
+  config_.motor_limit = SingleLimits(config);
   const double step = config_.quantum > 0 ? config_.quantum : kUnknownStep;
   for (Joint& joint : joints_) joint.step = step;
-  constexpr size_t kLongestReason = 160;
+  constexpr size_t kLongestReason = 300;
   reason_.reserve(kLongestReason);
 }
 
-bool Supervisor::Report(const char* text, double first, double second) {
-  if (!reason_.empty()) return false;  // the first reason stays
-  std::array<char, 150> line{};
-  std::snprintf(line.data(), line.size(), text, first, second);
+void Supervisor::Report(const Complaint& complaint) {
+  if (!reason_.empty()) return;  // the first reason stays
+  std::array<char, 300> line{};
+  const auto& [first, second, third] = complaint.numbers;
+  std::snprintf(line.data(), line.size(), complaint.text, first, second, third);
   reason_ = line.data();
-  return false;
+}
+
+LoopState Supervisor::Fail(const Complaint& complaint) {
+  Report(complaint);
+  return state_ = LoopState::kFault;
 }
 
 void Supervisor::Brake(const CycleFacts& facts) {
@@ -124,10 +154,10 @@ bool Supervisor::IsStuck(Joint& joint, double change, double longest,
   return v * time - kHardest * time * time / 2 > 2 * joint.step;
 }
 
-bool Supervisor::CheckMotion(const CycleFacts& facts) {
+Complaint Supervisor::CheckMotion(const CycleFacts& facts) {
   const double longest = std::max(facts.received - last_read_at_, kShortest);
   const double shortest = std::max(facts.read_at - kOldest - last_received_, kShortest);
-  bool good = true;
+  Complaint complaint;
   for (size_t j = 0; j < 2; ++j) {
     Joint& joint = joints_[j];
     const double change = facts.angle[j] - joint.angle;
@@ -135,64 +165,89 @@ bool Supervisor::CheckMotion(const CycleFacts& facts) {
     if (!has_reading_) continue;
     joint.rate = facts.read_at > last_read_at_ ? change / (facts.read_at - last_read_at_) : 0;
     const auto number = static_cast<double>(j + 1);
-    if (!CheckVelocity(joint, change, shortest, longest + kOldest)) {
-      good = Report("joint %.0f: the angle jumps by %.4g rad, which no motion explains", number,
-                    change);
-    } else if (IsStuck(joint, change, longest, facts)) {
-      good = Report("joint %.0f: the encoder sticks while the joint moves", number);
+    const bool explained = CheckVelocity(joint, change, shortest, longest + kOldest);
+    const bool stuck = IsStuck(joint, change, longest, facts);
+    if (!explained) {
+      complaint = {"joint %.0f: the angle jumps by %.4g rad, which no motion explains",
+                   {number, change}};
+    } else if (stuck) {
+      complaint = {"joint %.0f: the encoder sticks while the joint moves", {number}};
     }
   }
   has_reading_ = true;
   last_read_at_ = facts.read_at;
   last_received_ = facts.received;
-  return good;
+  return complaint;
 }
 
-bool Supervisor::CheckReading(const CycleFacts& facts) {
-  const bool driving = state_ == LoopState::kRunning || state_ == LoopState::kBraking;
+Complaint Supervisor::CheckReading(const CycleFacts& facts) {
   for (size_t j = 0; j < 2; ++j) {
     const auto joint = static_cast<double>(j + 1);
     if (!Within(facts.angle[j], kLargestReading) || !Within(facts.torque[j], kLargestReading)) {
-      return Report("joint %.0f: expected a finite reading, got another number", joint);
+      return {"joint %.0f: expected a finite reading, got another number", {joint}};
     }
     if (std::abs(facts.angle[j]) >= config_.angle_range) {
-      return Report("joint %.0f: the encoder saturates at %.4g rad", joint, facts.angle[j]);
+      return {"joint %.0f: the encoder saturates at %.4g rad", {joint, facts.angle[j]}};
     }
   }
-  if (facts.locked && driving) {
-    return Report("the machine's watchdog has switched its motors off");
-  }
+  const bool drives = state_ == LoopState::kRunning || state_ == LoopState::kBraking ||
+                      state_ == LoopState::kProbing;
+  if (facts.locked && drives) return {"the machine's watchdog has switched its motors off"};
   return CheckMotion(facts);
 }
 
-bool Supervisor::CheckEstimate(const CycleFacts& facts) {
+Complaint Supervisor::CheckEstimate(const CycleFacts& facts) const {
   const auto& [q1, q2, w1, w2] = facts.state;
   if (!std::isfinite(q1 + q2 + w1 + w2 + facts.energy)) {
-    return Report("the estimate of the state is not finite");
+    return {"the estimate of the state is not finite"};
   }
   const Joints q{q1, q2}, w{w1, w2};
   for (size_t j = 0; j < 2 && facts.fresh; ++j) {
     const double error = facts.angle[j] - facts.zero[j] - q[j];
     if (Within(error, kLargestError + std::abs(w[j]) * (facts.age + config_.period))) continue;
-    return Report("joint %.0f: the estimate is %.4g rad from the reading",
-                  static_cast<double>(j + 1), error);
+    return {"joint %.0f: the estimate is %.4g rad from the reading",
+            {static_cast<double>(j + 1), error}};
   }
-  return true;
+  return {};
 }
 
-bool Supervisor::WithinLimits(const CycleFacts& facts) {
+/// Lost readings leave time for a slip that a hard motion could explain, too. The twin knows better.
+Complaint Supervisor::CheckSlip(const CycleFacts& facts) const {
+  const Expectation& e = facts.expected;
+  if (!e.known || config_.trust == TwinTrust::kNever) return {};
+  if (!facts.fresh || e.gap < kLostCycles * config_.period) return {};
+  const Joints w{facts.state.w1, facts.state.w2};
+  const double unsure = facts.received - facts.read_at;  // of the moment of the measurement, s
+  for (size_t j = 0; j < 2; ++j) {
+    const double most = kSlip + kSlipRate * e.gap + kSlipSteps * joints_[j].step +
+                        std::abs(w[j]) * unsure;
+    if (Within(e.innovation[j], most)) continue;
+    return {"joint %.0f: after lost readings the angle is %.3g rad from its prediction",
+            {static_cast<double>(j + 1), e.innovation[j]}};
+  }
+  return {};
+}
+
+Complaint Supervisor::CheckResponse() {
+  if (state_ == LoopState::kProbing) return earned_.JudgePulse();
+  return earned_.JudgeRun();
+}
+
+Complaint Supervisor::CheckLimits(const CycleFacts& facts) const {
   const Limits& limits = config_.limits;
   const auto& [q1, q2, w1, w2] = facts.state;
   const double angle = std::max(std::abs(q1), std::abs(q2));
   const double velocity = std::max(std::abs(w1), std::abs(w2));
   if (!Within(angle, limits.angle)) {
-    return Report("angle: %.4g rad is beyond the limit %.4g rad", angle, limits.angle);
+    return {"angle: %.4g rad is beyond the limit %.4g rad", {angle, limits.angle}};
   }
   if (!Within(velocity, limits.velocity)) {
-    return Report("velocity: %.4g rad/s is beyond the limit %.4g rad/s", velocity, limits.velocity);
+    return {"velocity: %.4g rad/s is beyond the limit %.4g rad/s", {velocity, limits.velocity}};
   }
-  return Within(facts.energy, limits.energy) ||
-         Report("energy: %.4g is beyond the limit %.4g", facts.energy, limits.energy);
+  if (!Within(facts.energy, limits.energy)) {
+    return {"energy: %.4g is beyond the limit %.4g", {facts.energy, limits.energy}};
+  }
+  return {};
 }
 
 LoopState Supervisor::GoOnBraking(const CycleFacts& facts) {
@@ -203,8 +258,7 @@ LoopState Supervisor::GoOnBraking(const CycleFacts& facts) {
   if (!Within(velocity, kBrakeShare * config_.limits.velocity) ||
       !Within(facts.energy, kBrakeShare * config_.limits.energy) ||
       energy_ > kEnergyShare * least_energy_ + kEnergyRise) {
-    Report("braking does not slow the links: %.4g rad/s", velocity);
-    return LoopState::kFault;
+    return Fail({"braking does not slow the links: %.4g rad/s", {velocity}});
   }
   if (!AtRest(facts.state)) slow_since_ = facts.time;
   if (facts.time - slow_since_ < kSlowSeconds &&
@@ -229,43 +283,62 @@ void Supervisor::Wait(const CycleFacts& facts) {
     ended_ = true;
     state_ = LoopState::kIdle;
   } else if (facts.time - since_ > config_.limits.patience) {
-    Report(state_ == LoopState::kIdle
-               ? "no readings within %.4g s"
-               : "the machine did not come to rest in its start state within %.4g s",
-           config_.limits.patience);
-    state_ = LoopState::kFault;
+    const char* text = "the machine did not come to rest in its start state within %.4g s";
+    if (state_ == LoopState::kIdle) text = "no readings within %.4g s";
+    if (unlocks_) text = "the machine's motors stay locked for %.4g s";
+    Fail({text, {config_.limits.patience}});
   } else if (state_ == LoopState::kIdle && readings_ >= kArmReadings) {
     state_ = LoopState::kArmed;
-    since_ = facts.time;
+    if (!unlocks_) since_ = facts.time;
   } else if (state_ == LoopState::kArmed && facts.locked) {
     // Idle commands unlock the motors.
     state_ = LoopState::kIdle;
     readings_ = 0;
+    unlocks_ = true;
   } else if (state_ == LoopState::kArmed && facts.fresh && AtStart(facts.state)) {
-    state_ = LoopState::kRunning;
+    if (earned_.proven()) {
+      state_ = LoopState::kRunning;
+    } else if (earned_.quiet()) {
+      state_ = LoopState::kProbing;
+    }
   }
 }
 
 bool Supervisor::CheckAge(double age) {
   if (state_ == LoopState::kIdle || Within(age, config_.limits.age)) return true;
-  state_ = LoopState::kFault;
-  return Report("the last reading is %.4g s old, beyond the limit %.4g s", age, config_.limits.age);
+  Fail({"the last reading is %.4g s old, beyond the limit %.4g s", {age, config_.limits.age}});
+  return false;
 }
 
 LoopState Supervisor::Step(const CycleFacts& facts) {
   if (ended()) return state_;
   readings_ = facts.fresh ? readings_ + 1 : readings_;
   if (state_ == LoopState::kIdle && !facts.fresh) readings_ = 0;
-  if (facts.fresh && !CheckReading(facts)) return state_ = LoopState::kFault;
+  if (facts.fresh) {
+    if (const Complaint complaint = CheckReading(facts)) return Fail(complaint);
+    earned_.See({facts.read_at, facts.angle, facts.expected}, torque_);
+  }
   if (!CheckAge(facts.age)) return state_;
   if (state_ == LoopState::kIdle || state_ == LoopState::kArmed) {
     Wait(facts);
-  } else if (!CheckEstimate(facts)) {
-    state_ = LoopState::kFault;
-  } else if (state_ == LoopState::kBraking) {
-    state_ = GoOnBraking(facts);
-  } else if (!WithinLimits(facts) || facts.stop) {
+    return state_;
+  }
+  if (const Complaint complaint = CheckEstimate(facts)) return Fail(complaint);
+  if (const Complaint complaint = CheckSlip(facts)) return Fail(complaint);
+  if (facts.fresh) {
+    if (const Complaint complaint = CheckResponse()) return Fail(complaint);
+  }
+  if (state_ == LoopState::kBraking) return state_ = GoOnBraking(facts);
+  const Complaint complaint = CheckLimits(facts);
+  if (complaint) {
+    Report(complaint);
+    beyond_limit_ = true;
+  }
+  if (complaint || facts.stop) {
     Brake(facts);
+  } else if (state_ == LoopState::kProbing && earned_.proven()) {
+    state_ = LoopState::kArmed;
+    since_ = facts.time;
   }
   return state_;
 }
@@ -285,22 +358,21 @@ Joints Supervisor::BrakeTorque(const CycleFacts& facts) const {
 }
 
 Joints Supervisor::Torque(const Joints& controller, const CycleFacts& facts) {
-  Joints torque{};
-  if (state_ == LoopState::kRunning) torque = controller;
-  if (state_ == LoopState::kBraking) torque = BrakeTorque(facts);
-  if (!std::isfinite(torque[0]) || !std::isfinite(torque[1])) {
-    Report("the controller's torque is not a finite number");
-    state_ = LoopState::kFault;
-    return {};
+  torque_ = {};
+  Joints wanted{};
+  if (state_ == LoopState::kProbing) wanted = earned_.Pulse();
+  if (state_ == LoopState::kRunning) wanted = earned_.Permitted(controller);
+  if (state_ == LoopState::kBraking) wanted = BrakeTorque(facts);
+  if (!std::isfinite(wanted[0]) || !std::isfinite(wanted[1])) {
+    Fail({"the controller's torque is not a finite number"});
+    return torque_;
   }
-  bool clipped = false;
   for (size_t j = 0; j < 2; ++j) {
-    const double limit = config_.motor_limit[j], asked = torque[j];
-    torque[j] = std::clamp(asked, -limit, limit);
-    clipped = clipped || torque[j] != asked;
+    const double limit = config_.motor_limit[j];
+    torque_[j] = std::clamp(wanted[j], -limit, limit);
   }
-  clipped_ += clipped && state_ == LoopState::kRunning ? 1 : 0;
-  return torque;
+  clipped_ += torque_ != wanted && state_ == LoopState::kRunning ? 1 : 0;
+  return torque_;
 }
 
 PendulumState ParsePendulumStart(const std::string& text) {

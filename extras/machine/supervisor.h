@@ -4,7 +4,9 @@
 #include <string>
 
 #include "base/options.h"
+#include "extras/machine/expectation.h"
 #include "extras/machine/log.h"
+#include "extras/machine/earned_torque.h"
 #include "pendulum/plant.h"
 
 /// The supervisor of a control loop: it decides in each cycle who drives the motors. It has no
@@ -28,10 +30,12 @@ struct Limits {
 
 enum class LoopState {
   kIdle,     // waits for readings; motors off
-  kArmed,    // readings come; motors hold torque 0 until the machine is in its start state
+  kArmed,    // readings come; motors hold torque 0 until the machine is in its start state, and at
+             // first until it rests
   kRunning,  // the controller drives
   kBraking,  // torques against the motion until the links hang; then kIdle, or kFault with a reason
   kFault,    // motors off until the program ends
+  kProbing,  // short pulses of the motors, which the encoders have to answer; then kArmed
 };
 const char* NameOf(LoopState state);
 
@@ -48,6 +52,7 @@ struct CycleFacts {
   PendulumState state{};     // estimate of the true state now
   PendulumState ahead{};     // the same when a torque that is sent next will act
   double energy = 0;         // see Limits; 0 if unknown
+  Expectation expected{};    // motion that the encoders have to show
   bool stop = false;         // whether the user or the end of the run asks for a stop
 };
 
@@ -57,6 +62,8 @@ struct SupervisorConfig {
   // State in which the controller takes over, to within kStartAngle and kStartVelocity.
   PendulumState start = {};
   Joints motor_limit{};    // largest torque of each joint, N·m
+  int actuated_joint = 1;  // of the controller's motor, 1 or 2
+  TwinTrust trust = TwinTrust::kAlways;
   double angle_range = 0;  // of the encoders, rad
   double quantum = 0;      // of the encoders, rad
   double period = 0.002;   // of the cycles, s
@@ -82,6 +89,8 @@ class Supervisor {
   bool ended() const { return state_ == LoopState::kFault || ended_; }
   /// Why the supervisor stops or has stopped the run, in one line; empty: no fault.
   const std::string& reason() const { return reason_; }
+  /// Whether the reason is a fault, not a limit of the run that was exceeded.
+  bool faulty() const { return !reason_.empty() && !beyond_limit_; }
   /// Number of cycles in which a torque was clipped.
   int64_t clipped() const { return clipped_; }
 
@@ -90,13 +99,17 @@ class Supervisor {
   static constexpr int kArmReadings = 5;  // readings in a row before the motors are armed
 
  private:
-  /// Sets the reason from a format of two numbers, unless there is one, and returns false.
-  bool Report(const char* text, double first = 0, double second = 0);
+  /// Sets the reason, unless there is one.
+  void Report(const Complaint& complaint);
+  /// Reports a complaint and switches the motors off.
+  LoopState Fail(const Complaint& complaint);
   void Brake(const CycleFacts& facts);
-  bool CheckReading(const CycleFacts& facts);
-  bool CheckMotion(const CycleFacts& facts);
-  bool CheckEstimate(const CycleFacts& facts);
-  bool WithinLimits(const CycleFacts& facts);
+  Complaint CheckReading(const CycleFacts& facts);
+  Complaint CheckMotion(const CycleFacts& facts);
+  Complaint CheckEstimate(const CycleFacts& facts) const;
+  Complaint CheckSlip(const CycleFacts& facts) const;
+  Complaint CheckResponse();
+  Complaint CheckLimits(const CycleFacts& facts) const;
   LoopState GoOnBraking(const CycleFacts& facts);
   Joints BrakeTorque(const CycleFacts& facts) const;
   bool AtStart(const PendulumState& s) const;
@@ -105,8 +118,10 @@ class Supervisor {
   SupervisorConfig config_;
   LoopState state_ = LoopState::kIdle;
   bool ended_ = false, begun_ = false;
+  bool beyond_limit_ = false;  // whether the reason is a limit
   std::string reason_;
   int readings_ = 0;                      // in a row
+  bool unlocks_ = false;                  // whether the machine locked its motors when armed
   double since_ = 0, slow_since_ = 0;     // s
   double energy_ = 0, least_energy_ = 0;  // smoothed while braking; see Limits
   int64_t clipped_ = 0;
@@ -126,6 +141,8 @@ class Supervisor {
   bool IsStuck(Joint& joint, double change, double longest, const CycleFacts& facts) const;
 
   std::array<Joint, 2> joints_;
+  EarnedTorque earned_;
+  Joints torque_{};  // of the last cycle, N·m
   bool has_reading_ = false;
   double last_read_at_ = 0, last_received_ = 0;  // s
 };

@@ -17,18 +17,22 @@ using enum LoopState;
 constexpr double kCycle = 0.002;  // s
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kQuantum = 0.0004, kRange = 12.5;  // rad
+// A start that does not hang: the controller drives without pulses before it.
+constexpr PendulumState kHeld{0.01, 0, 0, 0};
 
 /// A supervisor and the facts of its next cycle.
 struct Bench {
   Limits limits;
+  PendulumState start = kHeld;
   Supervisor supervisor{{.limits = limits,
+                         .start = start,
                          .motor_limit = {5, 0.5},
                          .angle_range = kRange,
                          .quantum = kQuantum,
                          .period = kCycle}};
-  CycleFacts facts{.fresh = true};
+  CycleFacts facts{.fresh = true, .expected = {.known = true}};
 
-  explicit Bench(const Limits& l = {}) : limits(l) {}
+  explicit Bench(const Limits& l = {}, const PendulumState& s = kHeld) : limits(l), start(s) {}
 
   LoopState Step() {
     facts.time += kCycle;
@@ -117,7 +121,7 @@ TEST(Supervisor, CutsTorques) {
   EXPECT_EQ(b.supervisor.Torque({9, -2}, b.facts), (Joints{5, -0.5}));
   EXPECT_EQ(b.supervisor.clipped(), 1);
   // A single that is sent is not beyond the limit either.
-  Supervisor tenth({.limits = {.torque = 0.1}, .motor_limit = {5, 5}, .angle_range = kRange});
+  Supervisor tenth({.limits = {.torque = 0.1}, .start = kHeld, .motor_limit = {5, 5}, .angle_range = kRange});
   CycleFacts facts{.fresh = true};
   for (int i = 1; i < 8; ++i) {
     facts.time = facts.read_at = facts.received = i * kCycle;
@@ -370,6 +374,112 @@ TEST(Supervisor, UnlocksAnArmedMachine) {
   b.facts.locked = false;
   EXPECT_EQ(b.Step(Supervisor::kArmReadings), kArmed);
   EXPECT_EQ(b.Step(), kRunning);
+}
+
+TEST(Supervisor, MotorsThatStayLockedEndTheWait) {
+  Bench b;
+  int cycles = 0;
+  while (!b.supervisor.ended()) {
+    b.facts.locked = true;
+    b.Step();
+    ASSERT_LT(++cycles, 2 * b.limits.patience / kCycle);
+  }
+  EXPECT_EQ(b.supervisor.reason(), "the machine's motors stay locked for 10 s");
+}
+
+/// A block on each joint, which the torque of joint 1 moves; joint 2 goes the other way.
+struct Blocks {
+  double mass = 0.03, share = 1;        // kg·m²; of its motion that the encoder of joint 1 shows
+  double other = -1.5;                  // motion of joint 2 for that of joint 1
+  double angle = 0, velocity = 0;       // rad, rad/s
+  double largest = 0, strongest = 0;    // velocity, rad/s, and torque, N·m
+
+  void Move(double torque) {
+    velocity += torque / mass * kCycle;
+    angle += velocity * kCycle;
+    largest = std::max(largest, std::abs(velocity));
+    strongest = std::max(strongest, std::abs(torque));
+  }
+};
+
+/// Runs the pulses without a twin until the controller drives or a fault.
+std::string Probe(Blocks& blocks) {
+  Bench b({}, {});
+  b.facts.expected.known = false;
+  double torque = 0;
+  for (int i = 0; i < 1000 && !b.supervisor.ended() && b.supervisor.state() != kRunning; ++i) {
+    blocks.Move(torque);
+    b.facts.angle = {blocks.share * blocks.angle, blocks.other * blocks.angle};
+    b.facts.zero = b.facts.angle;
+    b.Step();
+    torque = b.supervisor.Torque({5, 0}, b.facts)[0];
+  }
+  return b.supervisor.state() == kRunning ? "running" : b.supervisor.reason();
+}
+
+TEST(Supervisor, TheControllerDrivesOnceTheEncodersHaveAnswered) {
+  for (const double mass : {0.003, 0.03, 0.3}) {
+    Blocks good{.mass = mass};
+    EXPECT_EQ(Probe(good), "running");
+    // The pulses move the links little, and end at rest.
+    EXPECT_LT(std::abs(good.angle), 0.05);
+    EXPECT_LT(std::abs(good.velocity), 0.1);
+    EXPECT_LT(good.largest, 1.5);
+  }
+}
+
+TEST(Supervisor, AnEncoderThatDoesNotAnswerIsAFault) {
+  Blocks dead{.share = 0};
+  EXPECT_TRUE(Probe(dead).starts_with("joint 1 does not answer its motor")) << Probe(dead);
+  EXPECT_LT(dead.largest, 13);  // half of the usual limit, with full torque at the end
+  Blocks other{.other = 0};
+  EXPECT_TRUE(Probe(other).starts_with("joint 2 does not answer")) << Probe(other);
+  EXPECT_LT(other.largest, 6);
+  Blocks reversed{.share = -1};
+  EXPECT_TRUE(Probe(reversed).starts_with("joint 1 moves by -0.00")) << Probe(reversed);
+  EXPECT_LT(reversed.largest, 0.5);
+}
+
+TEST(Supervisor, PulsesWaitUntilTheLinksRest) {
+  Bench b({}, {});
+  b.facts.expected.known = false;
+  b.Arm();
+  for (int i = 0; i < 200; ++i) ASSERT_EQ(b.Move(0.4, 0), kArmed);  // slow enough for a start
+  for (int i = 0; i < 310 && b.supervisor.state() == kArmed; ++i) b.Move(0, 0);
+  EXPECT_EQ(b.supervisor.state(), kProbing);
+}
+
+TEST(Supervisor, MotionThatTheTwinPredictsHasToBeSeen) {
+  for (const int joint : {0, 1}) {
+    Bench b;
+    b.Run();
+    b.facts.expected = {.known = true, .deviation = {0.01, 0.01}};
+    b.facts.expected.unseen[joint] = 0.05;  // within 4 deviations and the steps of the encoder
+    EXPECT_EQ(b.Step(10), kRunning);
+    b.facts.expected.unseen[joint] = 0.07;
+    EXPECT_EQ(b.Step(), kRunning);
+    EXPECT_EQ(b.Step(), kFault);
+    EXPECT_NE(b.supervisor.reason().find("the twin moves by 0.07 rad"), std::string::npos);
+  }
+}
+
+TEST(Supervisor, LinksWithoutMotionGetTorquesThatFrictionHolds) {
+  Bench b;
+  b.Run();
+  b.facts.expected = {.known = true, .friction = {0.2, 0.1}, .deviation = {9, 9}};
+  b.Step(10);
+  EXPECT_EQ(b.supervisor.Torque({0.3, 0}, b.facts), (Joints{0.3, 0}));
+  b.Step(150);  // 0.3 s
+  EXPECT_NEAR(b.supervisor.Torque({0.3, 0}, b.facts)[0], 0.8 * 0.2, 1e-9);
+  // More is permitted until the twin has moved.
+  EXPECT_EQ(b.supervisor.Torque({-3, 0}, b.facts), (Joints{-3, 0}));
+  b.facts.expected.unseen[0] = -0.2;
+  b.Step();
+  EXPECT_NEAR(b.supervisor.Torque({-3, 0}, b.facts)[0], -0.8 * 0.2, 1e-9);
+  // A motion opens the limits again.
+  b.facts.expected.unseen[0] = 0;
+  b.Move(1, 0);
+  EXPECT_EQ(b.supervisor.Torque({-3, 0}, b.facts), (Joints{-3, 0}));
 }
 
 TEST(Supervisor, AnEncoderAtItsEndIsAFault) {
