@@ -6,25 +6,26 @@
 namespace upswing::machine {
 namespace {
 
-constexpr double kLeastStep = 1e-5;     // of encoders of an unknown step, rad; 20 bits per turn
-constexpr double kQuietSeconds = 0.3;   // window of the readings that show whether links rest
-constexpr double kQuietAngle = 0.004;   // range of readings at rest, rad
+constexpr double kLeastStep = 1e-5;    // of encoders of an unknown step, rad; 20 bits per turn
+constexpr double kQuietSeconds = 0.3;  // window of the readings that show whether links rest
+constexpr double kQuietAngle = 0.004;  // range of readings at rest, rad
 
 // The pulse.
-constexpr double kFirstShare = 0.01;     // of the limit
-constexpr double kDoubling = 0.025;      // time in which the torque doubles, s
-constexpr double kSlowDoubling = 0.1;    // the same once the motor's joint has answered, s
-constexpr double kLimitSeconds = 0.04;   // time at the limit in which the joints have to answer, s
-constexpr double kLargestTravel = 0.5;   // of the motor's joint until the other one answers, rad
+constexpr double kFirstShare = 0.01;    // of the limit
+constexpr double kDoubling = 0.025;     // time in which the torque doubles, s
+constexpr double kSlowDoubling = 0.1;   // the same once the motor's joint has answered, s
+constexpr double kLimitSeconds = 0.04;  // time at the limit in which the joints have to answer, s
+constexpr double kLargestTravel = 0.5;  // of the motor's joint until the other one answers, rad
 
 // Motion that the twin predicts for a pulse before it is compared.
 constexpr double kCompared = 0.03, kComparedSteps = 12;  // rad, steps
 constexpr double kLeastCompared = 0.4;  // share of it that is compared under the largest torque
 constexpr double kLeastShare = 0.4, kLargestShare = 1.6;  // of this motion that an encoder may show
-constexpr double kAboveFriction = 3;  // torque of the pulse, of dry friction, which differs by session
+constexpr double kAboveFriction =
+    3;  // torque of the pulse, of dry friction, which differs by session
 
 // Motion that an encoder must have shown.
-constexpr double kDeviations = 4;  // of the twin's prediction
+constexpr double kDeviations = 4;      // of the twin's prediction
 constexpr double kLeastUnseen = 0.02;  // rad
 constexpr int kUnseenReadings = 2;
 constexpr double kBlockMotion = 0.25, kBlockSteps = 30;  // rad, steps
@@ -147,10 +148,11 @@ Complaint EarnedTorque::JudgeJoint(int j) {
   const bool lacks = j == motor_ ? at_limit_ > kLimitSeconds
                                  : std::abs(pushed.angle - pushed.start) > kLargestTravel;
   if (!lacks) return {};
-  return {j == motor_ ? "joint %.0f does not answer its motor: no motion with up to %.3g N·m. Are the "
-                        "motor and the encoder connected, does anything hold the joint?"
-                      : "joint %.0f does not answer: no motion after the other one has turned, with "
-                        "up to %.3g N·m. Is its encoder connected, does anything hold the joint?",
+  return {j == motor_
+              ? "joint %.0f does not answer its motor: no motion with up to %.3g N·m. Are the "
+                "motor and the encoder connected, does anything hold the joint?"
+              : "joint %.0f does not answer: no motion after the other one has turned, with "
+                "up to %.3g N·m. Is its encoder connected, does anything hold the joint?",
           {static_cast<double>(j + 1), amplitude_}};
 }
 
@@ -161,9 +163,10 @@ Complaint EarnedTorque::JudgeDirection(int j) {
   block_.friction = kBlockFriction * amplitude_;  // gravity may hold the joint, too
   block_.mass = travel_ / std::abs(motion);
   if (motion > 0) return {};
-  return {"joint %.0f moves by %.3g rad under %.3g N·m: is the sign of its motor or encoder wrong, are "
-          "the joints swapped?",
-          {static_cast<double>(j + 1), motion, amplitude_}};
+  return {
+      "joint %.0f moves by %.3g rad under %.3g N·m: is the sign of its motor or encoder wrong, are "
+      "the joints swapped?",
+      {static_cast<double>(j + 1), motion, amplitude_}};
 }
 
 /// Judges the share of the twin's motion that an encoder shows.
@@ -180,9 +183,11 @@ Complaint EarnedTorque::JudgeShare(int j) {
   if (std::abs(expected) < kLeastCompared * enough) return {};
   const double share = shown / expected;
   if (share >= kLeastShare && share <= kLargestShare) return {};
-  return {"joint %.0f moves by %.3g rad under the first torques, and the twin by %.3g rad: are the signs, "
-          "the scales and the order of motors and encoders those of the twin?",
-          {static_cast<double>(j + 1), shown, expected}};
+  return {
+      "joint %.0f moves by %.3g rad under the first torques, and the twin by %.3g rad: are the "
+      "signs, "
+      "the scales and the order of motors and encoders those of the twin?",
+      {static_cast<double>(j + 1), shown, expected}};
 }
 
 Complaint EarnedTorque::JudgeRun() {
@@ -202,13 +207,15 @@ Complaint EarnedTorque::JudgeRun() {
               {number, e.unseen[j]}};
     }
     if (j == motor_ && std::abs(block_.moved) > std::max(kBlockMotion, kBlockSteps * joint.step)) {
-      return {"joint %.0f: the encoder sticks, or the joint is held, under the motor's torque", {number}};
+      return {"joint %.0f: the encoder sticks, or the joint is held, under the motor's torque",
+              {number}};
     }
     const double turned = joints_[1 - j].angle - joint.other;
     if (j != motor_ && std::abs(turned) > kOtherTravel) {
-      return {"joint %.0f: the encoder sticks, or the joint is held, while the other joint turns by "
-              "%.3g rad",
-              {number, turned}};
+      return {
+          "joint %.0f: the encoder sticks, or the joint is held, while the other joint turns by "
+          "%.3g rad",
+          {number, turned}};
     }
   }
   return {};

@@ -34,18 +34,18 @@ struct EarnedTorqueConfig {
   double limit = 0;        // largest torque of the controller's motor, N·m
   int actuated_joint = 1;  // of this motor, 1 or 2
   TwinTrust trust = TwinTrust::kAlways;
-  bool hangs = true;       // whether the run begins with links that hang
-  double quantum = 0;      // step of the encoders, rad; 0: unknown
-  double period = 0.002;   // of the cycles, s
+  bool hangs = true;      // whether the run begins with links that hang
+  double quantum = 0;     // step of the encoders, rad; 0: unknown
+  double period = 0.002;  // of the cycles, s
 };
 
 /// Asks the joints for an answer before the controller drives, and watches that they go on
 /// answering.
 ///
-/// A pulse of the controller's motor begins with 1% of its limit and doubles every 25 ms until both joints
-/// move. The same impulse in the other direction then stops them. With a twin, each encoder has to
-/// show the motion that the twin predicts, in direction and size. Without one, it has to move at
-/// all, and the motor's own joint in the direction of the torque: a torque on links at rest
+/// A pulse of the controller's motor begins with 1% of its limit and doubles every 25 ms until both
+/// joints move. The same impulse in the other direction then stops them. With a twin, each encoder
+/// has to show the motion that the twin predicts, in direction and size. Without one, it has to
+/// move at all, and the motor's own joint in the direction of the torque: a torque on links at rest
 /// accelerates its joint along with it, because the mass matrix is positive definite. Links that do
 /// not hang at the start are not asked, because a pulse would throw them down.
 ///
@@ -101,9 +101,7 @@ class EarnedTorque {
   };
   enum class Phase { kRest, kPush, kStop };
 
-  bool PredictsPulse() const {
-    return seen_.expected.known && config_.trust == TwinTrust::kAlways;
-  }
+  bool PredictsPulse() const { return seen_.expected.known && config_.trust == TwinTrust::kAlways; }
   bool PredictsRun() const { return seen_.expected.known && config_.trust != TwinTrust::kNever; }
   /// Least change of an angle that shows a motion, rad.
   double Visible(const Joint& joint) const;

@@ -189,8 +189,7 @@ void Estimator::BeginUnseen(int joint, double angle) {
 void Estimator::ExpectUnseen(const TimedReading& reading) {
   Encoders visible{};
   for (int j = 0; j < 2; ++j) {
-    const bool begins =
-        track_.time == *begin_ || track_.time > unseen_begin_[j] + kLongestUnseen;
+    const bool begins = track_.time == *begin_ || track_.time > unseen_begin_[j] + kLongestUnseen;
     visible[j] = std::abs(reading.angle[j] - shown_[j]) > kVisibleSteps * AngleNoise();
     // A filter that sees no motion takes it for friction.
     if (visible[j]) shown_friction_[j] = friction()[j];
@@ -253,7 +252,8 @@ void Estimator::Update(double time, const Joints& sent, const TimedReading* read
     ExpectUnseen(*reading);
     ExpectResponse(*reading, driven);
     expectation_.known = true;
-    for (int j = 0; j < 2; ++j) expectation_.friction[j] = std::numbers::pi / 2 * shown_friction_[j];
+    for (int j = 0; j < 2; ++j)
+      expectation_.friction[j] = std::numbers::pi / 2 * shown_friction_[j];
   }
   if (!begin_ || source_ == StateSource::kDifferences) return;
   const Drive& drive = model_->drive;

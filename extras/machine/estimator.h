@@ -116,14 +116,14 @@ class Estimator {
   Track track_;
   Eigen::Vector2d mean_innovation_ = Eigen::Vector2d::Zero();  // normalized, low-passed
   double disturbed_until_ = 0;                                 // s
-  std::array<Track, 2> unseen_;  // without the encoder of each joint
-  Joints shown_{};               // angles at their last visible motion, rad
-  Joints shown_friction_{};      // dry friction that was estimated then, N·m
-  Joints unseen_begin_{};        // times at which `unseen_` began, s
-  Joints unseen_angle_{};        // angles of `unseen_` then, as the encoders would show them, rad
+  std::array<Track, 2> unseen_;                                // without the encoder of each joint
+  Joints shown_{};           // angles at their last visible motion, rad
+  Joints shown_friction_{};  // dry friction that was estimated then, N·m
+  Joints unseen_begin_{};    // times at which `unseen_` began, s
+  Joints unseen_angle_{};    // angles of `unseen_` then, as the encoders would show them, rad
   Vector driven_ = Vector::Zero(), coasting_ = Vector::Zero();
-  Joints response_angle_{};                            // measured when the torques began, rad
-  double response_begin_ = 0, response_time_ = 0;      // s
+  Joints response_angle_{};                        // measured when the torques began, rad
+  double response_begin_ = 0, response_time_ = 0;  // s
   Expectation expectation_;
   PendulumState now_, ahead_;
 };

@@ -103,7 +103,7 @@ class FakeMachine {
   double last_command_ = 0, enabled_since_ = MachineFaults::kNever;  // s
   // Whether the motors stay off until a command without kEnabled: at first, and after the watchdog.
   bool locked_ = true;
-  Joints torque_{};              // applied, N·m
+  Joints torque_{};                             // applied, N·m
   std::array<std::optional<double>, 2> stuck_;  // rad
 };
 

@@ -22,8 +22,9 @@ namespace upswing::machine {
 namespace {
 
 constexpr double kNever = MachineFaults::kNever;
-constexpr double kSeconds = 6;   // of a run
-constexpr double kMotion = 0.1;  // of a joint since its encoder sticks, which has to be noticed, rad
+constexpr double kSeconds = 6;  // of a run
+constexpr double kMotion =
+    0.1;  // of a joint since its encoder sticks, which has to be noticed, rad
 
 /// A fault from the beginning, or encoders that stick at a random moment.
 struct Kind {

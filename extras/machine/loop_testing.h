@@ -63,7 +63,7 @@ struct LoopBench {
   LoopConfig config{.seconds = 2};
   MachineController machine_controller = SineTorque;
   PendulumState start{};
-  bool has_twin = true;      // else the loop knows only the encoders
+  bool has_twin = true;  // else the loop knows only the encoders
   std::unique_ptr<MachineLink> link;
   std::string log_path;
   StateSource source = StateSource::kTwin;

@@ -30,8 +30,8 @@ struct RunArguments {
 
 std::unique_ptr<MachineLink> g_link;  // global for signal handlers, which may come until the end
 
-/// Says how the plant that a policy was made for differs from the twin: times and torques that decide
-/// how the machine answers. The controllers of `run` are made for the twin itself.
+/// Says how the plant that a policy was made for differs from the twin: times and torques that
+/// decide how the machine answers. The controllers of `run` are made for the twin itself.
 void CompareWithTwin(const LoadedPolicy& policy, const Twin& twin) {
   constexpr double kSimilar = 0.2;  // relative difference that a policy usually withstands
   const Manipulator own = ManipulatorOf(policy.plant), body = BodyOf(twin);
@@ -91,8 +91,7 @@ int Drive(const RunArguments& a, const MachinePolicy& policy, const std::optiona
   ControllerOf(policy)(0, {});
   MachineController controller = ControllerOf(policy);
   const StateSource source = a.differences ? StateSource::kDifferences : StateSource::kTwin;
-  Estimator estimator =
-      twin ? Estimator(*twin, period, source) : Estimator(a.sensors, period);
+  Estimator estimator = twin ? Estimator(*twin, period, source) : Estimator(a.sensors, period);
 
   Joints motor{a.passive_torque, a.passive_torque};
   motor[joint - 1] = twin ? twin->plant.torque_limit : a.limits.torque;
@@ -204,7 +203,8 @@ void AddRun(CommandLine& line) {
             "with a twin as --link: play a machine drawn from the twin's covariance");
   line.Excludes("--compensation", {"--differences"}, ", which estimates no friction");
   line.Footer(
-      "The loop waits for readings (idle), then for the start state (armed). From hanging links, a\n"
+      "The loop waits for readings (idle), then for the start state (armed). From hanging links, "
+      "a\n"
       "pulse of the motor then has to move both joints (probing). Then the\n"
       "controller drives (running). Afterwards, at Ctrl-C and beyond a limit it brakes until\n"
       "the links hang; a second Ctrl-C switches the motors off at once. So does a fault: no\n"

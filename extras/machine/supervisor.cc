@@ -19,12 +19,12 @@ constexpr double kLargestReading = 1e6;
 constexpr double kLargestStart = 100;  // rad, rad/s
 
 // Limits of plausible readings.
-constexpr double kHardest = 1000;       // acceleration that no joint exceeds, rad/s²
-constexpr double kOldest = 0.001;       // age of an angle when its command comes, s
-constexpr double kShortest = 1e-4;      // time between two measurements, s
-constexpr double kLeastError = 0.002;   // of the change between two angles, rad
-constexpr int kErrorSteps = 4;          // of the encoder, in this change
-constexpr double kLargestError = 0.2;   // of the estimate at a slow joint, rad
+constexpr double kHardest = 1000;      // acceleration that no joint exceeds, rad/s²
+constexpr double kOldest = 0.001;      // age of an angle when its command comes, s
+constexpr double kShortest = 1e-4;     // time between two measurements, s
+constexpr double kLeastError = 0.002;  // of the change between two angles, rad
+constexpr int kErrorSteps = 4;         // of the encoder, in this change
+constexpr double kLargestError = 0.2;  // of the estimate at a slow joint, rad
 
 // Angle after lost readings, less its prediction: most, and most for each second and each step of
 // the encoder. With readings of real machines left out for 20 ms it is at most 0.025 rad.
@@ -81,9 +81,7 @@ Joints SingleLimits(const SupervisorConfig& config) {
   return limits;
 }
 
-bool Hangs(const PendulumState& s) {
-  return s.q1 == 0 && s.q2 == 0 && s.w1 == 0 && s.w2 == 0;
-}
+bool Hangs(const PendulumState& s) { return s.q1 == 0 && s.q2 == 0 && s.w1 == 0 && s.w2 == 0; }
 
 }  // namespace
 
@@ -211,7 +209,8 @@ Complaint Supervisor::CheckEstimate(const CycleFacts& facts) const {
   return {};
 }
 
-/// Lost readings leave time for a slip that a hard motion could explain, too. The twin knows better.
+/// Lost readings leave time for a slip that a hard motion could explain, too. The twin knows
+/// better.
 Complaint Supervisor::CheckSlip(const CycleFacts& facts) const {
   const Expectation& e = facts.expected;
   if (!e.known || config_.trust == TwinTrust::kNever) return {};
@@ -219,8 +218,8 @@ Complaint Supervisor::CheckSlip(const CycleFacts& facts) const {
   const Joints w{facts.state.w1, facts.state.w2};
   const double unsure = facts.received - facts.read_at;  // of the moment of the measurement, s
   for (size_t j = 0; j < 2; ++j) {
-    const double most = kSlip + kSlipRate * e.gap + kSlipSteps * joints_[j].step +
-                        std::abs(w[j]) * unsure;
+    const double most =
+        kSlip + kSlipRate * e.gap + kSlipSteps * joints_[j].step + std::abs(w[j]) * unsure;
     if (Within(e.innovation[j], most)) continue;
     return {"joint %.0f: after lost readings the angle is %.3g rad from its prediction",
             {static_cast<double>(j + 1), e.innovation[j]}};

@@ -4,9 +4,9 @@
 #include <string>
 
 #include "base/options.h"
+#include "extras/machine/earned_torque.h"
 #include "extras/machine/expectation.h"
 #include "extras/machine/log.h"
-#include "extras/machine/earned_torque.h"
 #include "pendulum/plant.h"
 
 /// The supervisor of a control loop: it decides in each cycle who drives the motors. It has no

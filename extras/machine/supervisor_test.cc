@@ -121,7 +121,8 @@ TEST(Supervisor, CutsTorques) {
   EXPECT_EQ(b.supervisor.Torque({9, -2}, b.facts), (Joints{5, -0.5}));
   EXPECT_EQ(b.supervisor.clipped(), 1);
   // A single that is sent is not beyond the limit either.
-  Supervisor tenth({.limits = {.torque = 0.1}, .start = kHeld, .motor_limit = {5, 5}, .angle_range = kRange});
+  Supervisor tenth(
+      {.limits = {.torque = 0.1}, .start = kHeld, .motor_limit = {5, 5}, .angle_range = kRange});
   CycleFacts facts{.fresh = true};
   for (int i = 1; i < 8; ++i) {
     facts.time = facts.read_at = facts.received = i * kCycle;
@@ -389,10 +390,10 @@ TEST(Supervisor, MotorsThatStayLockedEndTheWait) {
 
 /// A block on each joint, which the torque of joint 1 moves; joint 2 goes the other way.
 struct Blocks {
-  double mass = 0.03, share = 1;        // kg·m²; of its motion that the encoder of joint 1 shows
-  double other = -1.5;                  // motion of joint 2 for that of joint 1
-  double angle = 0, velocity = 0;       // rad, rad/s
-  double largest = 0, strongest = 0;    // velocity, rad/s, and torque, N·m
+  double mass = 0.03, share = 1;      // kg·m²; of its motion that the encoder of joint 1 shows
+  double other = -1.5;                // motion of joint 2 for that of joint 1
+  double angle = 0, velocity = 0;     // rad, rad/s
+  double largest = 0, strongest = 0;  // velocity, rad/s, and torque, N·m
 
   void Move(double torque) {
     velocity += torque / mass * kCycle;

@@ -63,9 +63,8 @@ class CallbackEnv final : public VectorEnv {
     arrays["reward"] = reward_;
     arrays["terminated"] = terminated_;
     arrays["truncated"] = truncated_;
-    lanes_ = CallPython([&] {
-      return make(config.for_evaluation, rows(), config.evaluations, arrays);
-    });
+    lanes_ =
+        CallPython([&] { return make(config.for_evaluation, rows(), config.evaluations, arrays); });
     Begin(stream_);
   }
   CallbackEnv(const CallbackEnv&) = delete;

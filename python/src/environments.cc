@@ -90,8 +90,8 @@ class Environments {
   /// `same_step`: the next episode begins in the step that ends an episode; else the following step
   /// begins it and ignores the action (Gymnasium's AutoresetMode). Throws BadInput.
   Environments(const std::string& num_envs, const PlantSettings& plant,
-               const SettingTexts& settings, const std::string& actions,
-               const std::string& levels, bool same_step)
+               const SettingTexts& settings, const std::string& actions, const std::string& levels,
+               bool same_step)
       : config_(ConfigOf(num_envs, plant, settings)),
         same_step_(same_step),
         pool_(ResolveThreads(config_.train.threads)),

@@ -133,8 +133,8 @@ void FitToReward(const Options& options, const std::string& place, const Config&
   const std::string asymmetry = RewardAsymmetry(config.Environments());
   if (asymmetry.empty()) return;
   if (place.empty()) return options.Set("mirror", "false", "reward");
-  throw BadInput(Concat(place, ": expected false with this reward, which is ", asymmetry,
-                        ", got true"));
+  throw BadInput(
+      Concat(place, ": expected false with this reward, which is ", asymmetry, ", got true"));
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ namespace upswing {
 struct RolloutRow {
   double t = 0;  // s
   PendulumState state;
-  double torque = 0;  // applied by the motor, delayed and limited; N·m
+  double torque = 0;      // applied by the motor, delayed and limited; N·m
   bool inverted = false;  // in this state, or at the goal
   // Of the control step that begins here: for this torque and the next row's state, as `eval` adds
   // it up. 0 in the last row of a finished rollout, because no step follows.

@@ -109,16 +109,31 @@ TEST(OwnReward, KnowsStatePlantAndHistory) {
 }
 
 TEST(OwnReward, ConstantsAreEvaluatedLikeVariables) {
-  const std::pair<const char*, double> kValues[] = {
-      {"0.5 && 1", 1},     {"1 && 0.3", 1},       {"0.2 || 0", 1},
-      {"0 || 0.2", 1},     {"0.5 && 0", 0},       {"pi && 0.1", 1},
-      {"0.5 ? 2 : 3", 2},  {"(0.5 && 1) + 1", 2}, {"2 + 3*4 - 6/3", 12},
-      {"2^3^2", 512},      {"-2^2", -4},          {"2^-1", 0.5},
-      {"8/4/2", 1},        {"5 - 3 - 1", 1},      {"1 < 2 && 2 <= 2 && 3 > 2 && 3 >= 3", 1},
-      {"1 == 1 != 0", 1},  {"1 + 1 == 2", 1},     {"0 || 1 && 0", 0},
-      {"1 ? 0 ? 1 : 2 : 3", 2}, {"0 ? 1 : 0 ? 2 : 3", 3},
-      {"1 + (0 ? 1 : 2)*3", 7}, {"max(0 ? 1 : 2, 1 ? 3 : 4)", 3},
-      {"0 && 0/0", 0},     {"1 || 0/0", 1},       {"1 ? 1 : 0/0", 1}};
+  const std::pair<const char*, double> kValues[] = {{"0.5 && 1", 1},
+                                                    {"1 && 0.3", 1},
+                                                    {"0.2 || 0", 1},
+                                                    {"0 || 0.2", 1},
+                                                    {"0.5 && 0", 0},
+                                                    {"pi && 0.1", 1},
+                                                    {"0.5 ? 2 : 3", 2},
+                                                    {"(0.5 && 1) + 1", 2},
+                                                    {"2 + 3*4 - 6/3", 12},
+                                                    {"2^3^2", 512},
+                                                    {"-2^2", -4},
+                                                    {"2^-1", 0.5},
+                                                    {"8/4/2", 1},
+                                                    {"5 - 3 - 1", 1},
+                                                    {"1 < 2 && 2 <= 2 && 3 > 2 && 3 >= 3", 1},
+                                                    {"1 == 1 != 0", 1},
+                                                    {"1 + 1 == 2", 1},
+                                                    {"0 || 1 && 0", 0},
+                                                    {"1 ? 0 ? 1 : 2 : 3", 2},
+                                                    {"0 ? 1 : 0 ? 2 : 3", 3},
+                                                    {"1 + (0 ? 1 : 2)*3", 7},
+                                                    {"max(0 ? 1 : 2, 1 ? 3 : 4)", 3},
+                                                    {"0 && 0/0", 0},
+                                                    {"1 || 0/0", 1},
+                                                    {"1 ? 1 : 0/0", 1}};
   for (const auto& [text, value] : kValues) {
     OwnReward constants(text);
     EXPECT_EQ(Judge(constants, {}, 0, false), value) << text;
@@ -144,7 +159,9 @@ TEST(OwnReward, NaNIsNeverTrueOrFalse) {
   }
   OwnReward reward("sqrt(1 - w1) > 0 ? 1 : 2");
   EXPECT_EQ(Judge(reward, {0, 0, -3, 0}, 1, false), 1);
-  EXPECT_NE(MessageOf([&] { Judge(reward, {0, 0, 3, 0}, 1, false); }).find("got nan at q1 = 0"),
+  EXPECT_NE(MessageOf([&] {
+              Judge(reward, {0, 0, 3, 0}, 1, false);
+            }).find("got nan at q1 = 0"),
             std::string::npos);
   // Another evaluation works again.
   EXPECT_EQ(Judge(reward, {0, 0, 1, 0}, 1, false), 2);
@@ -161,11 +178,26 @@ TEST(OwnReward, KnowsWhetherMirrorImagesHaveTheSameReward) {
         "1 - cos(q1 - 2*pi)", "max(w1, -w1)"}) {
     EXPECT_EQ(asymmetry(text), "") << text;
   }
-  for (const char* text :
-       {"0.2*w1", "E + 0.001*w2", "q1", "tau", "dtau", "tau > 4.9", "sin(q1)", "w1^3", "w1 > 0",
-        "inverted*w1", "inverted && upright > 5 ? w1 : 0", "E > 1.4 ? w2 : 0", "5 + 1e-6*q2",
-        "abs(q1 - 3) < 0.05 ? 1 : 0", "a: w1; b: -w2", "exp(w1/10)", "q1 > 7 ? 1 : 0",
-        "tau == torque_limit ? 1 : 0", "atan2(q1, q2 + 1)", "wrap(q1 - 1)^2"}) {
+  for (const char* text : {"0.2*w1",
+                           "E + 0.001*w2",
+                           "q1",
+                           "tau",
+                           "dtau",
+                           "tau > 4.9",
+                           "sin(q1)",
+                           "w1^3",
+                           "w1 > 0",
+                           "inverted*w1",
+                           "inverted && upright > 5 ? w1 : 0",
+                           "E > 1.4 ? w2 : 0",
+                           "5 + 1e-6*q2",
+                           "abs(q1 - 3) < 0.05 ? 1 : 0",
+                           "a: w1; b: -w2",
+                           "exp(w1/10)",
+                           "q1 > 7 ? 1 : 0",
+                           "tau == torque_limit ? 1 : 0",
+                           "atan2(q1, q2 + 1)",
+                           "wrap(q1 - 1)^2"}) {
     EXPECT_NE(asymmetry(text), "") << text;
   }
   const std::string example = asymmetry("0.2*w1");

@@ -32,8 +32,8 @@ FastestDecay DecayAt(const Manipulator& body, double cos_q2) {
 }  // namespace
 
 FastestDecay FastestDecayOf(const Manipulator& body) {
-  // M is affine in cos q2, so its smallest eigenvalue relative to D is concave: it is smallest at an
-  // end.
+  // M is affine in cos q2, so its smallest eigenvalue relative to D is concave: it is smallest at
+  // an end.
   const FastestDecay stretched = DecayAt(body, 1), folded = DecayAt(body, -1);
   return stretched.rate > folded.rate ? stretched : folded;
 }
@@ -43,13 +43,12 @@ void CheckTimestep(const Plant& plant, const std::string& where, double h) {
   const double largest = kStable / h;
   if (decay.rate <= largest) return;
   const bool first = decay.joint == 1;
-  throw BadInput(Concat(
-      where, ": expected friction that stops the joints at a rate of at most ", largest,
-      "/s, because time steps of ", h, " s are unstable beyond it, got ",
-      decay.rate, "/s: damping", decay.joint, " = ",
-      first ? plant.damping1 : plant.damping2, " N·m·s/rad and coulomb", decay.joint,
-      " = ", first ? plant.coulomb1 : plant.coulomb2, " N·m act on ",
-      decay.inertia, " kg·m²"));
+  throw BadInput(Concat(where, ": expected friction that stops the joints at a rate of at most ",
+                        largest, "/s, because time steps of ", h, " s are unstable beyond it, got ",
+                        decay.rate, "/s: damping", decay.joint, " = ",
+                        first ? plant.damping1 : plant.damping2, " N·m·s/rad and coulomb",
+                        decay.joint, " = ", first ? plant.coulomb1 : plant.coulomb2, " N·m act on ",
+                        decay.inertia, " kg·m²"));
 }
 
 void CheckTimestep(const Plant& nominal, const Randomization& random, const std::string& where) {

@@ -80,9 +80,10 @@ TEST(Timestep, APlantIsRefusedWithTheNumberThatIsWrong) {
   light.damping2 = 0.5;
   light.armature = 1e-4;
   const std::string problem = ProblemOf(light);
-  EXPECT_TRUE(problem.starts_with("plant: expected friction that stops the joints at a rate of at "
-                                  "most 557/s, because time steps of 0.005 s are unstable beyond "
-                                  "it, got "))
+  EXPECT_TRUE(
+      problem.starts_with("plant: expected friction that stops the joints at a rate of at "
+                          "most 557/s, because time steps of 0.005 s are unstable beyond "
+                          "it, got "))
       << problem;
   EXPECT_NE(problem.find("/s: damping2 = 0.5 N·m·s/rad and coulomb2 = 0 N·m act on "),
             std::string::npos)

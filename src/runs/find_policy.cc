@@ -133,8 +133,7 @@ LoadedPolicy GetPolicy(const PolicyArguments& a) {
                           a.name, " means the file; rename the file to use the controller"));
   }
   if (is_controller) {
-    return DesignController(a.name, config,
-                            TitleOf(a.name, config, made_for.name, made_for.plant));
+    return DesignController(a.name, config, TitleOf(a.name, config, made_for.name, made_for.plant));
   }
   return LoadPolicy(a.name);
 }
