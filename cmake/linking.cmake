@@ -7,6 +7,7 @@ add_link_options(-Wl,-z,relro,-z,now -Wl,--build-id=none)
 # The folders in which an installed target looks for shared libraries. Only the built one looks where this
 # machine has MuJoCo, too. CMake's own change of a run path is not used: it ends the built one with empty
 # entries, and the loader takes them for the current folder, where anyone's library may lie.
+#
 # upswing_install_run_path(TARGET FOLDER PATHS … INSTALL …), with FOLDER below the prefix, PATHS relative
 # to $ORIGIN, and INSTALL as for install()
 function(upswing_install_run_path target folder)

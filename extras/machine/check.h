@@ -111,8 +111,9 @@ bool IsStuck(const Findings& findings, int joint);
 /// do, including motors whose rotors the other joint accelerates.
 bool ActsWithoutCommand(Pieces pieces, int joint);
 
-/// The pieces, with the measured torques less those that accelerate the rotors of idle motors: an
-/// idle motor reports such a torque in the rows without a command. It must follow the acceleration.
+/// The pieces, with the measured torques less the torques that accelerate the rotors of idle
+/// motors: an idle motor reports such a torque in the rows without a command. It must follow the
+/// acceleration.
 std::vector<MachineLog> WithoutRotors(Pieces pieces);
 
 /// Rows `first` to `last` (indices) of a piece as rows of the file.

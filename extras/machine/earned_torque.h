@@ -76,9 +76,9 @@ class EarnedTorque {
   Joints Pulse();
   /// Judges the last cycle of a run.
   Complaint JudgeRun();
-  /// The torques (N·m) that are permitted of the ones that the controller wants. With a twin, links that
-  /// show no motion for a while get torques that friction holds. They get more only until the twin
-  /// has moved: a torque must be seen to act.
+  /// The torques (N·m) that are permitted of the ones that the controller wants. With a twin, links
+  /// that show no motion for a while get torques that friction holds. They get more only until the
+  /// twin has moved: a torque must be seen to act.
   Joints Permitted(const Joints& wanted);
 
  private:

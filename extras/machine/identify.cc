@@ -48,7 +48,7 @@ double MeanOfSessions(std::span<const MachineLog> logs,
 }
 
 /// Throws for a log in which a motor acts without commanded torques, which drive the model:
-/// BadInput if it has none, Failure if those that it has are wrong.
+/// BadInput if it has none, Failure if its commands are wrong.
 void ExpectCommands(const MachineLog& log) {
   for (const int joint : {0, 1}) {
     const bool acts = log.commanded.empty() ? HasTorque(log.measured, joint)

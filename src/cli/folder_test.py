@@ -63,7 +63,7 @@ class NoLocksTest(ProgramTest):
         self.refuse(many, "cannot lock many/.locks-", "No locks",
                     preexec_fn=lambda: without_locks(folders=False))
 
-    def test_what_exists_stays_as_it_is(self):
+    def test_a_folder_that_exists_stays_as_it_is(self):
         self.succeed(*small(**TINY | {"out": "run"}))
         self.refuse(["train", "--resume", "run", "--steps", "800"], "cannot lock run: No locks",
                     preexec_fn=without_locks)

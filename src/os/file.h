@@ -70,8 +70,8 @@ std::filesystem::path FreePath(const std::filesystem::path& path);
 /// Makes a folder and its missing parents. Throws as PathError does.
 void MakeFolder(const std::filesystem::path& folder);
 
-/// A folder whose first use may fail. Makes it and its missing parents. Removes those that it made
-/// and that are empty, unless Keep is called.
+/// A folder whose first use may fail. Makes it and its missing parents. Removes the
+/// empty ones of its own folders, unless Keep is called.
 class NewFolder {
  public:
   /// Throws as PathError does.

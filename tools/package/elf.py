@@ -17,7 +17,7 @@ def is_elf(path):
 
 
 def faults_of_run_path(run_path, packaged):
-    """What is wrong with a run path. Anyone may put a library into the current folder, where the loader
+    """Faults of a run path. Anyone may put a library into the current folder, where the loader
     looks for an empty or a relative entry, and into a place of this machine that others lack."""
     faults = []
     for entry in run_path.split(":"):
@@ -33,7 +33,7 @@ def faults_of_run_path(run_path, packaged):
 
 
 def faults_of(path, packaged, ours=True, readelf="readelf"):
-    """What is wrong with a file, in lines. `packaged`: whether it is installed or packaged, not in a build
+    """Faults of a file, in lines. `packaged`: whether it is installed or packaged, not in a build
     folder. `ours`: whether this project has linked it."""
     text = subprocess.run([readelf, "--wide", "--dynamic", "--program-headers", path], check=True,
                           encoding="utf-8", stdout=subprocess.PIPE).stdout
@@ -51,7 +51,7 @@ def faults_of(path, packaged, ours=True, readelf="readelf"):
 
 
 def faults_below(folder, own, readelf="readelf"):
-    """What is wrong with the files below a folder that is installed or packaged. `own`: its folders whose
+    """Faults of the files below a folder that is installed or packaged. `own`: its folders whose
     files this project has linked."""
     return [fault for path in sorted(folder.rglob("*")) if is_elf(path)
             for fault in faults_of(path, True, path.parent.relative_to(folder).as_posix() in own, readelf)]

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Tests how programs and modules are linked: those of the build folder, those that `cmake --install`
-installs, and files with faults. The packages are tested in package_test.py.
+"""Tests how programs and modules are linked: in the build folder, after `cmake --install`, and in files
+with faults. The packages are tested in package_test.py.
 
 UPSWING names the program; its build folder is used (see src/cli/testing.py).
 """
@@ -27,7 +27,7 @@ class BuildTest(unittest.TestCase):
         self.assertEqual([fault for path in [*programs, *modules]
                           for fault in elf.faults_of(path, packaged=False)], [])
 
-    def test_what_is_installed(self):
+    def test_the_installed_files(self):
         with tempfile.TemporaryDirectory() as folder:
             prefix = Path(folder) / "installed"
             install = ["cmake", "--install", BUILD, "--prefix", prefix, "--strip"]
