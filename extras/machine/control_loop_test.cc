@@ -78,8 +78,8 @@ TEST(ControlLoop, EachFaultOfTheMachineEndsInItsState) {
   silent.machine.silent_after = kAfter;
   expect("silence", silent, LoopState::kFault, kAfter + Limits().age);
   FakeConfig stuck;
-  stuck.machine.stuck_after[0] = 0.55;  // the joint moves at more than 2 rad/s
-  expect("stuck", stuck, LoopState::kFault, 0.55);
+  stuck.machine.stuck_after[0] = 0.85;  // the joint moves at more than 2 rad/s
+  expect("stuck", stuck, LoopState::kFault, 0.85);
   FakeConfig saturated;
   saturated.machine.saturate = 0.3;
   expect("saturation", saturated, LoopState::kFault, 0);

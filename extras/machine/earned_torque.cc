@@ -8,13 +8,15 @@ namespace {
 
 constexpr double kLeastStep = 1e-5;    // of encoders of an unknown step, rad; 20 bits per turn
 constexpr double kQuietSeconds = 0.3;  // window of the readings that show whether links rest
-constexpr double kQuietAngle = 0.004;  // range of readings at rest, rad
+// Range of the readings at rest, rad. A twin knows how slow links go on.
+constexpr double kQuietAngle = 0.004, kPredictedQuietAngle = 0.03;
 
 // The pulse.
 constexpr double kFirstShare = 0.01;    // of the limit
 constexpr double kDoubling = 0.025;     // time in which the torque doubles, s
 constexpr double kSlowDoubling = 0.1;   // the same once the motor's joint has answered, s
 constexpr double kLimitSeconds = 0.04;  // time at the limit in which the joints have to answer, s
+constexpr double kDragSeconds = 0.5;    // the same for the other joint, s
 constexpr double kLargestTravel = 0.5;  // of the motor's joint until the other one answers, rad
 
 // Motion that the twin predicts for a pulse before it is compared.
@@ -79,9 +81,10 @@ void EarnedTorque::See(const Cycle& cycle, const Joints& sent) {
   has_seen_ = true;
   if (cycle.time < window_begin_ + kQuietSeconds || phase_ != Phase::kRest) return;
   quiet_ = true;
+  const double angle = PredictsPulse() ? kPredictedQuietAngle : kQuietAngle;
   for (Joint& joint : joints_) {
     joint.range = joint.highest - joint.lowest;
-    quiet_ = quiet_ && joint.range <= std::max(kVisibleSteps * joint.step, kQuietAngle);
+    quiet_ = quiet_ && joint.range <= std::max(kVisibleSteps * joint.step, angle);
     joint.lowest = joint.highest = joint.angle;
   }
   window_begin_ = cycle.time;
@@ -145,8 +148,10 @@ Complaint EarnedTorque::JudgeJoint(int j) {
     return j == motor_ ? JudgeDirection(j) : Complaint{};
   }
   const Joint& pushed = joints_[motor_];
-  const bool lacks = j == motor_ ? at_limit_ > kLimitSeconds
-                                 : std::abs(pushed.angle - pushed.start) > kLargestTravel;
+  // Once it moves, the motor's joint drags the other one along.
+  const bool travelled = std::abs(pushed.angle - pushed.start) > kLargestTravel;
+  const bool lacks =
+      j == motor_ ? at_limit_ > kLimitSeconds : travelled || at_limit_ > kDragSeconds;
   if (!lacks) return {};
   return {j == motor_
               ? "joint %.0f does not answer its motor: no motion with up to %.3g N·m. Are the "
@@ -234,7 +239,9 @@ Joints EarnedTorque::Permitted(const Joints& wanted) {
     if (std::abs(wanted[j]) > kSurelyMoves * e.friction[j]) moves = true;
   }
   const double moved = std::max(std::abs(e.unseen[0]), std::abs(e.unseen[1]));
-  if (moves && moved > kStillMotion && !held_) {
+  if (!moves) {
+    held_ = false;
+  } else if (moved > kStillMotion && !held_) {
     held_ = true;
     held_at_ = seen_.time;
   }

@@ -10,8 +10,8 @@
 /// it does.
 namespace upswing::machine {
 
-/// Step that counts for encoders of an unknown one until they show smaller changes, rad: 1024 steps
-/// per turn.
+/// Assumed step of encoders of an unknown step until they show smaller changes, rad: 1024 steps per
+/// turn.
 inline constexpr double kUnknownStep = 0.006;
 
 /// A fault in one line: a printf format of numbers.
@@ -47,7 +47,7 @@ struct EarnedTorqueConfig {
 /// has to show the motion that the twin predicts, in direction and size. Without one, it has to
 /// move at all, and the motor's own joint in the direction of the torque: a torque on links at rest
 /// accelerates its joint along with it, because the mass matrix is positive definite. Links that do
-/// not hang at the start are not asked, because a pulse would throw them down.
+/// not hang at the start get no pulse, because it would throw them down.
 ///
 /// Afterwards, a joint that must have moved and shows no motion is a fault. With a twin, its
 /// prediction and the other encoder say what must have moved (Expectation). Without one, a block
@@ -66,9 +66,9 @@ class EarnedTorque {
 
   /// Takes a cycle with a new reading, in any state, after `sent` (N·m) was sent.
   void See(const Cycle& cycle, const Joints& sent);
-  /// Whether the links are quiet enough for a pulse. A twin knows how links in motion answer.
-  bool quiet() const { return PredictsPulse() || quiet_; }
-  /// Whether both joints have answered, or need not.
+  /// Whether the links rest, so that a pulse shows how they answer.
+  bool quiet() const { return quiet_; }
+  /// Whether both joints have answered, or get no pulse.
   bool proven() const { return proven_; }
   /// Judges the answer to the pulses so far.
   Complaint JudgePulse();

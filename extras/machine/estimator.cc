@@ -199,7 +199,8 @@ void Estimator::ExpectUnseen(const TimedReading& reading) {
     Track& track = unseen_[j];
     const double seconds = reading.time - track.time;
     if (seconds > 0) {
-      // Static friction may hold slow links. An encoder that shows no motion either proves nothing.
+      // Static friction may hold slow links. An encoder without visible motion does not correct the
+      // other joint.
       Predict(track, seconds, Slow(track) ? kDisturbedNoise : kVelocityNoise);
       Encoders others = visible;
       others[j] = false;

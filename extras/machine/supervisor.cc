@@ -81,8 +81,6 @@ Joints SingleLimits(const SupervisorConfig& config) {
   return limits;
 }
 
-bool Hangs(const PendulumState& s) { return s.q1 == 0 && s.q2 == 0 && s.w1 == 0 && s.w2 == 0; }
-
 }  // namespace
 
 Supervisor::Supervisor(const SupervisorConfig& config)
@@ -90,7 +88,7 @@ Supervisor::Supervisor(const SupervisorConfig& config)
       earned_({.limit = SingleLimits(config)[config.actuated_joint == 1 ? 0 : 1],
                .actuated_joint = config.actuated_joint,
                .trust = config.trust,
-               .hangs = Hangs(config.start),
+               .hangs = AtRest(config.start),
                .quantum = config.quantum,
                .period = config.period}) {
   config_.motor_limit = SingleLimits(config);
@@ -361,7 +359,7 @@ Joints Supervisor::Torque(const Joints& controller, const CycleFacts& facts) {
   Joints wanted{};
   if (state_ == LoopState::kProbing) wanted = earned_.Pulse();
   if (state_ == LoopState::kRunning) wanted = earned_.Permitted(controller);
-  if (state_ == LoopState::kBraking) wanted = BrakeTorque(facts);
+  if (state_ == LoopState::kBraking) wanted = earned_.Permitted(BrakeTorque(facts));
   if (!std::isfinite(wanted[0]) || !std::isfinite(wanted[1])) {
     Fail({"the controller's torque is not a finite number"});
     return torque_;
@@ -370,7 +368,7 @@ Joints Supervisor::Torque(const Joints& controller, const CycleFacts& facts) {
     const double limit = config_.motor_limit[j];
     torque_[j] = std::clamp(wanted[j], -limit, limit);
   }
-  clipped_ += torque_ != wanted && state_ == LoopState::kRunning ? 1 : 0;
+  clipped_ += torque_ != controller && state_ == LoopState::kRunning ? 1 : 0;
   return torque_;
 }
 

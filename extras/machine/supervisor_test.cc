@@ -17,8 +17,8 @@ using enum LoopState;
 constexpr double kCycle = 0.002;  // s
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kQuantum = 0.0004, kRange = 12.5;  // rad
-// A start that does not hang: the controller drives without pulses before it.
-constexpr PendulumState kHeld{0.01, 0, 0, 0};
+// A start that does not rest: the controller drives without a pulse before it.
+constexpr PendulumState kHeld{0, 0, 0.4, 0};
 
 /// A supervisor and the facts of its next cycle.
 struct Bench {
