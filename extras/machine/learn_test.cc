@@ -161,7 +161,7 @@ TEST(Learn, AMachineThatDoesNotAnswerGetsNoMoreTorque) {
 TEST(Learn, EndsWithoutMotion) {
   const TempFolder folder;
   Twin stuck = StrangeTwin();
-  stuck.plant.coulomb1 = stuck.plant.coulomb2 = 10;
+  stuck.plant.coulomb1 = stuck.plant.coulomb2 = 7;
   WatchedLink link(stuck);
   const LearnResult result = LearnOn(link, ConfigFor(2), folder.path());
   EXPECT_NE(result.reason.find("no motion"), std::string::npos) << result.reason;

@@ -316,12 +316,14 @@ LoopState Supervisor::Step(const CycleFacts& facts) {
     earned_.See({facts.read_at, facts.angle, facts.expected}, torque_);
   }
   if (!CheckAge(facts.age)) return state_;
+  if (state_ != LoopState::kIdle) {
+    if (const Complaint complaint = CheckSlip(facts)) return Fail(complaint);
+  }
   if (state_ == LoopState::kIdle || state_ == LoopState::kArmed) {
     Wait(facts);
     return state_;
   }
   if (const Complaint complaint = CheckEstimate(facts)) return Fail(complaint);
-  if (const Complaint complaint = CheckSlip(facts)) return Fail(complaint);
   if (facts.fresh) {
     if (const Complaint complaint = CheckResponse()) return Fail(complaint);
   }
