@@ -47,19 +47,17 @@ double MeanOfSessions(std::span<const MachineLog> logs,
   return std::exp(sum / static_cast<double>(sessions.size()));
 }
 
-/// Throws for a log in which a motor acts without commanded torques, which drive the model:
-/// BadInput if it has none, Failure if its commands are wrong.
+/// Throws BadInput for a log in which a motor acts without commanded torques, which drive the
+/// model.
 void ExpectCommands(const MachineLog& log) {
   for (const int joint : {0, 1}) {
     const bool acts = log.commanded.empty() ? HasTorque(log.measured, joint)
                                             : ActsWithoutCommand(std::span(&log, 1), joint);
     if (!acts) continue;
-    const std::string text = Concat(log.name, ": joint ", joint + 1,
-                                    ": expected commanded torques besides the measured ones, got "
-                                    "none; --columns can name measured torques as commanded",
-                                    joint + 1);
-    if (log.commanded.empty()) throw BadInput(text);
-    throw Failure(text);
+    throw BadInput(Concat(log.name, ": joint ", joint + 1,
+                          ": expected commanded torques besides the measured ones, got none; "
+                          "--columns can name measured torques as commanded",
+                          joint + 1));
   }
 }
 

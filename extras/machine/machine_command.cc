@@ -189,7 +189,20 @@ std::vector<MachineLog> ReadAndWarn(const MachineArguments& a, bool& is_faulty) 
   });
 }
 
-int RunValidate(const MachineArguments& a) {
+/// Runs work that sets `is_faulty` if it reads logs with faults. A later error follows from these
+/// faults, and has exit code 1, too.
+int RunOnLogs(void (*work)(const MachineArguments& a, bool& is_faulty), const MachineArguments& a) {
+  bool is_faulty = false;
+  try {
+    work(a, is_faulty);
+  } catch (const Error& error) {
+    if (!is_faulty) throw;
+    throw Failure(error.what());
+  }
+  return is_faulty ? 1 : 0;
+}
+
+void Validate(const MachineArguments& a, bool& is_faulty) {
   const std::string& file = a.twin;
   if (file.ends_with(".csv") || file.ends_with(".csv.gz")) {
     throw BadInput(Concat("machine validate: expected the twin's file before the logs, got \"",
@@ -197,7 +210,6 @@ int RunValidate(const MachineArguments& a) {
   }
   const Twin twin = ReadTwin(file, "machine validate");
   const std::vector<Twin> others = ReadOthers(a);
-  bool is_faulty = false;
   const std::vector<MachineLog> logs = ReadAndWarn(a, is_faulty);
   std::vector<Predictor> predictors{PredictorOf(twin.name, twin, logs)};
   AddOthers(others, a, logs, predictors);
@@ -215,8 +227,9 @@ int RunValidate(const MachineArguments& a) {
   }
   if (!a.csv.empty()) WriteNamedFile(a.csv, MotionCsv(logs, predictors));
   ShowErrors(a, logs, predictors, rows, {}, pool);
-  return is_faulty ? 1 : 0;
 }
+
+int RunValidate(const MachineArguments& a) { return RunOnLogs(Validate, a); }
 
 void PrintTwin(const Identification& found) {
   const Twin& twin = found.fit.twin;
@@ -290,7 +303,7 @@ void WarnOfTwin(const Twin& twin, std::span<const ErrorRow> rows) {
 }
 
 /// Fits a twin to logs: from --plant, or with a prior twin as its adaptation.
-int RunIdentify(const MachineArguments& a) {
+void FitTwin(const MachineArguments& a, bool& is_faulty) {
   const bool adapts = a.plant.empty() && !a.twin.empty();
   const char* command = adapts ? "adapt" : "identify";
   if (!adapts && a.plant.empty()) {
@@ -303,7 +316,6 @@ int RunIdentify(const MachineArguments& a) {
   CheckWritable("--out", a.out);
   const Twin first = adapts ? ReadTwin(a.twin, "machine adapt") : ReadTwin(a.plant, "--plant");
   const std::vector<Twin> others = ReadOthers(a);
-  bool is_faulty = false;
   const std::vector<MachineLog> logs = ReadAndWarn(a, is_faulty);
   IdentifyConfig config;
   config.folds = adapts ? 0 : static_cast<int>(a.folds);
@@ -333,8 +345,9 @@ int RunIdentify(const MachineArguments& a) {
   }
   if (!a.as_json) PrintIdentification(found, logs.size());
   ShowErrors(a, logs, predictors, rows, IdentificationJson(found, a.out), pool);
-  return is_faulty ? 1 : 0;
 }
+
+int RunIdentify(const MachineArguments& a) { return RunOnLogs(FitTwin, a); }
 
 /// Checks the files to write before any work.
 void CheckOutputs(const MachineArguments& a) {
