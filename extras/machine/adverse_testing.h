@@ -32,9 +32,9 @@ class AdverseLink : public MachineLink {
       : choose_(std::move(choose)),
         limit_(limit),
         rarity_(rarity),
-        machine_(twin, {}, {.line = {}, .machine = AnyWiring()}),
         protocol_(/*datagrams=*/choose_(2) == 0),
-        clock_(choose_(5)) {}
+        clock_(choose_(5)),
+        machine_(twin, {}, {.line = {}, .machine = AnyWiring()}) {}
 
   double Now() const override { return now_; }
   bool simulated() const override { return true; }
@@ -74,7 +74,7 @@ class AdverseLink : public MachineLink {
   /// Faults of motors and encoders from the beginning, in half of the runs.
   MachineFaults AnyWiring() {
     MachineFaults faults;
-    if (choose_(2) == 0) return faults;
+    if (choose_(2) != 0) return faults;
     wired_ = false;
     const size_t j = choose_(2);
     switch (choose_(5)) {
@@ -213,9 +213,9 @@ class AdverseLink : public MachineLink {
   bool wired_ = true;  // whether motors and encoders work at the beginning
   Joints limit_;       // N·m
   uint32_t rarity_;
-  FakeMachine machine_;
   LinkProtocol protocol_;
   uint32_t clock_;
+  FakeMachine machine_;
   double now_ = 0, last_reading_ = -1;  // s
   Joints last_angle_{}, torque_{};
   Joints offset_{}, sign_{1, 1};

@@ -29,7 +29,7 @@ constexpr double kLargestError = 0.2;  // of the estimate at a slow joint, rad
 // Angle after lost readings, less its prediction: most, and most for each second and each step of
 // the encoder. With readings of real machines left out for 20 ms it is at most 0.025 rad.
 constexpr double kSlip = 0.012, kSlipRate = 1, kSlipSteps = 6;  // rad, rad/s, steps
-constexpr double kLostCycles = 1.5;
+constexpr double kLostCycles = 1.5, kLongestLoss = 0.025;       // shortest in cycles, longest in s
 
 // Braking that does not work ends with motors off.
 constexpr double kBrakeShare = 1.5;                      // of the limits of velocity and energy
@@ -212,7 +212,7 @@ Complaint Supervisor::CheckEstimate(const CycleFacts& facts) const {
 Complaint Supervisor::CheckSlip(const CycleFacts& facts) const {
   const Expectation& e = facts.expected;
   if (!e.known || config_.trust == TwinTrust::kNever) return {};
-  if (!facts.fresh || e.gap < kLostCycles * config_.period) return {};
+  if (!facts.fresh || e.gap < kLostCycles * config_.period || e.gap > kLongestLoss) return {};
   const Joints w{facts.state.w1, facts.state.w2};
   const double unsure = facts.received - facts.read_at;  // of the moment of the measurement, s
   for (size_t j = 0; j < 2; ++j) {

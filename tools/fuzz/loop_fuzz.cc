@@ -16,7 +16,7 @@ bool TryInput(std::string_view input) {
     return (n > 256 ? low + 256U * next() : low) % n;
   };
   const bool with_twin = choose(2) == 0;
-  const AdverseRun run = RunAdversely(with_twin, 64, 300, choose);
+  const AdverseRun run = RunAdversely(with_twin, 64, 600, choose);
   Expect(run.violation.empty(), "safe torques");
   return run.reason.empty();
 }
