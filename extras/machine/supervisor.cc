@@ -28,7 +28,7 @@ constexpr double kLargestError = 0.2;  // of the estimate at a slow joint, rad
 
 // Angle after lost readings, less its prediction: most, and most for each second and each step of
 // the encoder. With readings of real machines left out for 20 ms it is at most 0.025 rad.
-constexpr double kSlip = 0.012, kSlipRate = 1, kSlipSteps = 6;  // rad, rad/s, steps
+constexpr double kSlip = 0.025, kSlipRate = 1, kSlipSteps = 6;  // rad, rad/s, steps
 constexpr double kLostCycles = 1.5, kLongestLoss = 0.025;       // shortest in cycles, longest in s
 
 // Braking that does not work ends with motors off.
@@ -214,7 +214,7 @@ Complaint Supervisor::CheckSlip(const CycleFacts& facts) const {
   if (!e.known || config_.trust == TwinTrust::kNever) return {};
   if (!facts.fresh || e.gap < kLostCycles * config_.period || e.gap > kLongestLoss) return {};
   const Joints w{facts.state.w1, facts.state.w2};
-  const double unsure = facts.received - facts.read_at;  // of the moment of the measurement, s
+  const double unsure = facts.received - facts.read_at + kOldest;  // of the measurement, s
   for (size_t j = 0; j < 2; ++j) {
     const double most =
         kSlip + kSlipRate * e.gap + kSlipSteps * joints_[j].step + std::abs(w[j]) * unsure;
