@@ -105,9 +105,7 @@ bool ControlLoop::Cycle() {
   torque_ = supervisor_.Torque(wanted, facts);
   const LoopState after = supervisor_.state();
   enabled_ = state != LoopState::kIdle && after != LoopState::kFault;
-  const bool moves =
-      after == LoopState::kRunning || after == LoopState::kBraking || after == LoopState::kProbing;
-  summary_.moving += moves ? 1 : 0;
+  summary_.moving += MayDrive(after) ? 1 : 0;
   if (reading) {
     const LoopRow row{reading->time, reading->angle,  {facts.state.w1, facts.state.w2},
                       torque_,       reading->torque, static_cast<int>(after),

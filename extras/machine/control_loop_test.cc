@@ -184,42 +184,37 @@ TEST(ControlLoop, AnExceptionSwitchesTheMotorsOff) {
 }
 
 TEST(Supervisor, TakesTheReadingsOfARealMachineForMotions) {
-  const std::filesystem::path real = RealData();
-  if (real.empty()) GTEST_SKIP() << "no measured data";
-  Twin twin = ReadTwin("realaigym-twin", "twin");
+  const std::vector<RealRun> runs = RealRuns();
+  if (RealData().empty()) GTEST_SKIP() << "no measured data";
+  const Twin twin = ReadTwin("realaigym-twin", "twin");
   int rows = 0, running = 0;
-  for (const char* kind : {"C.1/pushed", "C.1/swingup"}) {
-    for (const auto& file : std::filesystem::directory_iterator(real / kind)) {
-      const MachineLog log = ReadLog(file.path()).front();
-      const double period = UsualCycle(std::span(&log, 1));
-      if (period > 0.01) continue;  // MC-PILCO at 33 Hz
-      Estimator estimator(twin, period);
-      constexpr int kArmed = Supervisor::kArmReadings + 1;
-      const Joints& q = log.angle[kArmed];
-      const Joints& w = log.velocity[kArmed];
-      Supervisor supervisor({.limits = {.angle = 1e3, .velocity = 1e3, .energy = 1e3},
-                             .start = {q[0], q[1], w[0], w[1]},
-                             .angle_range = 1e3,
-                             .quantum = twin.sensors.quantum,
-                             .period = period});
-      for (int k = 1; k < log.rows(); ++k, ++rows) {
-        const double time = log.time[k];
-        const TimedReading reading{{log.angle[k], log.measured[k]}, time};
-        estimator.Update(time, log.commanded[k - 1], &reading);
-        supervisor.Step({.time = time,
-                         .fresh = true,
-                         .read_at = log.time[k - 1],
-                         .received = time,
-                         .angle = log.angle[k],
-                         .torque = log.measured[k],
-                         .zero = estimator.zero(),
-                         .state = estimator.now(),
-                         .ahead = estimator.ahead(),
-                         .energy = estimator.energy()});
-      }
-      EXPECT_EQ(supervisor.reason(), "") << file.path();
-      running += supervisor.state() == LoopState::kRunning ? 1 : 0;
+  for (const auto& [file, log, period] : runs) {
+    Estimator estimator(twin, period);
+    constexpr int kArmed = Supervisor::kArmReadings + 1;
+    const Joints& q = log.angle[kArmed];
+    const Joints& w = log.velocity[kArmed];
+    Supervisor supervisor({.limits = {.angle = 1e3, .velocity = 1e3, .energy = 1e3},
+                           .start = {q[0], q[1], w[0], w[1]},
+                           .angle_range = 1e3,
+                           .quantum = twin.sensors.quantum,
+                           .period = period});
+    for (int k = 1; k < log.rows(); ++k, ++rows) {
+      const double time = log.time[k];
+      const TimedReading reading{{log.angle[k], log.measured[k]}, time};
+      estimator.Update(time, log.commanded[k - 1], &reading);
+      supervisor.Step({.time = time,
+                       .fresh = true,
+                       .read_at = log.time[k - 1],
+                       .received = time,
+                       .angle = log.angle[k],
+                       .torque = log.measured[k],
+                       .zero = estimator.zero(),
+                       .state = estimator.now(),
+                       .ahead = estimator.ahead(),
+                       .energy = estimator.energy()});
     }
+    EXPECT_EQ(supervisor.reason(), "") << file;
+    running += supervisor.state() == LoopState::kRunning ? 1 : 0;
   }
   EXPECT_GE(running, 23);
   EXPECT_GT(rows, 50'000);

@@ -23,8 +23,8 @@ constexpr double kLargestTravel = 0.5;  // of the motor's joint until the other 
 constexpr double kCompared = 0.03, kComparedSteps = 12;  // rad, steps
 constexpr double kLeastCompared = 0.4;  // share of it that is compared under the largest torque
 constexpr double kLeastShare = 0.4, kLargestShare = 1.6;  // of this motion that an encoder may show
-constexpr double kAboveFriction =
-    3;  // torque of the pulse, of dry friction, which differs by session
+// Least torque of the pulse, of dry friction. Sessions differ in their friction.
+constexpr double kAboveFriction = 3;
 
 // Motion that an encoder must have shown.
 constexpr double kDeviations = 4;      // of the twin's prediction
@@ -190,8 +190,7 @@ Complaint EarnedTorque::JudgeShare(int j) {
   if (share >= kLeastShare && share <= kLargestShare) return {};
   return {
       "joint %.0f moves by %.3g rad under the first torques, and the twin by %.3g rad: are the "
-      "signs, "
-      "the scales and the order of motors and encoders those of the twin?",
+      "signs, the scales and the order of motors and encoders those of the twin?",
       {static_cast<double>(j + 1), shown, expected}};
 }
 

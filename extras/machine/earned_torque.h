@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <optional>
 
 #include "extras/machine/expectation.h"
 #include "extras/machine/log.h"
@@ -110,6 +109,7 @@ class EarnedTorque {
   Complaint JudgeShare(int j);
   Complaint JudgeDirection(int j);
   bool Answered() const { return joints_[0].answered && joints_[1].answered; }
+
   EarnedTorqueConfig config_;
   std::array<Joint, 2> joints_;
   Block block_;

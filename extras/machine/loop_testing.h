@@ -1,11 +1,15 @@
 #pragma once
 
 #include <cmath>
+#include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "extras/machine/check.h"
 #include "extras/machine/control_loop.h"
 #include "extras/machine/fake_machine.h"
 #include "extras/machine/testing.h"
@@ -55,6 +59,29 @@ class FakeLink : public MachineLink {
   bool enabled_ = false;
   Joints torque_{};
 };
+
+/// A run of a real machine, and the usual time between its cycles.
+struct RealRun {
+  std::filesystem::path file;
+  MachineLog log;
+  double period;  // s
+};
+
+/// The runs of design C.1 with fast cycles, 10 of them with pushes. Empty without measured data.
+inline std::vector<RealRun> RealRuns() {
+  const std::filesystem::path real = RealData();
+  std::vector<RealRun> runs;
+  for (const char* kind : {"C.1/pushed", "C.1/swingup"}) {
+    if (real.empty()) break;
+    for (const auto& file : std::filesystem::directory_iterator(real / kind)) {
+      const MachineLog log = ReadLog(file.path()).front();
+      const double period = UsualCycle(std::span(&log, 1));
+      if (period > 0.01) continue;  // MC-PILCO at 33 Hz
+      runs.push_back({file.path(), log, period});
+    }
+  }
+  return runs;
+}
 
 /// A loop on a link, cycle by cycle.
 struct LoopBench {

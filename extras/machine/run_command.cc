@@ -203,10 +203,9 @@ void AddRun(CommandLine& line) {
             "with a twin as --link: play a machine drawn from the twin's covariance");
   line.Excludes("--compensation", {"--differences"}, ", which estimates no friction");
   line.Footer(
-      "The loop waits for readings (idle), then for the start state (armed). From hanging links, "
-      "a\n"
-      "pulse of the motor then has to move both joints (probing). Then the\n"
-      "controller drives (running). Afterwards, at Ctrl-C and beyond a limit it brakes until\n"
+      "The loop waits for readings (idle), then for the start state (armed). From hanging links,\n"
+      "a pulse of the motor then has to move both joints (probing). Then the controller drives\n"
+      "(running). Afterwards, at Ctrl-C and beyond a limit it brakes until\n"
       "the links hang; a second Ctrl-C switches the motors off at once. So does a fault: no\n"
       "reading for --max-age, a reading that is no number, an angle that jumps, an encoder that\n"
       "sticks or saturates (docs/howto/protection.md).\n"

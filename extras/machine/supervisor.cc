@@ -45,6 +45,16 @@ bool AtRest(const PendulumState& s) {
          std::cos(s.q1 + s.q2) > kLow;
 }
 
+/// Limits each motor to the largest torque that a single, as frames have it, does not round up.
+SupervisorConfig WithSingleLimits(SupervisorConfig config) {
+  for (double& limit : config.motor_limit) {
+    limit = std::min(limit, config.limits.torque);
+    const auto single = static_cast<float>(limit);
+    if (single > limit) limit = std::nextafter(single, 0.0F);
+  }
+  return config;
+}
+
 }  // namespace
 
 void Limits::Describe(Options& o) {
@@ -68,30 +78,19 @@ const char* NameOf(LoopState state) {
   return kNames[static_cast<size_t>(state)];
 }
 
-namespace {
-
-/// The largest torque of each joint that a single, as frames have it, does not round up.
-Joints SingleLimits(const SupervisorConfig& config) {
-  Joints limits = config.motor_limit;
-  for (double& limit : limits) {
-    limit = std::min(limit, config.limits.torque);
-    const auto single = static_cast<float>(limit);
-    if (single > limit) limit = std::nextafter(single, 0.0F);
-  }
-  return limits;
+bool MayDrive(LoopState state) {
+  return state == LoopState::kProbing || state == LoopState::kRunning ||
+         state == LoopState::kBraking;
 }
 
-}  // namespace
-
 Supervisor::Supervisor(const SupervisorConfig& config)
-    : config_(config),
-      earned_({.limit = SingleLimits(config)[config.actuated_joint == 1 ? 0 : 1],
+    : config_(WithSingleLimits(config)),
+      earned_({.limit = config_.motor_limit[config.actuated_joint == 1 ? 0 : 1],
                .actuated_joint = config.actuated_joint,
                .trust = config.trust,
                .hangs = AtRest(config.start),
                .quantum = config.quantum,
                .period = config.period}) {
-  config_.motor_limit = SingleLimits(config);
   const double step = config_.quantum > 0 ? config_.quantum : kUnknownStep;
   for (Joint& joint : joints_) joint.step = step;
   constexpr size_t kLongestReason = 300;
@@ -186,9 +185,8 @@ Complaint Supervisor::CheckReading(const CycleFacts& facts) {
       return {"joint %.0f: the encoder saturates at %.4g rad", {joint, facts.angle[j]}};
     }
   }
-  const bool drives = state_ == LoopState::kRunning || state_ == LoopState::kBraking ||
-                      state_ == LoopState::kProbing;
-  if (facts.locked && drives) return {"the machine's watchdog has switched its motors off"};
+  if (facts.locked && MayDrive(state_))
+    return {"the machine's watchdog has switched its motors off"};
   return CheckMotion(facts);
 }
 

@@ -38,6 +38,8 @@ enum class LoopState {
   kProbing,  // short pulses of the motors, which the encoders have to answer; then kArmed
 };
 const char* NameOf(LoopState state);
+/// Whether torques may act in a state.
+bool MayDrive(LoopState state);
 
 /// The supervisor's inputs in a cycle. All times are of the loop's clock.
 struct CycleFacts {
