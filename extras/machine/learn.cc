@@ -19,6 +19,7 @@
 #include "extras/machine/learning_run.h"
 #include "extras/machine/policy_controller.h"
 #include "os/file.h"
+#include "pendulum/runge_kutta.h"
 
 namespace upswing::machine {
 namespace {
@@ -101,6 +102,7 @@ class Learner {
       Excite(kLargeMotion, has_twin);
       while (true) {
         Fit(kLargeMotion.window);
+        if (result_.tries == 0) WarnOfFalls();
         if (Try()) return result_;
       }
     } catch (const Ended& ended) {
@@ -251,6 +253,31 @@ class Learner {
       const size_t n = twin_.uncertain.size();
       for (size_t i = 0; i < n * n; ++i) twin_.covariance[i] *= i % (n + 1) == 0 ? 1 : 0;
     }
+  }
+
+  /// Says which limits a fall from upright exceeds. A motor cannot hold links that fall.
+  void WarnOfFalls() {
+    constexpr double kLean = 0.1, kStep = 1e-3, kSeconds = 3;  // rad, s
+    const Manipulator body = BodyOf(twin_);
+    const auto falling = [&](const PendulumState& s, double /*share*/) {
+      return body.Acceleration(s, {});
+    };
+    double angle = 0, velocity = 0;
+    for (const double lean : {-kLean, kLean}) {
+      PendulumState s{std::numbers::pi + lean, 0, 0, 0};
+      for (int i = 0; i < kSeconds / kStep; ++i) {
+        s = RungeKuttaStep(s, falling(s, 0), kStep, falling);
+        angle = std::max(angle, Larger(s.q1, s.q2));
+        velocity = std::max(velocity, Larger(s.w1, s.w2));
+      }
+    }
+    const auto warn = [&](const char* flag, double limit, double reached, const char* unit) {
+      if (reached <= limit) return;
+      say_(fmt::format("  warning: a fall from upright reaches {:.1f} {}, beyond {} {:g}", reached,
+                       unit, flag, limit));
+    };
+    warn("--max-angle", c_.limits.angle, angle, "rad");
+    warn("--max-velocity", c_.limits.velocity, velocity, "rad/s");
   }
 
   /// Designs a controller and tries it. Returns whether the machine balanced.
