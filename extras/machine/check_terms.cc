@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "pendulum/regressor.h"
+
 namespace upswing::machine {
 
 int SpanOf(double cycle) {
@@ -49,23 +51,29 @@ Window SmoothWindowAt(const MachineLog& log, int first, int last, int span, doub
 }
 
 std::array<Terms, 2> TermsOf(const Window& window, const Reading& reading) {
+  enum Constant { kJ1, kJ2, kB, kA, kG1, kG2 };  // columns of a regressor
   std::array<Terms, 2> both{Terms::Zero(), Terms::Zero()};
   for (const Sample& sample : window) {
     const Joints q = reading.Of(sample.q), w = reading.Of(sample.w);
+    const auto angles = dynamics::AnglesOf<double>({q[0], q[1]});
+    const auto& [s1, c1, s2, c2] = angles;
+    const auto plain = MomentumRegressorOf(angles, {w[0], w[1]});
+    const auto turned1 = MomentumRegressorOf({c1, -s1, s2, c2}, {w[0], w[1]});
+    const auto turned2 = MomentumRegressorOf({s1, c1, c2, -s2}, {w[0], w[1]});
     const double dt = sample.force, end = sample.momentum;
-    const double s1 = std::sin(q[0]), c1 = std::cos(q[0]), s2 = std::sin(q[1]), c2 = std::cos(q[1]);
     for (const int row : {0, 1}) {
       Terms& terms = both[row];
-      const double coupled = row == 0 ? 2 * w[0] + w[1] : w[0];
-      const double force = row == 0 ? 0 : w[0] * (w[0] + w[1]) * dt;
-      terms[kInertia] += end * (row == 0 ? w[0] : w[0] + w[1]);
-      terms[kOther] += end * w[1];
-      terms[kCoupling] += end * c2 * coupled + s2 * force;
-      terms[kTurnedCoupling] += -end * s2 * coupled + c2 * force;
-      terms[kLink2] += (s1 * c2 + c1 * s2) * dt;
-      terms[kTurnedLink2] += (c1 * c2 - s1 * s2) * dt;
-      terms[kLink1] += row == 0 ? s1 * dt : 0;
-      terms[kTurnedLink1] += row == 0 ? c1 * dt : 0;
+      const auto& momentum = plain.momentum[row];
+      const auto& force = plain.force[row];
+      // Both columns of joint 1 contain w1. The second term has w2 only.
+      terms[kInertia] += end * momentum[row == 0 ? kJ1 : kJ2];
+      terms[kOther] += end * (row == 0 ? momentum[kJ2] - momentum[kJ1] : momentum[kA]);
+      terms[kCoupling] += end * momentum[kB] + dt * force[kB];
+      terms[kTurnedCoupling] += end * turned2.momentum[row][kB] + dt * turned2.force[row][kB];
+      terms[kLink2] += dt * force[kG2];
+      terms[kTurnedLink2] += dt * turned1.force[row][kG2];
+      terms[kLink1] += dt * force[kG1];
+      terms[kTurnedLink1] += dt * turned1.force[row][kG1];
       terms[kDamping] += w[row] * dt;
       terms[kFriction] += std::tanh(10 * w[row]) * dt;
       terms[kTorque1] += sample.tau[0] * dt;

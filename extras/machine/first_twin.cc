@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "base/error.h"
-#include "pendulum/equations.h"
+#include "pendulum/regressor.h"
 
 // Symbols: those of Manipulator; z zeros of the encoders, k1 = G1 z1, k2 = G2 (z1 + z2).
 namespace upswing::machine {
@@ -24,15 +24,25 @@ struct Terms {
 };
 
 Terms TermsAt(const Joints& q, const Joints& w) {
-  const double c = std::cos(q[1]), s = std::sin(q[1]), both = q[0] + q[1];
+  constexpr int kConstants = kNumManipulatorConstants;
+  enum { kDamping1 = 6, kDamping2, kFriction1, kFriction2 };
+  using Columns = Eigen::Map<const Eigen::Matrix<double, 1, kConstants>>;
+  const auto angles = dynamics::AnglesOf<double>({q[0], q[1]});
+  const auto [momentum, force] = MomentumRegressorOf(angles, {w[0], w[1]});
   Terms t;
-  // Momenta: M q̇.
-  t.change1 << w[0], w[0] + w[1], c * (2 * w[0] + w[1]), 0, 0, 0, q[0], 0, 0, 0, 0, 0;
-  t.change2 << 0, w[0] + w[1], c * w[0], w[1], 0, 0, 0, q[1], 0, 0, 0, 0;
-  t.rate1 << 0, 0, 0, 0, std::sin(q[0]), std::sin(both), 0, 0, DryFriction(1, w[0]), 0,
-      -std::cos(q[0]), -std::cos(both);
-  t.rate2 << 0, 0, s * w[0] * (w[0] + w[1]), 0, 0, std::sin(both), 0, 0, 0, DryFriction(1, w[1]), 0,
-      -std::cos(both);
+  t.change1.head<kConstants>() = Columns(momentum[0].data());
+  t.change2.head<kConstants>() = Columns(momentum[1].data());
+  t.rate1.head<kConstants>() = Columns(force[0].data());
+  t.rate2.head<kConstants>() = Columns(force[1].data());
+  // The integral of a velocity is exact: the change of an angle.
+  t.change1[kDamping1] = q[0];
+  t.change2[kDamping2] = q[1];
+  t.rate1[kDamping1] = t.rate2[kDamping2] = 0;
+  t.rate1[kFriction1] = DryFriction(1, w[0]);
+  t.rate2[kFriction2] = DryFriction(1, w[1]);
+  // Zeros turn gravity: k1 = G1 z1, k2 = G2 (z1 + z2).
+  t.rate1.tail<2>() << -angles.c1, -angles.c12();
+  t.rate2.tail<2>() << 0, -angles.c12();
   return t;
 }
 

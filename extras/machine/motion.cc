@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <unsupported/Eigen/AutoDiff>
 
+#include "pendulum/regressor.h"
 #include "pendulum/runge_kutta.h"
 
 namespace upswing::machine {
@@ -13,34 +15,46 @@ constexpr double kShortestLag = 1e-5;  // s; shorter lags count as this one
 using StateTangents = Eigen::Matrix<double, kTangents, 4>;
 using JointTangents = Eigen::Matrix<double, kTangents, 2>;
 
+/// The derivative of DryFriction(1, w) by w, s/rad. Dual numbers would take longer for it.
+double FrictionSlope(double w) {
+  return kFrictionSlope / (1 + kFrictionSlope * kFrictionSlope * w * w);
+}
+
+/// ∂F/∂(q1, q2, w1, w2) of F = M q̈ + c + g + d q̇ + f atan(100 q̇) at both joints, with q̈ held.
+Eigen::Matrix<double, 4, 2> ForceByState(const Manipulator& m, const PendulumState& s,
+                                         const Joints& a) {
+  using Dual = Eigen::AutoDiffScalar<Eigen::Vector4d>;
+  using Pair = dynamics::JointPair<Dual>;
+  const Pair q{{s.q1, 4, 0}, {s.q2, 4, 1}}, w{{s.w1, 4, 2}, {s.w2, 4, 3}};
+  const auto angles = dynamics::AnglesOf(q);
+  const auto M = dynamics::MassAt(m, angles.c2);
+  const Pair net = dynamics::NetTorque<false>(m, angles, w, Pair{Dual(0), Dual(0)});
+  const Dual F1 = M.M11 * a[0] + M.M12 * a[1] - net.one;
+  const Dual F2 = M.M12 * a[0] + M.M22 * a[1] - net.two;
+  Eigen::Matrix<double, 4, 2> derivatives;
+  derivatives << F1.derivatives(), F2.derivatives();
+  derivatives(2, 0) += m.f1 * FrictionSlope(s.w1);
+  derivatives(3, 1) += m.f2 * FrictionSlope(s.w2);
+  return derivatives;
+}
+
 /// Derivatives of the acceleration q̈ in state s, from those of the state. The equations of motion
-/// F(q̈, s, p) = M q̈ + h = τ are linear in the constants p, so M dq̈ = dτ - ∂F/∂s ds - ∂F/∂p dp.
+/// F(q̈, s, p) = τ are linear in the constants p, so M dq̈ = dτ - ∂F/∂s ds - Y dp.
 JointTangents AccelerationTangents(const Manipulator& m, const PendulumState& s, const Joints& a,
                                    const DriveTangents& torque, const StateTangents& state) {
-  const auto& [q1, q2, w1, w2] = s;
-  const double sin1 = std::sin(q1), cos1 = std::cos(q1), sin2 = std::sin(q2), cos2 = std::cos(q2);
-  const double sin12 = sin1 * cos2 + cos1 * sin2, cos12 = cos1 * cos2 - sin1 * sin2;
-  const double c = (2 * w1 + w2) * w2, bs = m.b * sin2;  // c, w1²: as in the velocity terms
-  const auto slope = [](double w) {
-    return kFrictionSlope / (1 + kFrictionSlope * kFrictionSlope * w * w);
-  };
-  Eigen::Matrix<double, 4, 2> by_state;  // ∂F/∂s
-  by_state << m.G1 * cos1 + m.G2 * cos12, m.G2 * cos12,
-      -bs * (2 * a[0] + a[1]) - m.b * cos2 * c + m.G2 * cos12,
-      -bs * a[0] + m.b * cos2 * w1 * w1 + m.G2 * cos12,  //
-      -2 * bs * w2 + m.d1 + m.f1 * slope(w1), 2 * bs * w1, -2 * bs * (w1 + w2),
-      m.d2 + m.f2 * slope(w2);
-  Eigen::Matrix<double, 12, 2> direct;  // ∂F/∂p, and -∂τ/∂delay, -∂τ/∂lag
-  direct << a[0], 0, a[0] + a[1], a[0] + a[1], cos2 * (2 * a[0] + a[1]) - sin2 * c,
-      cos2 * a[0] + sin2 * w1 * w1, 0, a[1], sin1, 0, sin12, sin12, w1, 0, 0, w2,
-      DryFriction(1, w1), 0, 0, DryFriction(1, w2), -torque.by_delay[0], -torque.by_delay[1],
-      -torque.by_lag[0], -torque.by_lag[1];
-  JointTangents force = state * by_state;
-  force.bottomRows<12>() += direct;
-  const MassMatrix M = m.Mass(cos2);
+  const auto angles = dynamics::AnglesOf<double>({s.q1, s.q2});
+  const Factors Y = Regressor(angles, {s.w1, s.w2}, {a[0], a[1]});
+  JointTangents force = state * ForceByState(m, s, a);
+  for (int j = 0; j < 2; ++j) {
+    force.col(j).segment<kNumManipulatorConstants>(4) +=
+        Eigen::Map<const Eigen::Vector<double, kNumManipulatorConstants>>(Y[j].data());
+    force(kTangents - 2, j) -= torque.by_delay[j];
+    force(kTangents - 1, j) -= torque.by_lag[j];
+  }
+  const MassMatrix M = m.Mass(angles.c2);
   Eigen::Matrix2d inverse;
   inverse << M.M22, -M.M12, -M.M12, M.M11;
-  return force * (inverse / -M.det());
+  return force * (inverse / -M.det);
 }
 
 }  // namespace

@@ -183,7 +183,7 @@ void RebuiltTvlqr::Linearise() {
     Eigen::Matrix<double, 4, 2> B = Eigen::Matrix<double, 4, 2>::Zero();
     const MassMatrix M = model.Mass(std::cos(x_[k](1)));
     B.bottomRows<2>() << M.M22, -M.M12, -M.M12, M.M11;
-    B /= M.det();
+    B /= M.det;
     if (pendubot) B.col(1).setZero();
     const Eigen::Matrix4d Ad =
         Eigen::Matrix4d::Identity() + A * kGridStep + A * A * (kGridStep * kGridStep / 2);

@@ -1,20 +1,30 @@
 #include "control/linearize.h"
 
+#include <numbers>
+#include <unsupported/Eigen/AutoDiff>
+
+#include "pendulum/dynamics.h"
+
 namespace upswing {
+namespace {
+
+/// A number with its derivatives by q1, q2, w1, w2 and u.
+using Dual = Eigen::AutoDiffScalar<Eigen::Matrix<double, 5, 1>>;
+
+}  // namespace
 
 LinearModel LinearizeUpright(const Manipulator& plant, int actuated_joint) {
-  // M q̈ = e u + G q - D q̇, with e the motor's joint. M keeps all terms with cos q2 = 1. Gravity,
-  // which pulls back when hanging, pushes away here. Terms quadratic in the velocities vanish.
-  Eigen::Matrix2d inverse, G, D;
-  const auto [M11, M12, M22] = plant.Mass(1);
-  inverse << M22, -M12, -M12, M11;
-  inverse /= plant.Mass(1).det();
-  G << plant.G1 + plant.G2, plant.G2, plant.G2, plant.G2;
-  D << plant.d1, 0, 0, plant.d2;
+  const Dual q1(std::numbers::pi, 5, 0), q2(0, 5, 1), w1(0, 5, 2), w2(0, 5, 3), u(0, 5, 4), none(0);
+  const auto angles = dynamics::AnglesOf<Dual>({q1, q2});
+  const dynamics::JointPair<Dual> tau{actuated_joint == 1 ? u : none,
+                                      actuated_joint == 1 ? none : u};
+  const auto r = dynamics::NetTorque<false>(plant, angles, {w1, w2}, tau);
+  const auto a = dynamics::AccelerationUnder(r, dynamics::MassAt(plant, angles.c2));
 
   LinearModel model;
-  model.A << Eigen::Matrix2d::Zero(), Eigen::Matrix2d::Identity(), inverse * G, -inverse * D;
-  model.B << 0, 0, inverse.col(actuated_joint - 1);
+  model.A << Eigen::Matrix2d::Zero(), Eigen::Matrix2d::Identity(),
+      a.one.derivatives().head<4>().transpose(), a.two.derivatives().head<4>().transpose();
+  model.B << 0, 0, a.one.derivatives()[4], a.two.derivatives()[4];
   return model;
 }
 

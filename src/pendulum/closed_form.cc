@@ -33,51 +33,40 @@ HWY_INLINE hn::Mask<D> DrivesJoint1(const ClosedFormBatch& batch, size_t i) {
   return hn::Lt(LoadFrom(batch.joint, i), Constant(1.5));
 }
 
-/// The constants of the equations of motion.
+// The operations of dynamics-inl.h that Highway lacks.
+template <typename T>
+HWY_INLINE V Number(double x) {
+  return Constant(x);
+}
+HWY_INLINE V Atan(V x) { return hn::Atan(kDoubles, x); }
+
+#include "pendulum/dynamics-inl.h"
+
+using JointVectors = JointPair<V>;
+
+/// The constants of the equations of motion, and the torques at both joints.
 struct Dynamics {
-  V J2, b, G1, G2, d1, d2, f1, f2;
-  V tau1, tau2;  // torques at both joints, N·m: one is the motor's, the other 0
-  V a2;          // 2 a
-  V J12;         // J1 + J2
-  V M22;         // J2 + a
-  V det;         // part of det M that does not depend on q2
+  ManipulatorConstants<V> constants;
+  JointVectors tau;  // N·m: one is the motor's, the other 0
 };
 
 HWY_INLINE Dynamics LoadDynamics(const ClosedFormBatch& batch, size_t i) {
-  Dynamics p;
-  const V J1 = LoadFrom(batch.J1, i);
-  p.J2 = LoadFrom(batch.J2, i);
-  p.b = LoadFrom(batch.b, i);
-  p.G1 = LoadFrom(batch.G1, i);
-  p.G2 = LoadFrom(batch.G2, i);
-  p.d1 = LoadFrom(batch.d1, i);
-  p.d2 = LoadFrom(batch.d2, i);
-  p.f1 = LoadFrom(batch.f1, i);
-  p.f2 = LoadFrom(batch.f2, i);
   const V tau = LoadFrom(batch.tau, i);
   const auto at1 = DrivesJoint1(batch, i);
-  p.tau1 = hn::IfThenElseZero(at1, tau);
-  p.tau2 = hn::IfThenZeroElse(at1, tau);
-  const V a = LoadFrom(batch.a, i);
-  p.a2 = a + a;
-  p.J12 = J1 + p.J2;
-  p.M22 = p.J2 + a;
-  p.det = MulAdd(J1, p.J2, a * p.J12);
-  return p;
+  return {{LoadFrom(batch.J1, i), LoadFrom(batch.J2, i), LoadFrom(batch.b, i), LoadFrom(batch.a, i),
+           LoadFrom(batch.G1, i), LoadFrom(batch.G2, i), LoadFrom(batch.d1, i),
+           LoadFrom(batch.d2, i), LoadFrom(batch.f1, i), LoadFrom(batch.f2, i)},
+          {hn::IfThenElseZero(at1, tau), hn::IfThenZeroElse(at1, tau)}};
 }
 
-/// A number for each joint.
-struct JointVectors {
-  V one, two;
+HWY_INLINE JointVectors operator+(const JointVectors& x, const JointVectors& y) {
+  return {x.one + y.one, x.two + y.two};
+}
 
-  HWY_INLINE JointVectors operator+(const JointVectors& other) const {
-    return {one + other.one, two + other.two};
-  }
-  /// this + h other
-  HWY_INLINE JointVectors Plus(double h, const JointVectors& other) const {
-    return {MulAdd(Constant(h), other.one, one), MulAdd(Constant(h), other.two, two)};
-  }
-};
+/// x + h y
+HWY_INLINE JointVectors Plus(const JointVectors& x, double h, const JointVectors& y) {
+  return {MulAdd(Constant(h), y.one, x.one), MulAdd(Constant(h), y.two, x.two)};
+}
 
 struct State {
   JointVectors q, w;  // rad, rad/s
@@ -100,46 +89,17 @@ HWY_INLINE V MotorAngleOf(const ClosedFormBatch& batch, size_t i, const State& x
   return hn::IfThenElse(DrivesJoint1(batch, i), x.q.one, x.q.two);
 }
 
-/// Sines and cosines of the joints' angles.
-struct Angles {
-  Angle q1, q2;
-};
-
-HWY_INLINE Angles AnglesOf(const JointVectors& q) {
-  return {SineCosineOf(q.one), SineCosineOf(q.two)};
+HWY_INLINE JointAngles<V> AnglesOf(const JointVectors& q) {
+  const auto [s1, c1] = SineCosineOf(q.one);
+  const auto [s2, c2] = SineCosineOf(q.two);
+  return {s1, c1, s2, c2};
 }
 
-/// M(q) q̈ = r = τ - c(q, q̇) - g(q) - d q̇ - f atan(100 q̇), solved for q̈.
 template <bool kFriction>
-HWY_INLINE JointVectors Acceleration(const Dynamics& p, const State& x, const Angles& angles) {
-  const auto& [s1, c1] = angles.q1;
-  const auto& [s2, c2] = angles.q2;
-  const auto& [w1, w2] = x.w;
-  const V s12 = MulAdd(s1, c2, c1 * s2);
-
-  // M = [[J1 + J2 + 2 b c2, J2 + b c2], [·, J2 + a]], so that
-  // det M = J1 J2 + a (J1 + J2) + b c2 (2 a - b c2).
-  const V bc = p.b * c2;
-  const V M11 = MulAdd(Constant(2), bc, p.J12);
-  const V M12 = p.J2 + bc;
-  const V det = MulAdd(bc, p.a2 - bc, p.det);
-
-  // r1 = τ1 + b s2 (2 w1 + w2) w2 - G1 s1 - G2 s12 - d1 w1 - f1 atan(100 w1)
-  // r2 = τ2 - b s2 w1² - G2 s12 - d2 w2 - f2 atan(100 w2)
-  const V bs = p.b * s2;
-  const V g2 = p.G2 * s12;
-  V r1 = MulAdd(bs, MulAdd(Constant(2), w1, w2) * w2,
-                NegMulAdd(p.G1, s1, NegMulAdd(p.d1, w1, p.tau1)) - g2);
-  V minus_r2 = MulAdd(bs, w1 * w1, MulAdd(p.d2, w2, g2)) - p.tau2;
-  if constexpr (kFriction) {
-    const V slope = Constant(kFrictionSlope);
-    r1 = NegMulAdd(p.f1, hn::Atan(kDoubles, slope * w1), r1);
-    minus_r2 = MulAdd(p.f2, hn::Atan(kDoubles, slope * w2), minus_r2);
-  }
-
-  const V inverse = Constant(1) / det;
-  return {MulAdd(p.M22, r1, M12 * minus_r2) * inverse,
-          hn::Neg(MulAdd(M11, minus_r2, M12 * r1)) * inverse};
+HWY_INLINE JointVectors Acceleration(const Dynamics& p, const State& x) {
+  const JointAngles<V> angles = AnglesOf(x.q);
+  return AccelerationUnder(NetTorque<kFriction>(p.constants, angles, x.w, p.tau),
+                           MassAt(p.constants, angles.c2));
 }
 
 /// Makes one classical Runge-Kutta step of K vectors of environments, so that the processor
@@ -151,26 +111,26 @@ HWY_INLINE void RungeKuttaStep(const Dynamics (&p)[K], double h, State (&x)[K]) 
   State stage[K];
   HWY_UNROLL(2)
   for (size_t k = 0; k < K; ++k) {
-    a1[k] = Acceleration<kFriction>(p[k], x[k], AnglesOf(x[k].q));
-    stage[k] = {x[k].q.Plus(h / 2, x[k].w), x[k].w.Plus(h / 2, a1[k])};
+    a1[k] = Acceleration<kFriction>(p[k], x[k]);
+    stage[k] = {Plus(x[k].q, h / 2, x[k].w), Plus(x[k].w, h / 2, a1[k])};
   }
   HWY_UNROLL(2)
   for (size_t k = 0; k < K; ++k) {
-    a2[k] = Acceleration<kFriction>(p[k], stage[k], AnglesOf(stage[k].q));
-    stage[k] = {x[k].q.Plus(h / 2, stage[k].w), x[k].w.Plus(h / 2, a2[k])};
+    a2[k] = Acceleration<kFriction>(p[k], stage[k]);
+    stage[k] = {Plus(x[k].q, h / 2, stage[k].w), Plus(x[k].w, h / 2, a2[k])};
   }
   HWY_UNROLL(2)
   for (size_t k = 0; k < K; ++k) {
-    const JointVectors a3 = Acceleration<kFriction>(p[k], stage[k], AnglesOf(stage[k].q));
-    stage[k] = {x[k].q.Plus(h, stage[k].w), x[k].w.Plus(h, a3)};
+    const JointVectors a3 = Acceleration<kFriction>(p[k], stage[k]);
+    stage[k] = {Plus(x[k].q, h, stage[k].w), Plus(x[k].w, h, a3)};
     middle[k] = a2[k] + a3;
     early[k] = a1[k] + middle[k];
   }
   HWY_UNROLL(2)
   for (size_t k = 0; k < K; ++k) {
-    const JointVectors a4 = Acceleration<kFriction>(p[k], stage[k], AnglesOf(stage[k].q));
-    x[k].q = x[k].q.Plus(h, x[k].w).Plus(h * h / 6, early[k]);
-    x[k].w = x[k].w.Plus(h / 6, early[k] + middle[k] + a4);
+    const JointVectors a4 = Acceleration<kFriction>(p[k], stage[k]);
+    x[k].q = Plus(Plus(x[k].q, h, x[k].w), h * h / 6, early[k]);
+    x[k].w = Plus(x[k].w, h / 6, early[k] + middle[k] + a4);
   }
 }
 
@@ -214,7 +174,7 @@ struct Verdict {
 
 /// The quantities that the task's formulas use.
 struct Pose {
-  Angle q1, q2;
+  JointAngles<V> angles;
   V c12;
   V energy;  // Ê: hanging at rest 0, upright at rest 1
   V height;  // ĥ of the tip, in [-1, 1]
@@ -222,28 +182,27 @@ struct Pose {
 
 HWY_INLINE Pose PoseOf(const ClosedFormBatch& batch, size_t i, const State& x) {
   Pose pose;
-  const Angles angles = AnglesOf(x.q);
-  pose.q1 = angles.q1;
-  pose.q2 = angles.q2;
-  pose.c12 = NegMulAdd(pose.q1.s, pose.q2.s, pose.q1.c * pose.q2.c);
+  pose.angles = AnglesOf(x.q);
+  const auto& [s1, c1, s2, c2] = pose.angles;
+  pose.c12 = pose.angles.c12();
 
   // E = (T1 w1² + T2 w12²)/2 + b c2 w1 w12 - G1 c1 - G2 c12, with w12 = w1 + w2
   const V half = Constant(0.5);
   const V w1 = x.w.one, w12 = x.w.one + x.w.two;
   const V squares = MulAdd(LoadFrom(batch.T1, i), w1 * w1, LoadFrom(batch.T2, i) * (w12 * w12));
-  const V kinetic = MulAdd(half, squares, (LoadFrom(batch.b, i) * pose.q2.c) * (w1 * w12));
-  const V minus_potential =
-      MulAdd(LoadFrom(batch.G1, i), pose.q1.c, LoadFrom(batch.G2, i) * pose.c12);
+  const V kinetic = MulAdd(half, squares, (LoadFrom(batch.b, i) * c2) * (w1 * w12));
+  const V minus_potential = MulAdd(LoadFrom(batch.G1, i), c1, LoadFrom(batch.G2, i) * pose.c12);
   pose.energy = MulAdd(kinetic - minus_potential, LoadFrom(batch.energy_scale, i), half);
   pose.height =
-      hn::Neg(MulAdd(LoadFrom(batch.share1, i), pose.q1.c, LoadFrom(batch.share2, i) * pose.c12));
+      hn::Neg(MulAdd(LoadFrom(batch.share1, i), c1, LoadFrom(batch.share2, i) * pose.c12));
   return pose;
 }
 
 HWY_INLINE void JudgeObservation(const Pose& pose, const State& x, Verdict& verdict) {
-  const V obs[kObservationSize] = {pose.q1.c,   pose.q1.s,  x.w.one * Constant(1 / kMaxVelocity1),
-                                   pose.q2.c,   pose.q2.s,  x.w.two * Constant(1 / kMaxVelocity2),
-                                   pose.energy, pose.height};
+  const V obs[kObservationSize] = {
+      pose.angles.c1, pose.angles.s1, x.w.one * Constant(1 / kMaxVelocity1),
+      pose.angles.c2, pose.angles.s2, x.w.two * Constant(1 / kMaxVelocity2),
+      pose.energy,    pose.height};
   const hn::Rebind<float, D> floats;
   HWY_UNROLL(8)
   for (size_t k = 0; k < kObservationSize; ++k) {
@@ -254,7 +213,7 @@ HWY_INLINE void JudgeObservation(const Pose& pose, const State& x, Verdict& verd
 HWY_INLINE void JudgeReward(const Pose& pose, const State& x, V tau, const RewardConfig& weights,
                             Verdict& verdict) {
   const V minus_cos30 = Constant(-std::numbers::sqrt3 / 2);
-  const auto inverted = hn::And(hn::Le(pose.q1.c, minus_cos30), hn::Le(pose.c12, minus_cos30));
+  const auto inverted = hn::And(hn::Le(pose.angles.c1, minus_cos30), hn::Le(pose.c12, minus_cos30));
   hn::Store(hn::IfThenElseZero(inverted, Constant(1)), kDoubles, verdict.inverted);
 
   const V half = Constant(0.5);

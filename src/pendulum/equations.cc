@@ -1,28 +1,31 @@
-// The equations of motion. Symbols: see pendulum/equations.h. Of a link: m mass (kg), l length (m),
-// c distance from joint to centre of mass (m), I moment of inertia about that centre (kg·m²).
+// The constants of a plant and the equations of motion of doubles. Of a link: m mass (kg), l length
+// (m), c distance from joint to centre of mass (m), I moment of inertia about that centre (kg·m²).
 #include "pendulum/equations.h"
 
 #include <cmath>
 
+#include "pendulum/dynamics.h"
+
 namespace upswing {
+
+MassMatrix Manipulator::Mass(double cos_q2) const { return dynamics::MassAt(*this, cos_q2); }
 
 ManipulatorTerms Manipulator::At(const PendulumState& s) const {
   const auto& [q1, q2, w1, w2] = s;
-  const double bs = b * std::sin(q2);
-  ManipulatorTerms t{Mass(std::cos(q2)), 0, 0, 0};
-  t.h1 = -bs * (2 * w1 + w2) * w2 + G1 * std::sin(q1) + G2 * std::sin(q1 + q2) + d1 * w1 +
-         DryFriction(f1, w1);
-  t.h2 = bs * w1 * w1 + G2 * std::sin(q1 + q2) + d2 * w2 + DryFriction(f2, w2);
-  t.energy = (t.M11 * w1 * w1 + 2 * t.M12 * w1 * w2 + t.M22 * w2 * w2) / 2 -
-             G1 * (1 + std::cos(q1)) - G2 * (1 + std::cos(q1 + q2));
+  const auto angles = dynamics::AnglesOf<double>({q1, q2});
+  const auto r = dynamics::NetTorque<true>(*this, angles, {w1, w2}, {0, 0});
+  ManipulatorTerms t{Mass(angles.c2), -r.one, -r.two, 0};
+  t.energy = (t.M11 * w1 * w1 + 2 * t.M12 * w1 * w2 + t.M22 * w2 * w2) / 2 - G1 * (1 + angles.c1) -
+             G2 * (1 + angles.c12());
   return t;
 }
 
 std::array<double, 2> Manipulator::Acceleration(const PendulumState& s,
                                                 const std::array<double, 2>& torque) const {
-  const ManipulatorTerms t = At(s);
-  const double r1 = torque[0] - t.h1, r2 = torque[1] - t.h2;
-  return {(t.M22 * r1 - t.M12 * r2) / t.det(), (t.M11 * r2 - t.M12 * r1) / t.det()};
+  const auto angles = dynamics::AnglesOf<double>({s.q1, s.q2});
+  const auto r = dynamics::NetTorque<true>(*this, angles, {s.w1, s.w2}, {torque[0], torque[1]});
+  const auto a = dynamics::AccelerationUnder(r, Mass(angles.c2));
+  return {a.one, a.two};
 }
 
 Manipulator ManipulatorOf(const Plant& plant) {

@@ -167,7 +167,7 @@ TEST(Manipulator, IsWhatTheClosedFormSteps) {
     const X got{batch.q1[0], batch.q2[0], batch.w1[0], batch.w2[0]};
     // The formulas of det M differ: links of very different length lose digits in M11 M22 - M12².
     const MassMatrix M = manipulator.Mass(std::cos(s.q2));
-    const double lost = std::max(1.0, M.M11 * M.M22 / M.det() / 100);
+    const double lost = std::max(1.0, M.M11 * M.M22 / M.det / 100);
     for (size_t i = 0; i < 4; ++i) {
       const double expected = x[i] + h / 6 * (k1[i] + 2 * k2[i] + 2 * k3[i] + k4[i]);
       const double scale = 1 + std::abs(expected) + std::abs(h * k1[2]) + std::abs(h * k1[3]);

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "pendulum/regressor.h"
+
 namespace upswing {
 namespace {
 
@@ -47,20 +49,25 @@ void Correct(const Row& h, double y, double noise, std::span<double> x, std::spa
   }
 }
 
-/// Factors of the constants in M q̈ + c + g + d q̇, which is linear in them, for both joints in the
-/// middle of a control period.
-struct Factors {
+/// The equations of both joints in the middle of a control period: factors of the identified
+/// constants.
+struct MiddleEquations {
   Row one, two;
   double c2;  // cos q2
 
-  Factors(const PendulumState& from, const PendulumState& to) {
-    const double a1 = (to.w1 - from.w1) / kControlPeriod, a2 = (to.w2 - from.w2) / kControlPeriod;
-    const double w1 = (from.w1 + to.w1) / 2, w2 = (from.w2 + to.w2) / 2;
-    const double q1 = from.q1 + kControlPeriod / 2 * w1, q2 = from.q2 + kControlPeriod / 2 * w2;
-    const double s1 = std::sin(q1), s2 = std::sin(q2), s12 = std::sin(q1 + q2);
-    c2 = std::cos(q2);
-    one = {a1, a1 + a2, c2 * (2 * a1 + a2) - s2 * (2 * w1 + w2) * w2, s1, s12, w1, 0};
-    two = {0, a1 + a2, c2 * a1 + s2 * w1 * w1, 0, s12, 0, w2};
+  MiddleEquations(const PendulumState& from, const PendulumState& to) {
+    const dynamics::JointPair<double> w{(from.w1 + to.w1) / 2, (from.w2 + to.w2) / 2};
+    const auto angles = dynamics::AnglesOf<double>(
+        {from.q1 + kControlPeriod / 2 * w.one, from.q2 + kControlPeriod / 2 * w.two});
+    c2 = angles.c2;
+    const Factors factors = Regressor(
+        angles, w, {(to.w1 - from.w1) / kControlPeriod, (to.w2 - from.w2) / kControlPeriod});
+    for (size_t k = 0; k < kIdentified.size(); ++k) {
+      const auto all = std::ranges::find(kManipulatorConstants, kIdentified[k]);
+      const auto column = static_cast<size_t>(all - kManipulatorConstants.begin());
+      one[k] = factors[0][column];
+      two[k] = factors[1][column];
+    }
   }
 };
 
@@ -143,25 +150,25 @@ void Identifier::Update(int env, double torque, const PendulumState& measured, d
   // True constants θ satisfy Φ θ = τ. Estimated ones leave the residual Φ θ' - τ, and so a wrong
   // acceleration: M⁻¹ (Φ θ' - τ) h is the measured minus the predicted change. The prediction is
   // exact; Φ as its derivative is nearly so.
-  Factors factors(before, measured);
-  const MassMatrix M = estimated.Mass(factors.c2);
-  const double scale = -kControlPeriod / M.det();
+  MiddleEquations equations(before, measured);
+  const MassMatrix M = estimated.Mass(equations.c2);
+  const double scale = -kControlPeriod / M.det;
   for (size_t k = 0; k < x.size(); ++k) {
     const double usual = nominal_.*kIdentified[k];
-    const double f1 = factors.one[k] * usual, f2 = factors.two[k] * usual;
-    factors.one[k] = scale * (M.M22 * f1 - M.M12 * f2);
-    factors.two[k] = scale * (M.M11 * f2 - M.M12 * f1);
+    const double f1 = equations.one[k] * usual, f2 = equations.two[k] * usual;
+    equations.one[k] = scale * (M.M22 * f1 - M.M12 * f2);
+    equations.two[k] = scale * (M.M11 * f2 - M.M12 * f1);
   }
   const auto at = [&](const Row& h) {
     return std::inner_product(x.begin(), x.end(), h.begin(), 0.0);
   };
-  const double y1 = measured.w1 - predicted.w1 + at(factors.one);
-  const double y2 = measured.w2 - predicted.w2 + at(factors.two);
+  const double y1 = measured.w1 - predicted.w1 + at(equations.one);
+  const double y2 = measured.w2 - predicted.w2 + at(equations.two);
   for (int k = 0; k < kConstants; ++k) {
     if (nominal_.*kIdentified[static_cast<size_t>(k)] > 0) P[At(k, k)] += kDrift * kDrift;
   }
-  Correct(factors.one, y1, noise, x, P);
-  Correct(factors.two, y2, noise, x, P);
+  Correct(equations.one, y1, noise, x, P);
+  Correct(equations.two, y2, noise, x, P);
   for (double& share : x) share = std::clamp(share, kLeast, kMost);
   const Manipulator now = estimate(env);
   constexpr size_t kB = 2;
@@ -182,12 +189,7 @@ void Identifier::Observe(int env, const PendulumState& s, std::span<float> numbe
   const Falling falling = FallingOf(plant, plant_, s);
   add(std::clamp(falling.delta, -1.0, 1.0));
   add(std::tanh(0.1 / falling.delta));
-  const double w12 = s.w1 + s.w2;
-  const double kinetic =
-      0.5 * (plant.J1 * s.w1 * s.w1 + plant.J2 * w12 * w12 + plant.a * s.w2 * s.w2) +
-      plant.b * std::cos(s.q2) * s.w1 * w12;
-  const double potential = -plant.G1 * std::cos(s.q1) - plant.G2 * std::cos(s.q1 + s.q2);
-  add((kinetic + potential) / (2 * (plant.G1 + plant.G2)) + 0.5);
+  add(plant.At(s).energy / (2 * (plant.G1 + plant.G2)) + 1);
   for (const double zeta : falling.zeta) add(zeta / (1 + std::abs(zeta)));
   add(std::clamp(falling.torque, -1.0, 1.0));
 }

@@ -22,11 +22,11 @@ FastestDecay DecayAt(const Manipulator& body, double cos_q2) {
   const MassMatrix M = body.Mass(cos_q2);
   const double D1 = Slope(body.d1, body.f1), D2 = Slope(body.d2, body.f2);
   // The eigenvalues of M⁻¹ D are real and at least 0.
-  const double r1 = M.M22 * D1 / M.det(), r2 = M.M11 * D2 / M.det();
-  const double half = (r1 + r2) / 2, product = D1 * D2 / M.det();
+  const double r1 = M.M22 * D1 / M.det, r2 = M.M11 * D2 / M.det;
+  const double half = (r1 + r2) / 2, product = D1 * D2 / M.det;
   const double rate = half + std::sqrt(std::max(0.0, half * half - product));
-  if (r1 > r2) return {rate, 1, M.det() / M.M22};
-  return {rate, 2, M.det() / M.M11};
+  if (r1 > r2) return {rate, 1, M.det / M.M22};
+  return {rate, 2, M.det / M.M11};
 }
 
 }  // namespace

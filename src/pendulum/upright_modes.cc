@@ -31,11 +31,11 @@ void SetPassiveJoint(const Manipulator& plant, int actuated_joint, UprightModes&
 
 UprightModes ModesOf(const Manipulator& plant, int actuated_joint) {
   const double G2 = plant.G2, d1 = plant.d1, d2 = plant.d2;
-  const auto [M11, M12, M22] = plant.Mass(1);
+  const auto [M11, M12, M22, det] = plant.Mass(1);
   // K(λ) = M λ² + D λ - G about upright; K(λ) y = 0 for a mode of rate λ. Its determinant is
   // k4 λ⁴ + k3 λ³ + k2 λ² + k1 λ + k0.
   const double G = plant.G1 + G2;
-  const double k4 = M11 * M22 - M12 * M12, k3 = M11 * d2 + M22 * d1;
+  const double k4 = det, k3 = M11 * d2 + M22 * d1;
   const double k2 = d1 * d2 - M11 * G2 - M22 * G + 2 * M12 * G2;
   const double k1 = -d1 * G2 - d2 * G, k0 = plant.G1 * G2;
 
@@ -72,7 +72,7 @@ Falling FallingOf(const Manipulator& plant, const Plant& motor, const PendulumSt
   const auto joint = static_cast<int>(motor.actuated_joint);
   Falling falling{ModesOf(plant, joint), {}, 0};
   const double G2 = plant.G2, d1 = plant.d1, d2 = plant.d2, G = plant.G1 + G2;
-  const auto [M11, M12, M22] = plant.Mass(1);
+  const auto [M11, M12, M22, det] = plant.Mass(1);
   const std::array rates{falling.faster, falling.slower};
   // z = y' (M w + (M λ + D) q) grows as ż = λ z + y1 u, or y2 u of a motor at joint 2.
   const auto lean = Lean(s);

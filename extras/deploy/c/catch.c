@@ -1,5 +1,5 @@
 /* Whether the regulator catches, by simulation (LqrCatch in control/lqr_catch.h). */
-#include "regulator.c"
+#include "equations.c"
 
 /* d' P d; p (10): the upper triangle of P, row by row. */
 static inline float policy_cost(const float *p, const float *d) {
@@ -8,21 +8,15 @@ static inline float policy_cost(const float *p, const float *d) {
                  d[1] * (p[5] * d[2] + p[6] * d[3]) + p[8] * d[2] * d[3]);
 }
 
-/* The derivative of a deviation by time, under a torque: M(q) q'' = f. */
+/* The derivative of a deviation by time, under a torque. */
 static inline void policy_derivative(const float *d, float torque, float *rate) {
-  const float *c = policy_plant; /* J1, J2, coupling, moments of gravity, dampings, armature */
-  const float bc = c[2] * cosf(d[1]), bs = c[2] * sinf(d[1]);
-  const float m11 = c[0] + c[1] + 2.0f * bc, m12 = c[1] + bc, m22 = c[1] + c[7];
-  const float g2 = c[4] * sinf(d[0] + d[1]);
-  const float f1 = (POLICY_ACTUATED_JOINT == 1 ? torque : 0.0f) + bs * (2.0f * d[2] + d[3]) * d[3] +
-                   c[3] * sinf(d[0]) + g2 - c[5] * d[2];
-  const float f2 =
-      (POLICY_ACTUATED_JOINT == 2 ? torque : 0.0f) + g2 - bs * d[2] * d[2] - c[6] * d[3];
-  const float det = m11 * m22 - m12 * m12;
+  const policy_equations e = policy_equations_at(d);
+  const float r1 = (POLICY_ACTUATED_JOINT == 1 ? torque : 0.0f) - e.h1;
+  const float r2 = (POLICY_ACTUATED_JOINT == 2 ? torque : 0.0f) - e.h2;
   rate[0] = d[2];
   rate[1] = d[3];
-  rate[2] = (m22 * f1 - m12 * f2) / det;
-  rate[3] = (m11 * f2 - m12 * f1) / det;
+  rate[2] = (e.m22 * r1 - e.m12 * r2) / e.det;
+  rate[3] = (e.m11 * r2 - e.m12 * r1) / e.det;
 }
 
 /* One control period with the torque held: four Runge-Kutta steps. */
