@@ -141,7 +141,14 @@ std::optional<double> QuantumOf(Pieces pieces, int joint);
 struct Pairs {
   double n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
 
-  void Add(double a, double b) { n += 1, x += a, y += b, xx += a * a, xy += a * b, yy += b * b; }
+  void Add(double a, double b) {
+    n += 1;
+    x += a;
+    y += b;
+    xx += a * a;
+    xy += a * b;
+    yy += b * b;
+  }
   double Sxx() const { return xx - x * x / n; }
   double Sxy() const { return xy - x * y / n; }
   double Syy() const { return yy - y * y / n; }

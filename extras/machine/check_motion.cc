@@ -77,10 +77,15 @@ void CheckGrowth(const MachineLog& piece, const Reporter& report) {
   const bool grows = before.height < kHeight && after.height > kGrow * (before.height + kRest) &&
                      after.speed > 2 * before.speed + 0.3;
   if (!grows) return;
-  const bool known = !piece.commanded.empty() || !piece.measured.empty();
-  report(known ? Severity::kFault : Severity::kWarning,
+  Severity severity = Severity::kFault;
+  const char* torque = "without torque";
+  if (piece.commanded.empty() && piece.measured.empty()) {
+    severity = Severity::kWarning;
+    torque = "and the log has no torque";
+  }
+  report(severity,
          fmt::format("the swing grows from {:.2g} to {:.2g} rad/s {}", before.speed, after.speed,
-                     known ? "without torque" : "and the log has no torque"),
+                     torque),
          RangeOf(piece, rows.first, rows.last),
          {{"speed_before", before.speed}, {"speed_after", after.speed}});
 }
@@ -119,13 +124,14 @@ bool CheckRest(const MachineLog& piece, const Reporter& report) {
     return hangs(link) || std::abs(Wrapped(link - std::numbers::pi)) < kUpright;
   });
   const bool known = !piece.commanded.empty();
-  report(
-      known && !upright ? Severity::kFault : Severity::kWarning,
-      fmt::format("rests at {:.3g} and {:.3g} rad {}, {}: suspect another zero (key hanging) or an "
-                  "angle against the vertical (key absolute)",
-                  q1, q2, known ? "without torque" : "and the log has no torque",
-                  upright ? "with a link upright" : "where gravity moves a link"),
-      RangeOf(piece, rest.first, rest.last));
+  const Severity severity = known && !upright ? Severity::kFault : Severity::kWarning;
+  const char* torque = known ? "without torque" : "and the log has no torque";
+  const char* place = upright ? "with a link upright" : "where gravity moves a link";
+  report(severity,
+         fmt::format("rests at {:.3g} and {:.3g} rad {}, {}: suspect another zero (key hanging) or "
+                     "an angle against the vertical (key absolute)",
+                     q1, q2, torque, place),
+         RangeOf(piece, rest.first, rest.last));
   return true;
 }
 
@@ -188,7 +194,9 @@ void CheckMotion(Pieces pieces, Findings& findings) {
   CheckNoMotion(pieces, findings);
   const Reporter report{findings, Aspect::kMotion};
   for (const MachineLog& piece : pieces) CheckGrowth(piece, report);
-  (void)std::ranges::any_of(pieces, [&](const auto& piece) { return CheckRest(piece, report); });
+  for (const MachineLog& piece : pieces) {
+    if (CheckRest(piece, report)) break;  // one finding is enough
+  }
   // The equations of motion do not hold for an encoder that sticks.
   if (!IsStuck(findings, 0) && !IsStuck(findings, 1)) CheckEquations(pieces, findings);
 }

@@ -244,6 +244,11 @@ struct WholeLog {
   std::vector<double> piece;  // empty: a single piece
 };
 
+/// Takes the values of a column out of a table that has it.
+std::vector<double> TakeValues(std::vector<CsvColumn>& table, const std::string& name) {
+  return std::move(std::ranges::find(table, name, &CsvColumn::name)->values);
+}
+
 WholeLog ReadRows(std::string_view csv, const LogColumns& columns, const std::string& where) {
   if (columns.velocity[0].name.empty() != columns.velocity[1].name.empty()) {
     throw BadInput(
@@ -254,18 +259,17 @@ WholeLog ReadRows(std::string_view csv, const LogColumns& columns, const std::st
   ForEachColumn(columns, [&](const auto&, const LogColumn& column, const char*) {
     if (!column.name.empty()) names.push_back(column.name);
   });
-  std::vector<CsvColumn> table = ReadCsv(csv, names, where);  // in the order of the names
-  auto next = table.begin();
+  std::vector<CsvColumn> table = ReadCsv(csv, names, where);
   WholeLog whole;
-  if (!columns.piece.empty()) whole.piece = std::move(next++->values);
-  whole.log.time = std::move(next++->values);
+  if (!columns.piece.empty()) whole.piece = TakeValues(table, columns.piece);
+  whole.log.time = TakeValues(table, columns.time.name);
   Scale(whole.log.time, columns.time, /*is_time=*/true, where);
   for (const JointQuantity& q : kJointQuantities) {
     std::vector<Joints>& values = whole.log.*q.values;
     for (int joint = 0; joint < 2; ++joint) {
       const LogColumn& column = (columns.*q.columns)[joint];
       if (column.name.empty()) continue;
-      std::vector<double>& numbers = next++->values;
+      std::vector<double> numbers = TakeValues(table, column.name);
       Scale(numbers, column, /*is_time=*/false, where);
       values.resize(numbers.size());
       for (size_t row = 0; row < numbers.size(); ++row) values[row][joint] = numbers[row];
