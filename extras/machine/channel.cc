@@ -24,7 +24,7 @@
 namespace upswing::machine {
 namespace {
 
-constexpr int kLeastBaud = 1200;
+constexpr int kLeastBaud = 1200, kMostBaud = 1 << 30;
 
 Error LinkError(const std::string& place, const std::string& what, int error_number) {
   return BadInput(
@@ -42,13 +42,20 @@ int ParsePort(std::string_view text, const std::string& link, int lowest) {
 
 LinkAddress ParseSerial(std::string place, const std::string& link) {
   LinkAddress address{LinkAddress::Kind::kSerial, std::move(place), kUsualBaud};
+  bool is_valid = true;
   const size_t colon = address.place.rfind(':');
   if (colon != std::string::npos) {
     const auto rate = ParseInteger(address.place.substr(colon + 1));
-    address.number = rate ? static_cast<int>(std::clamp<int64_t>(*rate, 0, 1 << 30)) : 0;
     address.place.resize(colon);
+    if (!rate || *rate < kLeastBaud) {
+      is_valid = false;
+    } else if (*rate > kMostBaud) {
+      address.number = kMostBaud;
+    } else {
+      address.number = static_cast<int>(*rate);
+    }
   }
-  if (address.place.empty() || address.number < kLeastBaud) {
+  if (!is_valid || address.place.empty()) {
     throw BadInput(Concat("--link ", Printable(link), ": expected serial:DEVICE[:BAUD] with BAUD ",
                           kLeastBaud, " or more, such as ", kUsualBaud));
   }
@@ -80,8 +87,9 @@ std::string UdpName(const sockaddr_storage& address, socklen_t size) {
 /// A UDP socket that is bound to the address, or connected to it.
 Descriptor OpenUdp(const LinkAddress& address, bool binds) {
   const std::string place = Concat(address.place, ":", address.number);
-  addrinfo hints{}, *found = nullptr;
+  addrinfo hints{};
   hints.ai_socktype = SOCK_DGRAM;
+  addrinfo* found = nullptr;
   const int failed =
       getaddrinfo(address.place.c_str(), std::to_string(address.number).c_str(), &hints, &found);
   if (failed != 0) {
@@ -96,6 +104,13 @@ Descriptor OpenUdp(const LinkAddress& address, bool binds) {
   if (result != 0)
     throw LinkError("udp:" + place, binds ? "cannot listen" : "cannot connect", errno);
   return fd;
+}
+
+/// Whether the device at the other end of a terminal is gone.
+bool HasHungUp(int fd) {
+  pollfd event{fd, POLLIN, 0};
+  if (poll(&event, 1, 0) <= 0) return false;
+  return (event.revents & (POLLHUP | POLLERR | POLLNVAL)) != 0;
 }
 
 }  // namespace
@@ -149,11 +164,11 @@ Channel Channel::Connect(const LinkAddress& address) {
   const std::string name = "serial:" + address.place;
   Descriptor fd(open(address.place.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
   if (fd.get() < 0) {
-    const char* what = errno == EACCES  ? "cannot open; `sudo usermod -aG dialout $USER` and a new "
-                                          "login permit it"
-                       : errno == EBUSY ? "another program uses it"
-                                        : "cannot open";
-    throw LinkError(name, what, errno);
+    const int error = errno;
+    std::string what = "cannot open";
+    if (error == EACCES) what += "; `sudo usermod -aG dialout $USER` and a new login permit it";
+    if (error == EBUSY) what = "another program uses it";
+    throw LinkError(name, what, error);
   }
   MakeRaw(fd.get(), address.number, name);
   ioctl(fd.get(), TIOCEXCL);  // no second program may write to the motors
@@ -183,11 +198,14 @@ Channel Channel::Listen(const LinkAddress& address) {
 }
 
 bool Channel::Send(std::span<const std::byte> bytes) {
-  // A socket without a peer sends to what it is connected to, else nowhere.
-  const auto* peer = peer_size_ > 0 ? reinterpret_cast<const sockaddr*>(&peer_) : nullptr;
-  const ssize_t sent =
-      datagrams_ ? sendto(fd_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL, peer, peer_size_)
-                 : write(fd_.get(), bytes.data(), bytes.size());
+  ssize_t sent = 0;
+  if (datagrams_) {
+    // A socket without a peer sends to what it is connected to, else nowhere.
+    const auto* peer = peer_size_ > 0 ? reinterpret_cast<const sockaddr*>(&peer_) : nullptr;
+    sent = sendto(fd_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL, peer, peer_size_);
+  } else {
+    sent = write(fd_.get(), bytes.data(), bytes.size());
+  }
   return sent == static_cast<ssize_t>(bytes.size());
 }
 
@@ -200,16 +218,17 @@ size_t Channel::Receive(std::span<std::byte> buffer) {
   } else {
     got = read(fd_.get(), buffer.data(), buffer.size());
   }
+  if (got > 0) return static_cast<size_t>(got);
   // A device that was pulled out hangs up. Errors such as a refused packet are ignored, because the
   // age of the last reading shows them.
-  if (!datagrams_ && got <= 0 && other_end_.get() < 0) {
-    pollfd hangs{fd_.get(), POLLIN, 0};
+  const bool is_device = !datagrams_ && other_end_.get() < 0;
+  if (is_device) {
     const bool failed = got < 0 && errno != EAGAIN && errno != EINTR;
-    if (failed || (poll(&hangs, 1, 0) > 0 && (hangs.revents & (POLLHUP | POLLERR | POLLNVAL)))) {
+    if (failed || HasHungUp(fd_.get())) {
       throw Failure(Concat("--link ", Printable(name_), ": disconnected"));
     }
   }
-  return got > 0 ? static_cast<size_t>(got) : 0;
+  return 0;
 }
 
 void Channel::Wait(double seconds) const {

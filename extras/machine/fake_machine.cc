@@ -126,7 +126,9 @@ std::optional<Frame> FakeMachine::Answer(const Frame& command, double now) {
   const bool enabled = asked && !locked_;
   if (enabled && enabled_since_ == MachineFaults::kNever) enabled_since_ = now;
   Joints torque{};
-  for (int j = 0; enabled && j < 2; ++j) torque[j] = std::clamp(command.torque[j], -limit_, limit_);
+  if (enabled) {
+    for (int j = 0; j < 2; ++j) torque[j] = std::clamp(command.torque[j], -limit_, limit_);
+  }
   Apply(torque);
   const MachineReading reading = Measure(now);
   ++sequence_;
@@ -152,7 +154,7 @@ void Serve(Channel& channel, FakeMachine& machine, const LineFaults& faults, uin
   for (double next_report = 1; !stop();) {
     const double next = std::min(to_machine.next(), from_machine.next());
     channel.Wait(std::clamp(next - clock(), 0.0, kTick));
-    for (size_t got = 0; (got = channel.Receive(buffer)) > 0;) {
+    while (const size_t got = channel.Receive(buffer)) {
       reader.Add(std::span(buffer).first(got));
       while (const auto frame = reader.Next()) {
         channel.AnswerSender();

@@ -71,24 +71,30 @@ void FrameReader::Add(std::span<const std::byte> bytes) {
     skipped_ += static_cast<int64_t>(bytes.size());
     return;
   }
-  const size_t excess = std::max(size_ + bytes.size(), buffer_.size()) - buffer_.size();
-  skipped_ += static_cast<int64_t>(excess);
-  const size_t of_buffer = std::min(excess, size_);
-  Skip(of_buffer);
-  bytes = bytes.subspan(excess - of_buffer);
+  if (bytes.size() > buffer_.size()) {
+    skipped_ += static_cast<int64_t>(bytes.size() - buffer_.size());
+    bytes = bytes.last(buffer_.size());
+  }
+  const size_t room = buffer_.size() - size_;
+  if (bytes.size() > room) {
+    const size_t oldest = bytes.size() - room;
+    skipped_ += static_cast<int64_t>(oldest);
+    Skip(oldest);
+  }
   std::ranges::copy(bytes, buffer_.begin() + static_cast<std::ptrdiff_t>(size_));
   size_ += bytes.size();
 }
 
 std::optional<Frame> FrameReader::Next() {
-  size_t begin = 0;
   std::optional<Frame> frame;
-  for (; size_ - begin >= kFrameBytes; ++begin) {
+  size_t begin = 0;
+  while (!frame && size_ - begin >= kFrameBytes) {
     frame = Decode(std::span(buffer_).subspan(begin).first<kFrameBytes>());
-    if (frame) break;
+    if (!frame) ++begin;
   }
   skipped_ += static_cast<int64_t>(begin);
-  Skip(begin + (frame ? kFrameBytes : 0));
+  Skip(begin);
+  if (frame) Skip(kFrameBytes);
   return frame;
 }
 

@@ -42,7 +42,9 @@ void TwinLink::WaitUntil(double time) {
 std::optional<LinkReading> TwinLink::Exchange(const Joints& torque, bool enabled,
                                               double /*until*/) {
   Joints applied{};
-  for (size_t j = 0; enabled && j < 2; ++j) applied[j] = std::clamp(torque[j], -limit_, limit_);
+  if (enabled) {
+    for (size_t j = 0; j < 2; ++j) applied[j] = std::clamp(torque[j], -limit_, limit_);
+  }
   machine_.Command(applied);
   return LinkReading{{machine_.Read(), machine_.time()}, machine_.time(), false};
 }
@@ -68,8 +70,8 @@ bool LinkProtocol::IsNew(const Frame& frame) {
   const bool first = counts_.received == 0;
   const uint32_t before = filter_.last();
   const auto verdict = filter_.Judge(frame.sequence);
-  counts_.duplicates += verdict == SequenceFilter::Verdict::kDuplicate ? 1 : 0;
-  counts_.old += verdict == SequenceFilter::Verdict::kOld ? 1 : 0;
+  if (verdict == SequenceFilter::Verdict::kDuplicate) ++counts_.duplicates;
+  if (verdict == SequenceFilter::Verdict::kOld) ++counts_.old;
   if (verdict != SequenceFilter::Verdict::kNew) return false;
   ++counts_.received;
   if (!first) counts_.lost += frame.sequence - before - 1;
@@ -119,7 +121,7 @@ void ChannelLink::WaitUntil(double time) {
 }
 
 std::optional<LinkReading> ChannelLink::Exchange(const Joints& torque, bool enabled, double until) {
-  sent_ += channel_.Send(protocol_.Command(torque, enabled, Now())) ? 1 : 0;
+  if (channel_.Send(protocol_.Command(torque, enabled, Now()))) ++sent_;
   std::optional<LinkReading> newest;
   std::array<std::byte, 1024> buffer;
   do {
