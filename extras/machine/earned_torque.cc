@@ -66,8 +66,9 @@ void EarnedTorque::See(const Cycle& cycle, const Joints& sent) {
       joint.step = std::min(joint.step, change);
     }
     joint.angle = cycle.angle[j];
-    joint.lowest = has_seen_ ? std::min(joint.lowest, joint.angle) : joint.angle;
-    joint.highest = has_seen_ ? std::max(joint.highest, joint.angle) : joint.angle;
+    if (!has_seen_) joint.lowest = joint.highest = joint.angle;
+    joint.lowest = std::min(joint.lowest, joint.angle);
+    joint.highest = std::max(joint.highest, joint.angle);
     if (!has_seen_ || std::abs(joint.angle - joint.shown) > kVisibleSteps * joint.step) {
       joint.shown = joint.angle;
       joint.other = cycle.angle[1 - j];
@@ -79,15 +80,19 @@ void EarnedTorque::See(const Cycle& cycle, const Joints& sent) {
   }
   if (!has_seen_) window_begin_ = cycle.time;
   has_seen_ = true;
-  if (cycle.time < window_begin_ + kQuietSeconds || phase_ != Phase::kRest) return;
+  if (phase_ == Phase::kRest && cycle.time >= window_begin_ + kQuietSeconds) JudgeRest();
+}
+
+void EarnedTorque::JudgeRest() {
   quiet_ = true;
   const double angle = PredictsPulse() ? kPredictedQuietAngle : kQuietAngle;
   for (Joint& joint : joints_) {
     joint.range = joint.highest - joint.lowest;
-    quiet_ = quiet_ && joint.range <= std::max(kVisibleSteps * joint.step, angle);
+    const bool rests = joint.range <= std::max(kVisibleSteps * joint.step, angle);
+    if (!rests) quiet_ = false;
     joint.lowest = joint.highest = joint.angle;
   }
-  window_begin_ = cycle.time;
+  window_begin_ = seen_.time;
 }
 
 void EarnedTorque::MoveBlock(double torque) {
@@ -145,20 +150,25 @@ Complaint EarnedTorque::JudgeJoint(int j) {
   Joint& joint = joints_[j];
   if (std::abs(joint.angle - joint.start) > Visible(joint)) {
     joint.answered = true;
-    return j == motor_ ? JudgeDirection(j) : Complaint{};
+    if (j != motor_) return {};
+    return JudgeDirection(j);
   }
-  const Joint& pushed = joints_[motor_];
+  const auto number = static_cast<double>(j + 1);
+  if (j == motor_) {
+    if (at_limit_ <= kLimitSeconds) return {};
+    return {
+        "joint %.0f does not answer its motor: no motion with up to %.3g N·m. Are the motor and "
+        "the encoder connected, does anything hold the joint?",
+        {number, amplitude_}};
+  }
   // Once it moves, the motor's joint drags the other one along.
+  const Joint& pushed = joints_[motor_];
   const bool travelled = std::abs(pushed.angle - pushed.start) > kLargestTravel;
-  const bool lacks =
-      j == motor_ ? at_limit_ > kLimitSeconds : travelled || at_limit_ > kDragSeconds;
-  if (!lacks) return {};
-  return {j == motor_
-              ? "joint %.0f does not answer its motor: no motion with up to %.3g N·m. Are the "
-                "motor and the encoder connected, does anything hold the joint?"
-              : "joint %.0f does not answer: no motion after the other one has turned, with "
-                "up to %.3g N·m. Is its encoder connected, does anything hold the joint?",
-          {static_cast<double>(j + 1), amplitude_}};
+  if (!travelled && at_limit_ <= kDragSeconds) return {};
+  return {
+      "joint %.0f does not answer: no motion after the other one has turned, with up to %.3g N·m. "
+      "Is its encoder connected, does anything hold the joint?",
+      {number, amplitude_}};
 }
 
 /// Judges the first visible motion of the motor's joint, without a twin.
@@ -205,7 +215,11 @@ Complaint EarnedTorque::JudgeRun() {
     if (PredictsRun()) {
       const double least =
           kDeviations * e.deviation[j] + (kVisibleSteps + 1) * joint.step + kLeastUnseen;
-      joint.unseen = std::abs(e.unseen[j]) > least ? joint.unseen + 1 : 0;
+      if (std::abs(e.unseen[j]) > least) {
+        ++joint.unseen;
+      } else {
+        joint.unseen = 0;
+      }
       if (joint.unseen < kUnseenReadings) continue;
       return {"joint %.0f: the encoder sticks, or the joint is held: the twin moves by %.3g rad",
               {number, e.unseen[j]}};

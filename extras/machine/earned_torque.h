@@ -105,6 +105,8 @@ class EarnedTorque {
   /// Least change of an angle that shows a motion, rad.
   double Visible(const Joint& joint) const;
   void MoveBlock(double torque);
+  /// At the end of a window of readings, judges whether the links have rested in it.
+  void JudgeRest();
   Complaint JudgeJoint(int j);
   Complaint JudgeShare(int j);
   Complaint JudgeDirection(int j);

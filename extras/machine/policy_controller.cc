@@ -32,7 +32,8 @@ class PolicyController {
       builder_.Next(0, plant, {state, torque_}, before_, torque_, obs_);
     }
     policy_->policy->Act({obs_.data(), 1, policy_->policy->obs_size()}, {&torque_, 1, 1}, *memory_);
-    return torque_ = std::clamp(torque_, -plant.torque_limit, +plant.torque_limit);
+    torque_ = std::clamp(torque_, -plant.torque_limit, +plant.torque_limit);
+    return torque_;
   }
 
  private:

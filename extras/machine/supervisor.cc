@@ -105,9 +105,9 @@ void Supervisor::Report(const Complaint& complaint) {
   reason_ = line.data();
 }
 
-LoopState Supervisor::Fail(const Complaint& complaint) {
+void Supervisor::Fail(const Complaint& complaint) {
   Report(complaint);
-  return state_ = LoopState::kFault;
+  state_ = LoopState::kFault;
 }
 
 void Supervisor::Brake(const CycleFacts& facts) {
@@ -124,9 +124,10 @@ bool Supervisor::CheckVelocity(Joint& joint, double change, double shortest, dou
   // The mean velocity between two measurements differs by half of the acceleration's effect from
   // the velocity at each of them.
   const double differs = kHardest * longest / 2;
-  const double fastest = std::min(joint.fastest + differs, most / (most > 0 ? shortest : longest));
-  const double slowest =
-      std::max(joint.slowest - differs, least / (least < 0 ? shortest : longest));
+  const double fastest_mean = most > 0 ? most / shortest : most / longest;
+  const double slowest_mean = least < 0 ? least / shortest : least / longest;
+  const double fastest = std::min(joint.fastest + differs, fastest_mean);
+  const double slowest = std::max(joint.slowest - differs, slowest_mean);
   joint.fastest = fastest + differs;
   joint.slowest = slowest - differs;
   return slowest <= fastest;
@@ -185,8 +186,9 @@ Complaint Supervisor::CheckReading(const CycleFacts& facts) {
       return {"joint %.0f: the encoder saturates at %.4g rad", {joint, facts.angle[j]}};
     }
   }
-  if (facts.locked && MayDrive(state_))
+  if (facts.locked && MayDrive(state_)) {
     return {"the machine's watchdog has switched its motors off"};
+  }
   return CheckMotion(facts);
 }
 
@@ -195,8 +197,9 @@ Complaint Supervisor::CheckEstimate(const CycleFacts& facts) const {
   if (!std::isfinite(q1 + q2 + w1 + w2 + facts.energy)) {
     return {"the estimate of the state is not finite"};
   }
+  if (!facts.fresh) return {};
   const Joints q{q1, q2}, w{w1, w2};
-  for (size_t j = 0; j < 2 && facts.fresh; ++j) {
+  for (size_t j = 0; j < 2; ++j) {
     const double error = facts.angle[j] - facts.zero[j] - q[j];
     if (Within(error, kLargestError + std::abs(w[j]) * (facts.age + config_.period))) continue;
     return {"joint %.0f: the estimate is %.4g rad from the reading",
@@ -245,7 +248,7 @@ Complaint Supervisor::CheckLimits(const CycleFacts& facts) const {
   return {};
 }
 
-LoopState Supervisor::GoOnBraking(const CycleFacts& facts) {
+void Supervisor::GoOnBraking(const CycleFacts& facts) {
   const double velocity = std::max(std::abs(facts.state.w1), std::abs(facts.state.w2));
   // The energy of an estimate is noisy, and the last torques of the controller still act at first.
   energy_ += config_.period / kEnergyTime * (facts.energy - energy_);
@@ -253,15 +256,15 @@ LoopState Supervisor::GoOnBraking(const CycleFacts& facts) {
   if (!Within(velocity, kBrakeShare * config_.limits.velocity) ||
       !Within(facts.energy, kBrakeShare * config_.limits.energy) ||
       energy_ > kEnergyShare * least_energy_ + kEnergyRise) {
-    return Fail({"braking does not slow the links: %.4g rad/s", {velocity}});
+    Fail({"braking does not slow the links: %.4g rad/s", {velocity}});
+    return;
   }
   if (!AtRest(facts.state)) slow_since_ = facts.time;
-  if (facts.time - slow_since_ < kSlowSeconds &&
-      facts.time - since_ < config_.limits.brake_seconds) {
-    return LoopState::kBraking;
-  }
+  const bool is_moving = facts.time - slow_since_ < kSlowSeconds;
+  const bool may_go_on = facts.time - since_ < config_.limits.brake_seconds;
+  if (is_moving && may_go_on) return;
   ended_ = true;
-  return reason_.empty() ? LoopState::kIdle : LoopState::kFault;
+  state_ = reason_.empty() ? LoopState::kIdle : LoopState::kFault;
 }
 
 bool Supervisor::AtStart(const PendulumState& s) const {
@@ -307,37 +310,58 @@ bool Supervisor::CheckAge(double age) {
 
 LoopState Supervisor::Step(const CycleFacts& facts) {
   if (ended()) return state_;
-  readings_ = facts.fresh ? readings_ + 1 : readings_;
-  if (state_ == LoopState::kIdle && !facts.fresh) readings_ = 0;
   if (facts.fresh) {
-    if (const Complaint complaint = CheckReading(facts)) return Fail(complaint);
+    ++readings_;
+  } else if (state_ == LoopState::kIdle) {
+    readings_ = 0;
+  }
+  if (facts.fresh) {
+    if (const Complaint complaint = CheckReading(facts)) {
+      Fail(complaint);
+      return state_;
+    }
     earned_.See({facts.read_at, facts.angle, facts.expected}, torque_);
   }
   if (!CheckAge(facts.age)) return state_;
   if (state_ != LoopState::kIdle) {
-    if (const Complaint complaint = CheckSlip(facts)) return Fail(complaint);
+    if (const Complaint complaint = CheckSlip(facts)) {
+      Fail(complaint);
+      return state_;
+    }
   }
   if (state_ == LoopState::kIdle || state_ == LoopState::kArmed) {
     Wait(facts);
     return state_;
   }
-  if (const Complaint complaint = CheckEstimate(facts)) return Fail(complaint);
-  if (facts.fresh) {
-    if (const Complaint complaint = CheckResponse()) return Fail(complaint);
+  Drive(facts);
+  return state_;
+}
+
+void Supervisor::Drive(const CycleFacts& facts) {
+  if (const Complaint complaint = CheckEstimate(facts)) {
+    Fail(complaint);
+    return;
   }
-  if (state_ == LoopState::kBraking) return state_ = GoOnBraking(facts);
-  const Complaint complaint = CheckLimits(facts);
-  if (complaint) {
+  if (facts.fresh) {
+    if (const Complaint complaint = CheckResponse()) {
+      Fail(complaint);
+      return;
+    }
+  }
+  if (state_ == LoopState::kBraking) {
+    GoOnBraking(facts);
+    return;
+  }
+  if (const Complaint complaint = CheckLimits(facts)) {
     Report(complaint);
     beyond_limit_ = true;
-  }
-  if (complaint || facts.stop) {
+    Brake(facts);
+  } else if (facts.stop) {
     Brake(facts);
   } else if (state_ == LoopState::kProbing && earned_.proven()) {
     state_ = LoopState::kArmed;
     since_ = facts.time;
   }
-  return state_;
 }
 
 /// Damping by the least of the measured and the estimated velocities, where all have the same sign.
@@ -348,7 +372,12 @@ Joints Supervisor::BrakeTorque(const CycleFacts& facts) const {
   Joints torque{};
   for (size_t j = 0; j < 2; ++j) {
     const auto [least, most] = std::minmax({joints_[j].rate, now[j], ahead[j]});
-    const double velocity = least > 0 ? least : most < 0 ? most : 0;
+    double velocity = 0;
+    if (least > 0) {
+      velocity = least;
+    } else if (most < 0) {
+      velocity = most;
+    }
     torque[j] = -config_.limits.brake_damping * velocity;
   }
   return torque;
@@ -368,7 +397,7 @@ Joints Supervisor::Torque(const Joints& controller, const CycleFacts& facts) {
     const double limit = config_.motor_limit[j];
     torque_[j] = std::clamp(wanted[j], -limit, limit);
   }
-  clipped_ += torque_ != controller && state_ == LoopState::kRunning ? 1 : 0;
+  if (state_ == LoopState::kRunning && torque_ != controller) ++clipped_;
   return torque_;
 }
 

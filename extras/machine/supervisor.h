@@ -104,7 +104,7 @@ class Supervisor {
   /// Sets the reason, unless there is one.
   void Report(const Complaint& complaint);
   /// Reports a complaint and switches the motors off.
-  LoopState Fail(const Complaint& complaint);
+  void Fail(const Complaint& complaint);
   void Brake(const CycleFacts& facts);
   Complaint CheckReading(const CycleFacts& facts);
   Complaint CheckMotion(const CycleFacts& facts);
@@ -112,10 +112,12 @@ class Supervisor {
   Complaint CheckSlip(const CycleFacts& facts) const;
   Complaint CheckResponse();
   Complaint CheckLimits(const CycleFacts& facts) const;
-  LoopState GoOnBraking(const CycleFacts& facts);
+  void GoOnBraking(const CycleFacts& facts);
   Joints BrakeTorque(const CycleFacts& facts) const;
   bool AtStart(const PendulumState& s) const;
   void Wait(const CycleFacts& facts);
+  /// Checks and ends a cycle in which torques may act.
+  void Drive(const CycleFacts& facts);
 
   SupervisorConfig config_;
   LoopState state_ = LoopState::kIdle;

@@ -63,7 +63,8 @@ TrialController OnMachine(const ControllerMaker& make, const Twin& twin, Robot r
       const TimedReading reading{{in.angle, {}}, in.time};
       estimator->Update(in.time, sent, &reading);
       const PendulumState& s = estimator->ahead();
-      return sent = driver({in.time, {s.q1, s.q2}, {s.w1, s.w2}});
+      sent = driver({in.time, {s.q1, s.q2}, {s.w1, s.w2}});
+      return sent;
     };
   };
 }
