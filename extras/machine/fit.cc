@@ -68,6 +68,12 @@ struct Shot {
   int session;  // index
 };
 
+/// Normal equations of the constants in which the start state is eliminated.
+struct Reduced {
+  ConstantsMatrix H;
+  Constants g;
+};
+
 /// A window's part of the normal equations: start state x and constants c.
 struct Block {
   Matrix4d Hxx;
@@ -76,8 +82,8 @@ struct Block {
   ConstantsMatrix Hcc;
   Constants gc;
 
-  /// The parts H and g of the constants, after the elimination of the damped start state.
-  std::pair<ConstantsMatrix, Constants> Eliminate(double damping) const {
+  /// Eliminates the damped start state.
+  Reduced Eliminate(double damping) const {
     const Eigen::Matrix<double, kConstants, 4> half = Hxc.transpose() * Inverse(damping);
     return {Hcc - half * Hxc, gc - half * gx};
   }
@@ -131,9 +137,10 @@ class Problem {
       A.diagonal().array() += 1e-12;
       for (int i = 0; i < size(); ++i) {
         // A value that would leave its range stays at the limit.
-        const bool stays =
-            b(i) > 0 ? theta_(i) <= values_[i].range.low : theta_(i) >= values_[i].range.high;
-        if (stays) Forget(i, A, b);
+        const bool falls = b(i) > 0;
+        const bool stays_low = falls && theta_(i) <= values_[i].range.low;
+        const bool stays_high = !falls && theta_(i) >= values_[i].range.high;
+        if (stays_low || stays_high) Forget(i, A, b);
       }
       VectorXd theta = theta_ - A.ldlt().solve(b);
       for (int i = 0; i < size(); ++i) {
@@ -162,12 +169,12 @@ class Problem {
     const Evidence evidence = EvidenceOf(BlocksOf(Linearize()), Slopes(), 0);
     const MatrixXd first = FirstBetween();
     for (int i = 0; i < 200; ++i) {
-      const auto [change, inverse] = Solve(evidence);
+      const Solution solution = Solve(evidence);
       MatrixXd sum = first;
       for (const int s : seen_) {
         const std::vector<int> own = OwnOf(s);
-        const VectorXd difference = (theta_ + change)(own);
-        sum += difference * difference.transpose() + inverse(own, own);
+        const VectorXd difference = (theta_ + solution.change)(own);
+        sum += difference * difference.transpose() + solution.inverse(own, own);
       }
       SetBetween(sum / (std::ssize(seen_) + 1.0));
     }
@@ -180,14 +187,8 @@ class Problem {
     FitResult result;
     result.twin = TwinAt(theta_, -1);
     Covariances(shares, result.twin);
-    for (const int s : seen_) {
-      if (adapts_) break;
-      const Twin own = TwinAt(theta_, s);
-      Session& session = result.twin.sessions.emplace_back();
-      session.name = sessions_[s];
-      for (const Value& v : values_) {
-        if (v.session == s) session.values.emplace_back(v.name, NumberIn(own, v.name));
-      }
+    if (!adapts_) {
+      for (const int s : seen_) result.twin.sessions.push_back(SessionAt(s));
     }
     result.windows = windows();
     result.error = MedianError(shares, &Share::angle);
@@ -195,6 +196,17 @@ class Problem {
   }
 
  private:
+  /// The values of a session.
+  Session SessionAt(int index) const {
+    const Twin own = TwinAt(theta_, index);
+    Session session;
+    session.name = sessions_[index];
+    for (const Value& v : values_) {
+      if (v.session == index) session.values.emplace_back(v.name, NumberIn(own, v.name));
+    }
+    return session;
+  }
+
   static double NumberIn(Twin twin, const std::string& name) {
     return OptionsOf(twin).Get(name)->number();
   }
@@ -421,11 +433,11 @@ class Problem {
     constexpr int kInARow = 6;
     VectorXd score = VectorXd::Zero(size());
     for (int w = 0; w < windows(); ++w) {
-      const auto [H_w, g_w] = blocks[w].Eliminate(damping);
-      H[shots_[w].session] += H_w;
-      score += slopes[shots_[w].session].transpose() * g_w;
-      if (w + 1 == windows() || shots_[w + 1].window.log != shots_[w].window.log ||
-          (w + 1) % kInARow == 0) {
+      const Reduced reduced = blocks[w].Eliminate(damping);
+      H[shots_[w].session] += reduced.H;
+      score += slopes[shots_[w].session].transpose() * reduced.g;
+      const bool ends_log = w + 1 == windows() || shots_[w + 1].window.log != shots_[w].window.log;
+      if (ends_log || (w + 1) % kInARow == 0) {
         e.g += score;
         e.scatter += score * score.transpose();
         score.setZero();
@@ -436,8 +448,12 @@ class Problem {
     return e;
   }
 
-  /// The solution of the normal equations: the change (n) of θ, and the inverse of the matrix.
-  std::pair<VectorXd, MatrixXd> Solve(const Evidence& e) const {
+  /// The solution of the normal equations.
+  struct Solution {
+    VectorXd change;   // (n) of θ
+    MatrixXd inverse;  // (n × n) of the matrix
+  };
+  Solution Solve(const Evidence& e) const {
     MatrixXd A = e.H + prior_;
     VectorXd b = e.g + prior_ * (theta_ - guess_);
     A.diagonal().array() += 1e-12;
@@ -456,7 +472,7 @@ class Problem {
   /// Sets the names and the covariance of the machine's values.
   void Covariances(const std::vector<Share>& shares, Twin& twin) const {
     const Evidence evidence = EvidenceOf(BlocksOf(shares), Slopes(), 0);
-    MatrixXd covariance = Solve(evidence).second;
+    MatrixXd covariance = Solve(evidence).inverse;
     if (!adapts_) {
       // The fit makes the scores smaller than those of the true values: MacKinnon and White (1985),
       // HC1, with blocks as observations, and without what the prior determines.
@@ -509,8 +525,10 @@ FitResult Fit(std::span<const MachineLog> logs, const Twin& first, const Structu
                           "; machine check finds units and rests"));
   }
   constexpr int kRounds = 3;
-  for (int round = 0; round == 0 || (round < kRounds && problem.EstimateBetween()); ++round) {
-    for (int i = 0; i < config.iterations && problem.Step(config.tolerance); ++i) {
+  for (int round = 0; round < kRounds; ++round) {
+    if (round > 0 && !problem.EstimateBetween()) break;
+    for (int i = 0; i < config.iterations; ++i) {
+      if (!problem.Step(config.tolerance)) break;
       if (progress) progress(round + (i + 1.0) / config.iterations, kRounds);
     }
   }
