@@ -30,21 +30,38 @@ const std::vector<std::string> kTaken{"step", "episode", "return", "length", "te
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
+/// 0 if x is 0, else 1; NaN if x is NaN.
+double Truth(double x) {
+  if (std::isnan(x)) return x;
+  return x != 0 ? 1 : 0;
+}
+
 /// a and b; NaN if one of them that decides is NaN.
 double And(double a, double b) {
   if (std::isnan(a) || a == 0) return a;
-  return std::isnan(b) ? b : b != 0;
+  return Truth(b);
 }
 double Or(double a, double b) {
   if (std::isnan(a)) return a;
   if (a != 0) return 1;
-  return std::isnan(b) ? b : b != 0;
+  return Truth(b);
 }
 
 /// A comparison; NaN if an operand is.
 template <typename Comparison>
 double Compare(double a, double b) {
-  return std::isnan(a) || std::isnan(b) ? kNaN : static_cast<double>(Comparison()(a, b));
+  if (std::isnan(a) || std::isnan(b)) return kNaN;
+  return Comparison()(a, b) ? 1 : 0;
+}
+
+/// The smaller and the larger argument; NaN if an argument is.
+double Min(double a, double b) {
+  if (std::isnan(a)) return a;
+  return a < b ? a : b;
+}
+double Max(double a, double b) {
+  if (std::isnan(a)) return a;
+  return a > b ? a : b;
 }
 
 /// aᵇ; a square is the product, which is exact to rounding and fast.
@@ -107,11 +124,8 @@ std::vector<std::string> DefineFunctions(mu::Parser& parser) {
       {"sin", std::sin},   {"cos", std::cos},   {"tan", std::tan},   {"asin", std::asin},
       {"acos", std::acos}, {"atan", std::atan}, {"tanh", std::tanh}, {"exp", std::exp},
       {"log", std::log},   {"sqrt", std::sqrt}, {"abs", std::fabs},  {"wrap", Wrapped}};
-  // NaN as an argument gives NaN.
   constexpr std::pair<const char*, Two> kTwo[] = {
-      {"atan2", std::atan2},
-      {"min", [](double a, double b) { return std::isnan(a) || a < b ? a : b; }},
-      {"max", [](double a, double b) { return std::isnan(a) || a > b ? a : b; }}};
+      {"atan2", std::atan2}, {"min", Min}, {"max", Max}};
   constexpr std::pair<const char*, Three> kThree[] = {{"clamp", Clamp}, {"fma", std::fma}};
   parser.ClearFun();
   parser.ClearConst();
@@ -158,7 +172,8 @@ void CheckText(const std::string& text) {
   }
   int depth = 0;
   for (size_t i = 0; i < text.size(); ++i) {
-    depth += text[i] == '(' ? 1 : text[i] == ')' ? -1 : 0;
+    if (text[i] == '(') ++depth;
+    if (text[i] == ')') --depth;
     if (depth > kMostDepth) {
       throw BadInput(Concat("reward: expected at most ", kMostDepth,
                             " parentheses within each other, got more"));
@@ -338,10 +353,12 @@ std::string OwnReward::Asymmetry(const std::function<Plant(Rng&)>& draw) {
     now.Mirror();
     const Parsed::Sum there = now.Total();
     now.Mirror();
-    const bool known = here.size <= kLargest, known_there = there.size <= kLargest;
-    if (!known && !known_there) continue;
+    const bool known_here = here.size <= kLargest;
+    const bool known_there = there.size <= kLargest;
+    if (!known_here && !known_there) continue;
     const double rounding = kRounding * (here.size + there.size) + kSmallest;
-    if (known && known_there && std::abs(here.reward - there.reward) <= rounding) continue;
+    const bool equal = std::abs(here.reward - there.reward) <= rounding;
+    if (known_here && known_there && equal) continue;
     return Concat(here.reward, " at q1 = ", now.s.q1, ", q2 = ", now.s.q2, ", w1 = ", now.s.w1,
                   ", w2 = ", now.s.w2, ", tau = ", now.tau, ", but ", there.reward,
                   " at the mirror image");
@@ -363,8 +380,13 @@ void OwnReward::Judge(int env, const Plant& plant, const PendulumState& s, StepR
   now.h = built_in_[i * kRewardTerms + 1];
   now.inverted = result.at_goal[i];
   now.tau = result.torque[i];
-  now.dtau = now.tau - std::exchange(last_torque_[i], now.tau);
-  inverted_steps_[i] = result.at_goal[i] != 0 ? inverted_steps_[i] + 1 : 0;
+  now.dtau = now.tau - last_torque_[i];
+  last_torque_[i] = now.tau;
+  if (result.at_goal[i] != 0) {
+    ++inverted_steps_[i];
+  } else {
+    inverted_steps_[i] = 0;
+  }
   now.upright = static_cast<double>(inverted_steps_[i]) * kControlPeriod;
 
   const size_t K = names_.size();

@@ -153,9 +153,12 @@ void PendulumEnv::Reset(int env) {
   } else if (config_.any_pose && is_random) {
     builder_.SetGoal(env, kPoses[rng.Below(4)]);
   } else if (config_.any_pose) {
-    const uint64_t transition = rng.Below(12), goal = transition % 4;
+    // One of the 12 pairs of a goal and another pose, in which the episode begins.
+    const uint64_t pair = rng.Below(12);
+    const uint64_t goal = pair % 4;
+    const uint64_t first = (goal + 1 + pair / 4) % 4;
     builder_.SetGoal(env, kPoses[goal]);
-    s = RestIn(kPoses[(goal + 1 + transition / 4) % 4], s);  // one of the three other poses
+    s = RestIn(kPoses[first], s);
   }
   SetState(env, s);
 }
@@ -177,8 +180,10 @@ void PendulumEnv::Hold(int env) {
 }
 
 void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
+  std::span<const double> applied = torque;
+  if (disturber_) applied = disturber_->Apply(torque, step_counts_);
   if (reward_) reward_->SwapTerms(result);
-  physics_->Step(disturber_ ? disturber_->Apply(torque, step_counts_) : torque, result);
+  physics_->Step(applied, result);
   JudgeByGoal(result);
   if (reward_) reward_->SwapTerms(result);
   RestoreHeld(result);
@@ -201,17 +206,19 @@ void PendulumEnv::RestoreHeld(StepResult& result) {
 void PendulumEnv::JudgeByGoal(StepResult& result) const {
   if (!config_.any_pose) return;
   const RewardConfig built_in;  // an expression uses the terms with weights of 1
+  const RewardConfig& reward = reward_ ? built_in : config_.reward;
   for (int env = 0; env < config_.num_envs; ++env) {
     const auto i = static_cast<size_t>(env);
     const Pose goal = *this->goal(env);
     const auto terms = RewardTerms(plant(env), state(env), result.torque[i], goal);
-    (reward_ ? built_in : config_.reward).Weigh(env, terms, result);
+    reward.Weigh(env, terms, result);
     result.at_goal[i] = Inverted(SeenFrom(goal, state(env))) ? 1 : 0;
   }
 }
 
 void PendulumEnv::JudgeByOwnReward(StepResult& result) {
-  for (int env = 0; reward_ && env < config_.num_envs; ++env) {
+  if (!reward_) return;
+  for (int env = 0; env < config_.num_envs; ++env) {
     if (IsHeld(env) || result.terminated[static_cast<size_t>(env)]) continue;
     reward_->Judge(env, plant(env), state(env), result);
   }
