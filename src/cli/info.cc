@@ -46,11 +46,8 @@ std::string ObservationText(const LoadedPolicy& loaded) {
   }
   if (loaded.seeks_any_pose()) text += fmt::format(", {} for the goal", kGoalSize);
   const int steps = loaded.memory();
-  if (steps > 0) {
-    text +=
-        fmt::format(", {} for {}", kMemorySize,
-                    steps == 1 ? "the last step" : fmt::format("each of the last {} steps", steps));
-  }
+  if (steps == 1) text += fmt::format(", {} for the last step", kMemorySize);
+  if (steps > 1) text += fmt::format(", {} for each of the last {} steps", kMemorySize, steps);
   return text;
 }
 
@@ -97,19 +94,23 @@ void PrintController(const LoadedPolicy& loaded) {
 
 /// Prints the actions that a policy may choose. `learned` is the policy, if it is a network's.
 void PrintActions(const LoadedPolicy& loaded, const NetworkPolicy* learned) {
-  std::span<const double> levels, limits;
-  if (learned != nullptr) levels = learned->parts().torques;
-  if (learned != nullptr) limits = learned->parts().action_limit;
+  std::span<const double> levels;
+  std::span<const double> limits;
+  if (learned != nullptr) {
+    levels = learned->parts().torques;
+    limits = learned->parts().action_limit;
+  }
   if (loaded.is_foreign()) {
-    fmt::print("  actions     {}\n", levels.empty()
-                                         ? fmt::format("within ±{}", fmt::join(limits, ", ±"))
-                                         : fmt::format("one of {}", fmt::join(levels, ", ")));
+    if (levels.empty()) {
+      fmt::print("  actions     within ±{}\n", fmt::join(limits, ", ±"));
+    } else {
+      fmt::print("  actions     one of {}\n", fmt::join(levels, ", "));
+    }
     return;
   }
-  fmt::print("  torques     {}, every {} s\n",
-             levels.empty() ? "any within the torque limit"
-                            : fmt::format("{} N·m", fmt::join(levels, ", ")),
-             kControlPeriod);
+  std::string torques = "any within the torque limit";
+  if (!levels.empty()) torques = fmt::format("{} N·m", fmt::join(levels, ", "));
+  fmt::print("  torques     {}, every {} s\n", torques, kControlPeriod);
 }
 
 void PrintPolicy(const LoadedPolicy& loaded) {
@@ -163,15 +164,17 @@ ordered_json RunJson(const fs::path& path) {
 }
 
 void PrintRun(const fs::path& path, bool has_policy) {
-  const auto [checkpoint, config, spec, state] = RunFacts(path);
+  const RunFacts run(path);
+  const Config& config = run.config;
+  const TrainState& state = run.state;
   fmt::print("{}\n", Printable(path.string()));
   fmt::print("  agent       {}, seed {}, upswing {}\n", config.agent, config.train.seed,
-             Printable(checkpoint.Metadata("upswing_version")));
+             Printable(run.checkpoint.Metadata("upswing_version")));
   fmt::print("  checkpoint  step {} of {}, {} episodes, {} of training\n", FormatCount(state.steps),
              FormatCount(config.train.steps), FormatCount(state.episodes),
              FormatDuration(state.seconds));
-  if (std::isinf(spec.evaluation.solved_return)) {
-    fmt::print("  task        {}, never solved, as no solved_return was given\n", spec.task);
+  if (std::isinf(run.spec.evaluation.solved_return)) {
+    fmt::print("  task        {}, never solved, as no solved_return was given\n", run.spec.task);
   } else if (state.solved) {
     fmt::print("  solved      at step {}, after {} of training\n", FormatCount(state.streak_step),
                FormatDuration(state.streak_seconds));
@@ -179,10 +182,12 @@ void PrintRun(const fs::path& path, bool has_policy) {
     fmt::print("  solved      not yet; last success rate {}\n", state.last_success_rate);
   }
   if (has_policy) return;
-  fmt::print("  policy      {}\n", state.best_step == 0
-                                       ? "none yet; the first evaluation writes one"
-                                       : fmt::format("the best one, from step {}, no longer exists",
-                                                     FormatCount(state.best_step)));
+  if (state.best_step == 0) {
+    fmt::print("  policy      none yet; the first evaluation writes one\n");
+  } else {
+    fmt::print("  policy      the best one, from step {}, no longer exists\n",
+               FormatCount(state.best_step));
+  }
 }
 
 /// A policy as JSON; null where its file says nothing.

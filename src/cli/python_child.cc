@@ -29,7 +29,9 @@ PythonChild::PythonChild(std::string command, std::string program, std::string j
   const Descriptor other(ends[1]);
   setenv("PYTHONSAFEPATH", "1", 1);                   // no modules from the present folder
   const char* given = std::getenv("UPSWING_PYTHON");  // a name in the PATH, or a path
-  std::string python = given != nullptr && *given != '\0' ? given : "python3", flag = "-c";
+  std::string python = "python3";
+  if (given != nullptr && *given != '\0') python = given;
+  std::string flag = "-c";
   const std::array<char*, 5> words{python.data(), flag.data(), program.data(), job.data(), nullptr};
 
   posix_spawn_file_actions_t files;

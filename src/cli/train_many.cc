@@ -61,17 +61,18 @@ class ManyRunsView {
       return line_.Print(fmt::format("  {:<20} failed: {} (log: {})", run.name,
                                      Printable(run.problem), Printable(run.log().string())));
     }
-    if (!run.state)
+    if (!run.state) {
       return line_.Print(fmt::format("  {:<20} stopped before its first step", run.name));
+    }
     const TrainState& s = *run.state;
+    std::string end = "stopped";
+    if (run.finished) end = "done, not solved";
+    if (s.solved) end = "solved at " + FormatCount(s.streak_step);
     const Standing standing = Measure();
-    line_.Print(fmt::format("  {:<20} {:>11} steps  {:>12}  {:<22}  {} of {} runs done{}", run.name,
-                            FormatCount(s.steps), FormatDuration(s.seconds),
-                            s.solved       ? "solved at " + FormatCount(s.streak_step)
-                            : run.finished ? "done, not solved"
-                                           : "stopped",
-                            standing.done, runs_.size(),
-                            standing.left > 0 ? ", " + standing.time_left : ""));
+    std::string all = fmt::format("{} of {} runs done", standing.done, runs_.size());
+    if (standing.left > 0) all += ", " + standing.time_left;
+    line_.Print(fmt::format("  {:<20} {:>11} steps  {:>12}  {:<22}  {}", run.name,
+                            FormatCount(s.steps), FormatDuration(s.seconds), end, all));
   }
 
   /// If runs are left, prints how many are done and the next command to type.
@@ -99,16 +100,19 @@ class ManyRunsView {
     std::string time_left;  // such as `at most 3 min 20 s left`
   };
 
+  /// Steps that a run has made. Reads only the files of running runs, because there may be
+  /// thousands of others.
+  int64_t StepsOf(const SeedRun& run) const {
+    if (std::ranges::find(running_, &run) != running_.end()) return run.Steps();
+    return run.state ? run.state->steps : 0;
+  }
+
   Standing Measure() const {
     Standing standing;
     for (const SeedRun& run : runs_) {
-      // Reads only the files of running runs, because there may be thousands of others.
-      const bool runs_now = std::ranges::find(running_, &run) != running_.end();
-      const auto steps = static_cast<double>(runs_now    ? run.Steps()
-                                             : run.state ? run.state->steps
-                                                         : 0);
+      const auto steps = static_cast<double>(StepsOf(run));
       standing.steps += steps;
-      standing.done += run.finished ? 1 : 0;
+      if (run.finished) ++standing.done;
       if (run.finished || !run.problem.empty()) continue;
       standing.left += std::max(0.0, static_cast<double>(run.variant->config.train.steps) - steps);
     }
@@ -117,19 +121,20 @@ class ManyRunsView {
     standing.steps_per_second = (standing.steps - steps_before_) / std::max(1e-3, watch_.seconds());
     const bool may_end_early = std::ranges::any_of(
         runs_, [](const SeedRun& run) { return run.variant->config.train.stop_when_solved; });
-    standing.time_left = fmt::format("{} {} left", may_end_early ? "at most" : "about",
-                                     standing.steps_per_second > 0
-                                         ? FormatDuration(standing.left / standing.steps_per_second)
-                                         : "?");
+    std::string duration = "?";
+    if (standing.steps_per_second > 0) {
+      duration = FormatDuration(standing.left / standing.steps_per_second);
+    }
+    standing.time_left = fmt::format("{} {} left", may_end_early ? "at most" : "about", duration);
     return standing;
   }
 
   void Announce() const {
     const size_t variants = many_.plan.variants.size();
     Say("Training {} in {}\n", Printable(many_.what), Printable(many_.plan.folder.string()));
-    Say("  {}seed{} {}: {}, {} at a time\n",
-        variants == 1 ? "" : fmt::format("{} variants, ", variants),
-        many_.plan.seeds.size() == 1 ? "" : "s", SeedsText(many_.plan.seeds),
+    const std::string of_variants = variants > 1 ? fmt::format("{} variants, ", variants) : "";
+    const char* seeds = many_.plan.seeds.size() == 1 ? "seed" : "seeds";
+    Say("  {}{} {}: {}, {} at a time\n", of_variants, seeds, SeedsText(many_.plan.seeds),
         Counted(std::ssize(runs_), "run"), many_.jobs);
     for (const Variant& variant : many_.plan.variants) {
       for (const std::string& warning : Warnings(variant.config)) {
