@@ -52,36 +52,43 @@ LogRows RangeOf(const Cycle& cycle) {
 void CheckClockUnit(double usual, const Reporter& report) {
   constexpr double kSlow = 0.5, kVerySlow = 50;  // s
   if (usual < kSlow) return;
-  report(Severity::kFault, fmt::format("cycles of {:.4g} s: suspect a clock in {} (key unit){}",
-                                       usual, usual < kVerySlow ? "ms" : "µs",
-                                       usual == 1 ? ", or numbers of rows (key factor)" : ""));
+  const char* unit = usual < kVerySlow ? "ms" : "µs";
+  std::string text =
+      fmt::format("cycles of {:.4g} s: suspect a clock in {} (key unit)", usual, unit);
+  if (usual == 1) text += ", or numbers of rows (key factor)";
+  report(Severity::kFault, text);
 }
 
 /// Cycles that are longer count as gaps, s.
 double GapOf(double usual) { return std::max(0.05, 20 * usual); }
 
+/// Reports rows with the time of the row before.
+void CheckStandingClock(const std::vector<Cycle>& cycles, const Reporter& report) {
+  constexpr double kMuch = 0.1;  // share of cycles
+  const auto stands = [](const Cycle& cycle) { return cycle.seconds <= 0; };
+  const auto standing = static_cast<int>(std::ranges::count_if(cycles, stands));
+  if (standing == 0) return;
+  Severity severity = Severity::kWarning;
+  std::string text = fmt::format("the clock stands still in {}", Counted(standing, "row"));
+  if (standing > kMuch * static_cast<double>(cycles.size())) {
+    severity = Severity::kFault;
+    text += ": suspect rows that are there twice, or times with too few digits";
+  } else if (standing > 1) {
+    text += ", first";
+  }
+  report(severity, text, RangeOf(*std::ranges::find_if(cycles, stands)), {{"standing", standing}});
+}
+
 void CheckLostCycles(const std::vector<Cycle>& cycles, double usual, const Reporter& report) {
   constexpr double kLate = 1.5;  // usual cycles; a longer cycle lost at least one
-  int places = 0, standing = 0;
+  int places = 0;
   double lost = 0;
-  const Cycle *first_standing = nullptr, *longest = nullptr;
+  const Cycle* longest = nullptr;
   for (const Cycle& cycle : cycles) {
-    if (cycle.seconds <= 0 && standing++ == 0) first_standing = &cycle;
     if (cycle.seconds <= kLate * usual || cycle.seconds > GapOf(usual)) continue;
     if (!longest || cycle.seconds > longest->seconds) longest = &cycle;
     ++places;
     lost += std::round(cycle.seconds / usual) - 1;
-  }
-  if (standing > 0) {
-    constexpr double kMuch = 0.1;  // share of cycles
-    const bool is_fault = standing > kMuch * static_cast<double>(cycles.size());
-    report(is_fault ? Severity::kFault : Severity::kWarning,
-           fmt::format("the clock stands still in {}{}", Counted(standing, "row"),
-                       is_fault       ? ": suspect rows that are there twice, or times with "
-                                        "too few digits"
-                       : standing > 1 ? ", first"
-                                      : ""),
-           RangeOf(*first_standing), {{"standing", standing}});
   }
   if (longest == nullptr) return;
   constexpr double kMuch = 0.01;  // share of cycles
@@ -97,7 +104,9 @@ void CheckGaps(const std::vector<Cycle>& cycles, double usual, const Reporter& r
   constexpr int kMostGaps = 10;  // with a line each
   int gaps = 0;
   for (const Cycle& cycle : cycles) {
-    if (cycle.seconds <= GapOf(usual) || ++gaps > kMostGaps) continue;
+    if (cycle.seconds <= GapOf(usual)) continue;
+    ++gaps;
+    if (gaps > kMostGaps) continue;
     report(Severity::kFault, fmt::format("a gap of {:.4g} s", cycle.seconds), RangeOf(cycle),
            {{"gap", cycle.seconds}});
   }
@@ -154,6 +163,7 @@ void CheckClock(Pieces pieces, Findings& findings) {
                      1 / usual, 1e3 * usual, 1e3 * p99, 1e3 * seconds.back()),
          {}, {{"usual", usual}, {"p99", p99}, {"longest", seconds.back()}});
   CheckClockUnit(usual, report);
+  CheckStandingClock(cycles, report);
   CheckLostCycles(cycles, usual, report);
   CheckGaps(cycles, usual, report);
 }

@@ -77,27 +77,32 @@ bool IsSudden(const Repeat& repeat, double quantum) {
 void CheckRepeats(Pieces pieces, int joint, double quantum, const Reporter& report) {
   const auto [low, high] = std::ranges::minmax(ValuesOf(pieces, &MachineLog::angle, joint));
   constexpr double kPi = std::numbers::pi;
-  const Repeat* longest[2] = {};  // saturated, stuck
-  int count[2] = {};
+  /// Repeats of one cause.
+  struct Cause {
+    std::string text;
+    int count = 0;
+    const Repeat* longest = nullptr;
+  };
+  Cause saturation{"saturates"};
+  Cause sticking{"the encoder sticks"};
   const std::vector<Repeat> repeats = RepeatsOf(pieces, joint);
   for (const Repeat& repeat : repeats) {
     if (!IsSudden(repeat, quantum)) continue;
     const double q = repeat.piece->angle[repeat.first][joint];
     const bool at_end = (q < -kPi && q == low) || (q > kPi && q == high);
-    const int stuck = at_end ? 0 : 1;
-    if (stuck && !repeat.catches_up) continue;  // dry friction holds the joint
-    ++count[stuck];
-    const Repeat*& best = longest[stuck];
-    if (!best || repeat.last - repeat.first > best->last - best->first) best = &repeat;
+    if (!at_end && !repeat.catches_up) continue;  // dry friction holds the joint
+    Cause& cause = at_end ? saturation : sticking;
+    ++cause.count;
+    const Repeat* best = cause.longest;
+    if (!best || repeat.last - repeat.first > best->last - best->first) cause.longest = &repeat;
   }
-  for (const int stuck : {0, 1}) {
-    if (count[stuck] == 0) continue;
-    const Repeat& r = *longest[stuck];
-    report(Severity::kFault,
-           fmt::format("{} at {:.4g} rad while the joint moves{}",
-                       stuck ? "the encoder sticks" : "saturates", r.piece->angle[r.first][joint],
-                       count[stuck] > 1 ? fmt::format("; {} times, longest", count[stuck]) : ""),
-           RangeOf(*r.piece, r.first, r.last), {{"times", count[stuck]}});
+  for (const Cause& cause : {saturation, sticking}) {
+    if (cause.count == 0) continue;
+    const Repeat& r = *cause.longest;
+    std::string text = fmt::format("{} at {:.4g} rad while the joint moves", cause.text,
+                                   r.piece->angle[r.first][joint]);
+    if (cause.count > 1) text += fmt::format("; {} times, longest", cause.count);
+    report(Severity::kFault, text, RangeOf(*r.piece, r.first, r.last), {{"times", cause.count}});
   }
 }
 
@@ -158,15 +163,21 @@ void CheckJumps(Pieces pieces, int joint, const Reporter& report) {
                          jumps[i + 1].row - jumps[i].row <= kShort &&
                          std::abs(jumps[i + 1].size + jumps[i].size) < kNear;
     const bool is_turn = std::abs(std::abs(jumps[i].size) - kTurn) < kNear;
-    (is_turn ? wraps : returns ? wrong : slips).push_back(jumps[i]);
-    if (!is_turn && returns) ++i;
+    if (is_turn) {
+      wraps.push_back(jumps[i]);
+    } else if (returns) {
+      wrong.push_back(jumps[i]);
+      ++i;  // the jump back
+    } else {
+      slips.push_back(jumps[i]);
+    }
   }
   const auto add = [&](const std::vector<Jump>& found, const auto& text_of) {
     if (found.empty()) return;
     const Jump& first = found.front();
-    const std::string text = text_of(first), times = fmt::format("; {} times, first", found.size());
-    report(Severity::kFault, found.size() == 1 ? text : text + times,
-           RangeOf(*first.piece, first.row - 1, first.row),
+    std::string text = text_of(first);
+    if (found.size() > 1) text += fmt::format("; {} times, first", found.size());
+    report(Severity::kFault, text, RangeOf(*first.piece, first.row - 1, first.row),
            {{"times", static_cast<double>(found.size())}, {"jump", first.size}});
   };
   add(wraps, [](const Jump&) {

@@ -171,9 +171,12 @@ double StepOf(Pieces pieces, int joint) {
 /// The variance of a window's inertia term that the steps of both encoders make, (rad/s)². The
 /// other joint may move within a step of its own, which counts twice.
 double StepNoise(Pieces pieces, int row) {
-  const double own = StepOf(pieces, row), other = StepOf(pieces, 1 - row);
-  const double first = own > 0 ? own : other, second = other > 0 ? other : own;
-  return (first * first + 2 * second * second) / 12 * std::pow(2 * std::numbers::pi / kWindow, 2);
+  double own = StepOf(pieces, row);
+  double other = StepOf(pieces, 1 - row);
+  // A joint that does not move shows no step: take the other one's.
+  if (own <= 0) own = other;
+  if (other <= 0) other = own;
+  return (own * own + 2 * other * other) / 12 * std::pow(2 * std::numbers::pi / kWindow, 2);
 }
 
 /// Whether the joint of these windows moves by far more than the noise (a variance).

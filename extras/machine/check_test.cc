@@ -536,8 +536,11 @@ TEST(MachineCheck, AnEncoderThatFreezesWhereItsJointTurnsRound) {
 TEST(MachineCheck, TheSizeOfTheMachineChangesNoVerdictOnAnEncoder) {
   for (const double scale : {0.001, 1000.0}) {
     Plant plant;
-    plant.mass1 *= scale, plant.mass2 *= scale;
-    plant.damping1 *= scale, plant.damping2 *= scale, plant.armature *= scale;
+    plant.mass1 *= scale;
+    plant.mass2 *= scale;
+    plant.damping1 *= scale;
+    plant.damping2 *= scale;
+    plant.armature *= scale;
     MachineLog log = Sampled(Simulated(
                                  {}, [&](double t) { return scale * SwingTorque(t); }, 10, plant),
                              1, 4096);

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
 
 #include "base/format.h"
 #include "extras/machine/check.h"
@@ -36,8 +35,8 @@ constexpr double kMostPairs = 1e5;  // rows of a fit; more would only take longe
 Response Respond(Pieces pieces, int from, int to, int rows, double lag, bool is_swapped) {
   Response response{rows, lag, {}};
   for (const MachineLog& piece : pieces) {
-    const auto& [in, out] = is_swapped ? std::tie(piece.measured, piece.commanded)
-                                       : std::tie(piece.commanded, piece.measured);
+    const std::vector<Joints>& in = is_swapped ? piece.measured : piece.commanded;
+    const std::vector<Joints>& out = is_swapped ? piece.commanded : piece.measured;
     double torque = 0;
     for (int k = rows; k < piece.rows() && response.pairs.n < kMostPairs; ++k) {
       const int sent = k - rows;
@@ -88,9 +87,9 @@ std::string DelayText(const std::vector<Response>& responses, const Response& be
 bool CheckTorqueGain(const Response& best, const Reporter& report) {
   const double gain = best.pairs.gain();
   if (gain > 1.0 / 3 && gain < 3) return false;
-  const char* meaning = gain > 300 && gain < 3000    ? "suspect measured torque in mN·m"
-                        : gain > 3e-4 && gain < 3e-3 ? "suspect commanded torque in mN·m"
-                                                     : "suspect the unit or a gear";
+  const char* meaning = "suspect the unit or a gear";
+  if (gain > 300 && gain < 3000) meaning = "suspect measured torque in mN·m";
+  if (gain > 3e-4 && gain < 3e-3) meaning = "suspect commanded torque in mN·m";
   report(Severity::kFault, fmt::format("measured {:.3g} times commanded: {}", gain, meaning), {},
          {{"gain", gain}, {"correlation", best.pairs.correlation()}});
   return true;
@@ -189,11 +188,11 @@ void CheckTorque(Pieces pieces, int joint, const Reporter& report) {
   if (CheckTorqueGain(best, report)) return;
   constexpr double kProportional = 0.95, kLow = 0.6, kHigh = 1.6;  // correlation, gains
   const bool is_odd = r > kProportional && (gain < kLow || gain > kHigh);
-  add(is_odd ? Severity::kWarning : Severity::kNote,
-      fmt::format("measured follows commanded after {} and a lag of {:.0f} ms, gain {:.2f}, "
-                  "correlation {:.3f}{}",
-                  DelayText(responses, best), 1e3 * best.lag, gain, r,
-                  is_odd ? ": suspect one of them in amperes or another unit (key factor)" : ""));
+  std::string text = fmt::format(
+      "measured follows commanded after {} and a lag of {:.0f} ms, gain {:.2f}, correlation {:.3f}",
+      DelayText(responses, best), 1e3 * best.lag, gain, r);
+  if (is_odd) text += ": suspect one of them in amperes or another unit (key factor)";
+  add(is_odd ? Severity::kWarning : Severity::kNote, text);
 }
 
 /// Reports torques that no pendulum of this kind has, and commands that end at 1 exactly.
@@ -208,7 +207,7 @@ void CheckTorqueSize(Pieces pieces, int joint, const Reporter& report) {
   for (const auto quantity : {&MachineLog::commanded, &MachineLog::measured}) {
     for (const double u : ValuesOf(pieces, quantity, joint)) {
       largest = std::max(largest, std::abs(u));
-      ones += quantity == &MachineLog::commanded && std::abs(u) == 1 ? 1 : 0;
+      if (quantity == &MachineLog::commanded && std::abs(u) == 1) ++ones;
     }
   }
   constexpr double kLarge = 100;  // N·m

@@ -73,7 +73,7 @@ bool ControlLoop::Cycle() {
   link_.WaitUntil(deadline);
   const double now = link_.Now(), late = now - deadline;
   ++summary_.cycles;
-  summary_.on_time += late <= LoopSummary::kOnTime ? 1 : 0;
+  if (late <= LoopSummary::kOnTime) ++summary_.on_time;
   summary_.latest = std::max(summary_.latest, late);
   const auto missed = static_cast<int64_t>(std::max(0.0, late / period_));
   summary_.missed += missed;
@@ -105,7 +105,7 @@ bool ControlLoop::Cycle() {
   torque_ = supervisor_.Torque(wanted, facts);
   const LoopState after = supervisor_.state();
   enabled_ = state != LoopState::kIdle && after != LoopState::kFault;
-  summary_.moving += MayDrive(after) ? 1 : 0;
+  if (MayDrive(after)) ++summary_.moving;
   if (reading) {
     const LoopRow row{reading->time, reading->angle,  {facts.state.w1, facts.state.w2},
                       torque_,       reading->torque, static_cast<int>(after),

@@ -11,8 +11,10 @@ double Excitation::operator()(int64_t /*step*/, const PendulumState& state) {
   constexpr int kShortest = 3, kLongest = 15;      // time for which a share is held, steps
   constexpr double kAlong = 0.6;                   // probability of a push along with the motion
   constexpr double kSlow = 0.5;                    // rad/s
-  const double level = level_(state), w = joint_ == 1 ? state.w1 : state.w2;
-  if (held_-- <= 0) {
+  const double level = level_(state);
+  const double w = joint_ == 1 ? state.w1 : state.w2;
+  --held_;
+  if (held_ < 0) {
     held_ = kShortest + static_cast<int>(rng_.Uniform(0, kLongest - kShortest));
     share_ = rng_.Uniform(-1, 1);
     along_ = rng_.Uniform() < kAlong;

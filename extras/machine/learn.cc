@@ -337,7 +337,7 @@ class Learner {
           RunCycles(c_, TryRules(compensation), twin_.sensors, Estimator(twin_, 1 / c_.hz),
                     ControllerOf(policy), link, stop_);
       if (stop_()) throw Ended{"stopped"};
-      held += run.summary.upright >= c_.hold ? 1 : 0;
+      if (run.summary.upright >= c_.hold) ++held;
     }
     return held;
   }

@@ -105,12 +105,15 @@ void PrintErrors(std::span<const ErrorRow> rows, std::span<const Predictor> pred
       std::ranges::any_of(rows, [](const ErrorRow& row) { return row.session.empty(); });
   for (const ErrorRow& row : rows) {
     if (has_all && !row.session.empty()) continue;
+    const std::string session = row.session.empty() ? "all runs" : Printable(row.session);
+    const std::string torques = row.reported ? "reported" : commanded;
     const auto [value, interval] = row.improvement;
-    fmt::print(
-        "  {}, {} s, {} torques: {:.0f}{}\n",
-        row.session.empty() ? "all runs" : Printable(row.session), FormatNumber(row.seconds),
-        row.reported ? "reported" : commanded, 100 * value,
-        interval ? fmt::format(" ({:.0f}–{:.0f})", 100 * interval->low, 100 * interval->high) : "");
+    std::string improvement = fmt::format("{:.0f}", 100 * value);
+    if (interval) {
+      improvement += fmt::format(" ({:.0f}–{:.0f})", 100 * interval->low, 100 * interval->high);
+    }
+    fmt::print("  {}, {} s, {} torques: {}\n", session, FormatNumber(row.seconds), torques,
+               improvement);
   }
 }
 

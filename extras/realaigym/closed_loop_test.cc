@@ -81,8 +81,13 @@ Path PathOf(const MachineLog& log) {
   return path;
 }
 
-/// The row before `time`, and the share of the way to the next row.
-std::pair<size_t, double> PlaceAt(const MachineLog& log, double time) {
+/// A time between two rows.
+struct Place {
+  size_t row;    // before the time
+  double share;  // of the way to the next row
+};
+
+Place PlaceAt(const MachineLog& log, double time) {
   const auto after = std::ranges::upper_bound(log.time, time);
   if (after == log.time.begin()) return {0, 0};
   if (after == log.time.end()) return {log.time.size() - 2, 1};
@@ -263,7 +268,7 @@ HardwareReport RunTvlqrTrials(const Twin& twin, Robot robot, const RebuiltTvlqr&
   if (own.pushes) {
     own.push_of = [runs](int trial) -> std::function<Joints(double)> {
       const MachineLog& log = runs[static_cast<size_t>(trial) % runs.size()];
-      return [&log](double time) { return log.push[PlaceAt(log, time).first]; };
+      return [&log](double time) { return log.push[PlaceAt(log, time).row]; };
     };
   }
   ThreadPool pool(2);
