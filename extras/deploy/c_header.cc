@@ -98,17 +98,26 @@ std::string HeadComment(const CParts& parts, const CHeader& header) {
     states +=
         Concat(" *   ", input.name, std::string(8 - input.name.size(), ' '), input.meaning, '\n');
   }
+  std::string goal = parts.task.goal;
+  std::string when = period + " s";
+  std::string input = Join(names, ", ");
+  std::string apply = "set_motor";
+  std::string inputs = PendulumInputs(parts, states);
+  if (foreign) {
+    goal = CommentText(parts.task.goal);
+    when = "step";
+    input = "observation";
+    apply = "act";
+    inputs = ForeignInputs(parts, caps);
+  }
   const std::string comment = Concat(
-      "/* A policy that ", foreign ? CommentText(parts.task.goal) : parts.task.goal,
-      ", as one C99 header.\n *\n",
+      "/* A policy that ", goal, ", as one C99 header.\n *\n",
       Paragraph(Concat(parts.origin, ". Written by Upswing ", UPSWING_VERSION, '.')),
       "\n *\n *   static ", name, "_state state;\n *   float torque;\n *   if (", name,
       "_selftest() != ", caps, "_OK) stop();\n *   ", name,
-      "_init(&state);   before the first step, and after any pause\n *   for (;;) {   every ",
-      foreign ? "step" : period + " s", "\n *     ", name, "_control(&state, ",
-      foreign ? "observation" : Join(names, ", "), ", &torque);\n *     ",
-      foreign ? "act" : "set_motor", "(torque);\n *   }\n *\n",
-      foreign ? ForeignInputs(parts, caps) : PendulumInputs(parts, states), PlantParagraph(parts),
+      "_init(&state);   before the first step, and after any pause\n *   for (;;) {   every ", when,
+      "\n *     ", name, "_control(&state, ", input, ", &torque);\n *     ", apply,
+      "(torque);\n *   }\n *\n", inputs, PlantParagraph(parts),
       R"c( * The status reports null pointers and numbers that are not finite: the torque is then 0, and the
  * memory is cleared, as after )c",
       name, "_init.\n *\n",

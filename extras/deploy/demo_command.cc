@@ -168,8 +168,14 @@ int WriteSingle(const DemoArguments& a, const fs::path& page) {
 
 /// Serves the page until a signal ends it.
 int ServePage(const DemoArguments& a, const fs::path& page) {
-  std::string job = Concat(kPatience, '\n', a.port == 0 ? kUsualPort : a.port, '\n',
-                           a.port == 0 ? kLastPort : a.port, '\n', fs::absolute(page).string());
+  int64_t first_port = a.port;
+  int64_t last_port = a.port;
+  if (a.port == 0) {
+    first_port = kUsualPort;
+    last_port = kLastPort;
+  }
+  std::string job =
+      Concat(kPatience, '\n', first_port, '\n', last_port, '\n', fs::absolute(page).string());
   std::optional<Making> temporary;
   const auto [agents, address] = AgentsOf(a, page, temporary);
   if (temporary) job += '\n' + agents.string();

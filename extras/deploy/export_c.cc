@@ -97,7 +97,8 @@ void AddPlant(const Plant& plant, CParts& parts) {
 void AddLayers(const std::vector<LayerView>& layers, const std::string& prefix, CParts& parts) {
   std::string rows;
   for (const LayerView& layer : layers) {
-    const std::string name = Replaced(layer.name, ".", "_"), array = Concat(prefix, '_', name);
+    const std::string name = Replaced(layer.name, ".", "_");
+    const std::string array = Concat(prefix, '_', name);
     const auto add = [&](const char* what, const std::string& comment, std::vector<float> values) {
       parts.constants.push_back({name + what, comment, std::move(values)});
     };
@@ -109,9 +110,9 @@ void AddLayers(const std::vector<LayerView>& layers, const std::string& prefix, 
       add("_norm_bias", "", Floats(layer.norm_bias));
       norm = Concat(array, "_norm_weight,\n   ", array, "_norm_bias");
     }
-    const char activation = layer.activation == Activation::kRelu   ? 'r'
-                            : layer.activation == Activation::kTanh ? 't'
-                                                                    : 'n';
+    char activation = 'n';
+    if (layer.activation == Activation::kRelu) activation = 'r';
+    if (layer.activation == Activation::kTanh) activation = 't';
     rows += Concat("  {", array, "_weight, ", array, "_bias,\n   ", norm, ",\n   ", layer.in(),
                    ", ", layer.out(), ", '", activation, "'},\n");
   }
@@ -129,7 +130,8 @@ CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
   }
   const std::vector<LayerView> layers = LayersOf(policy);
   const CSamples samples = DrawSamples(policy, layers);
-  const int outputs = layers.back().out(), memory = loaded.memory();
+  const int outputs = layers.back().out();
+  const int memory = loaded.memory();
   const bool squashed = policy.rule() == ActionRule::kSquashedGaussian;
   CHeader header;
   header.prefix = prefix;
@@ -145,7 +147,8 @@ CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
   constexpr size_t kFloat = 4;
   header.state_bytes = kFloat;  // the last torque
   if (memory > 0) header.state_bytes += kFloat * static_cast<size_t>(3 + kMemorySize * memory);
-  int widest = 0, tanhs = squashed ? 1 : 0;
+  int widest = 0;
+  int tanhs = squashed ? 1 : 0;
   for (const LayerView& layer : layers) {
     header.multiply_adds += layer.W.size();
     widest = std::max(widest, layer.out());
@@ -157,24 +160,26 @@ CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
                         "; ", OriginOf(loaded.policy->info()));
   parts.limit = policy.limit;
   parts.period = *loaded.policy->info().control_period;
-  const std::string angles = policy.is_foreign()
-                                 ? std::string()
-                                 : Concat(", ", parts.task.state.size(), " sines and cosines");
-  parts.work = Concat(header.multiply_adds, " multiply-adds", angles,
-                      tanhs > 0 ? Concat(", ", tanhs, " of tanh") : "", '.');
+  parts.work = Concat(header.multiply_adds, " multiply-adds");
+  if (!policy.is_foreign()) {
+    parts.work += Concat(", ", parts.task.state.size(), " sines and cosines");
+  }
+  if (tanhs > 0) parts.work += Concat(", ", tanhs, " of tanh");
+  parts.work += '.';
   std::string observation = "/* of the observation:\n";
   int index = 0;
   for (const auto& [name, meaning] : policy.task.observation) {
     observation += Concat("     ", index++, ": ", name, ": ", meaning, '\n');
   }
+  const char* rule = "'c' /* the mean, clipped */";
+  if (squashed) rule = "'s' /* the mean, squashed */";
+  if (policy.is_discrete()) rule = "'l' /* the largest output's torque */";
   parts.macros = {{"OBSERVATION_SIZE", Concat(policy.obs_size(), ' ', observation, "*/")},
                   {"OUTPUT_SIZE", Concat(outputs, " /* of the network */")},
                   {"MULTIPLY_ADDS", Concat(header.multiply_adds, "L /* of a call */")},
                   {"LAYERS", Concat(layers.size())},
                   {"WIDEST_LAYER", Concat(widest)},
-                  {"RULE", policy.is_discrete() ? "'l' /* the largest output's torque */"
-                           : squashed           ? "'s' /* the mean, squashed */"
-                                                : "'c' /* the mean, clipped */"},
+                  {"RULE", rule},
                   {"STATE_SIZE", Concat(policy.state_size())},
                   {"SAMPLES", Concat(samples.torques.size())},
                   {"OUTPUT_TOLERANCE", CLiteral(samples.output_tolerance)},
