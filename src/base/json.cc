@@ -16,11 +16,23 @@ Error Unexpected(std::string_view name, const std::string& expected, const json&
   return BadInput(Concat("\"", name, "\": expected ", expected, ", got ", text));
 }
 
+/// The place of the quote that ends the string which begins at `at`; at least the text's size if
+/// there is none.
+size_t EndOfString(std::string_view text, size_t at) {
+  ++at;
+  while (at < text.size() && text[at] != '"') {
+    const bool escapes = text[at] == '\\';
+    at += escapes ? 2 : 1;
+  }
+  return at;
+}
+
 /// Throws BadInput for a text that is nested deeper than `max_depth` or has too many parts. The
 /// parser and the destructor of its result take stack for each level and memory for each part.
 void CheckSize(std::string_view text, int max_depth) {
   constexpr int kMostParts = 1'000'000;  // a part of 3 bytes can take 80 bytes of memory
-  int depth = 0, parts = 0;
+  int depth = 0;
+  int parts = 0;
   for (size_t at = 0; at < text.size(); ++at) {
     const char c = text[at];
     if (c == ']' || c == '}') --depth;
@@ -34,7 +46,7 @@ void CheckSize(std::string_view text, int max_depth) {
     if (c == '[' || c == '{') {
       ++depth;
     } else if (c == '"') {
-      for (++at; at < text.size() && text[at] != '"'; ++at) at += text[at] == '\\' ? 1 : 0;
+      at = EndOfString(text, at);
     } else {
       at = std::min(text.find_first_of(" \t\r\n]},:[{\"", at), text.size()) - 1;
     }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <compare>
 #include <cstring>
 #include <optional>
 
@@ -76,14 +77,20 @@ SafetensorsEntry ParseEntry(const json& entry, size_t data_size) {
 /// Throws BadInput unless the tensors cover the data without gaps and overlaps. The tensors then
 /// take no more memory than the file.
 void CheckCovered(const std::map<std::string, SafetensorsEntry>& entries, size_t data_size) {
-  std::vector<std::pair<size_t, size_t>> pieces;  // begin and size
+  struct Piece {
+    size_t begin, size;
+    auto operator<=>(const Piece&) const = default;  // an empty piece is before one with its begin
+  };
+  std::vector<Piece> pieces;
   pieces.reserve(entries.size());
-  for (const auto& [name, entry] : entries) pieces.emplace_back(entry.begin, entry.size);
+  for (const auto& [name, entry] : entries) pieces.push_back({entry.begin, entry.size});
   std::ranges::sort(pieces);
   size_t end = 0;
-  for (const auto& [begin, size] : pieces) {
-    if (size > 0 && begin != end) throw BadInput("expected tensors that do not overlap");
-    end += size;
+  for (const Piece& piece : pieces) {
+    if (piece.size > 0 && piece.begin != end) {
+      throw BadInput("expected tensors that do not overlap");
+    }
+    end += piece.size;
   }
   if (end != data_size) throw BadInput(Concat("expected ", end, " bytes of data, got ", data_size));
 }

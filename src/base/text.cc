@@ -56,15 +56,20 @@ struct CodePoint {
   size_t size;
 };
 
+/// Bytes of the character that begins with this byte; 0 if none does.
+size_t Utf8Size(unsigned char first) {
+  if (first < 0x80) return 1;
+  if (first < 0xc0) return 0;
+  if (first < 0xe0) return 2;
+  if (first < 0xf0) return 3;
+  if (first < 0xf8) return 4;
+  return 0;
+}
+
 /// The first character of `text`; nothing unless it is valid UTF-8 in its shortest form.
 std::optional<CodePoint> FirstCodePoint(std::string_view text) {
   const auto byte = [&](size_t i) { return static_cast<unsigned char>(text[i]); };
-  const size_t size = byte(0) < 0x80   ? 1
-                      : byte(0) < 0xc0 ? 0
-                      : byte(0) < 0xe0 ? 2
-                      : byte(0) < 0xf0 ? 3
-                      : byte(0) < 0xf8 ? 4
-                                       : 0;
+  const size_t size = Utf8Size(byte(0));
   if (size == 0 || size > text.size()) return std::nullopt;
   char32_t value = size == 1 ? byte(0) : byte(0) & (0x7fU >> size);
   for (size_t i = 1; i < size; ++i) {
@@ -221,12 +226,18 @@ std::string Printable(std::string_view text) {
       shown += Escape('x', static_cast<unsigned char>(text.front()), 2);
     } else if (!IsControl(c->value)) {
       shown += text.substr(0, size);
-    } else if (c->value == '\n' || c->value == '\r' || c->value == '\t') {
-      shown += c->value == '\n' ? "\\n" : c->value == '\r' ? "\\r" : "\\t";
+    } else if (c->value == '\n') {
+      shown += "\\n";
+    } else if (c->value == '\r') {
+      shown += "\\r";
+    } else if (c->value == '\t') {
+      shown += "\\t";
     } else if (c->value < 0x80) {
       shown += Escape('x', c->value, 2);
+    } else if (c->value < 0x10000) {
+      shown += Escape('u', c->value, 4);
     } else {
-      shown += c->value < 0x10000 ? Escape('u', c->value, 4) : Escape('U', c->value, 8);
+      shown += Escape('U', c->value, 8);
     }
     text.remove_prefix(size);
   }

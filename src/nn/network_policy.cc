@@ -36,8 +36,14 @@ void ForBlocks(int rows, const F& f) {
 NetworkPolicyParts Checked(NetworkPolicyParts parts) {
   const auto A = parts.action_limit.size(), Q = parts.torques.size();
   const bool levels = parts.rule == ActionRule::kLevels;
-  const size_t outputs = parts.chooses_torque() ? Q : 2 * A;
-  if (parts.chooses_torque() ? A != (levels ? 0 : 1) || Q == 0 : A == 0 || Q != 0) {
+  size_t outputs = 2 * A;
+  bool fits = A > 0 && Q == 0;
+  if (parts.chooses_torque()) {
+    const size_t limits = levels ? 0 : 1;
+    outputs = Q;
+    fits = A == limits && Q > 0;
+  }
+  if (!fits) {
     throw BadInput(Concat("policy: expected torques or limits for a ", NameOf(parts.rule), ", got ",
                           Q, " torques and ", A, " limits"));
   }

@@ -86,9 +86,9 @@ constexpr size_t kParts = kSummed / kLanes;  // registers that hold them
 /// Sum of the numbers of a register: its halves are added until one number remains. The page keeps
 /// the order of its first version.
 template <class D>
-HWY_INLINE Real SumOfRegister(D d, hn::Vec<D> x) {
+HWY_INLINE Real SumOfRegister([[maybe_unused]] D d, hn::Vec<D> x) {
 #if HWY_TARGET == HWY_SCALAR
-  return (void)d, hn::GetLane(x);
+  return hn::GetLane(x);
 #elif HWY_TARGET == HWY_WASM
   return hn::GetLane(hn::SumOfLanes(d, x));
 #else

@@ -163,12 +163,11 @@ void CheckFree(const fs::path& folder, std::string_view advice) {
   const bool is_folder = fs::is_directory(folder, error);
   if (is_folder && fs::is_empty(folder, error)) return;
   if (is_folder && error) throw PathError("cannot read", folder, error.value());
-  const bool leads_nowhere = fs::is_symlink(there) && !fs::exists(folder, error);
-  throw BadInput(Concat(folder.string(), ": expected a new or empty folder, got ",
-                        is_folder       ? "one that is not empty"
-                        : leads_nowhere ? "a link to nothing"
-                                        : "a file",
-                        " (", advice, ")"));
+  const char* got = "a file";
+  if (fs::is_symlink(there) && !fs::exists(folder, error)) got = "a link to nothing";
+  if (is_folder) got = "one that is not empty";
+  throw BadInput(
+      Concat(folder.string(), ": expected a new or empty folder, got ", got, " (", advice, ")"));
 }
 
 void MakeNewFolder(const fs::path& folder) {

@@ -225,15 +225,21 @@ class PanelScript {
       layers.push_back(Concat("$L", i, " using ($1>=", end, "?$1:NaN):2", style, 3, " notitle"));
       return;
     }
-    const bool is_cross = line.marker == Marker::kCross;
-    const int type = line.marker == Marker::kSquare ? 5 : is_cross ? 2 : 7;
-    const auto add = [&](double size, const std::string& look) {
+    int type = 7;
+    double size = 0.8;
+    if (line.marker == Marker::kSquare) type = 5;
+    if (line.marker == Marker::kCross) {
+      type = 2;
+      size = 1.6;
+    }
+    if (panel_.heat_map) size = 1;
+    const auto add = [&](double points, const std::string& look) {
       layers.push_back(Concat("$L", i, " using 1:2 with points pt ", type, " ps ",
-                              size * terminal_.marker, look));
+                              points * terminal_.marker, look));
     };
     // Give markers on a heat map a white rim, which separates them from every colour.
     if (panel_.heat_map) add(1.5, " lc rgb 'white' notitle");
-    add(panel_.heat_map ? 1.0 : is_cross ? 1.6 : 0.8, Concat(" lw 2", color, title));
+    add(size, Concat(" lw 2", color, title));
   }
 
   /// Colour of line i. On a heat map, red-orange comes first, because viridis does not contain it.
