@@ -132,8 +132,10 @@ class Environments {
       for (const int env : ended_) env_.Hold(env);
       env_.Step(actions_, result_);
       ended_.clear();
-      for (int env = 0; env < spec().num_envs && !same_step_; ++env) {
-        if (result_.done(static_cast<size_t>(env))) ended_.push_back(env);
+      if (!same_step_) {
+        for (int env = 0; env < spec().num_envs; ++env) {
+          if (result_.done(static_cast<size_t>(env))) ended_.push_back(env);
+        }
       }
     });
   }

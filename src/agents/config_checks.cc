@@ -20,12 +20,15 @@ std::string Gigabytes(double bytes) {
 /// Throws BadInput if a setting of the double pendulum differs from its default in another
 /// environment.
 void CheckForeign(Config& config, const std::string& where) {
+  const auto settings_of = [](Config& from) {
+    Options settings;
+    from.train.DescribeCurriculum(settings);
+    from.DescribeEnvironment(settings);
+    return settings;
+  };
   Config defaults;
-  Options now, usual;
-  for (auto [from, options] : {std::pair(&config, &now), {&defaults, &usual}}) {
-    from->train.DescribeCurriculum(*options);
-    from->DescribeEnvironment(*options);
-  }
+  const Options now = settings_of(config);
+  const Options usual = settings_of(defaults);
   for (const auto& [option, other] : Differences(now, usual)) {
     throw BadInput(Concat(where.empty() ? "" : where + ": ", option.name,
                           ": expected none with a Gymnasium environment, which has no such "
@@ -86,13 +89,16 @@ void CheckMemory(const Config& config, int64_t available, int64_t runs) {
   const double needed = static_cast<double>(runs) * SizeOf(config).memory;
   if (needed <= static_cast<double>(available)) return;
   const AgentSize learner = config.learner().Size(config.Spec());
+  std::string what = "a ";
+  std::string flags = Concat("--hidden or ", learner.store_flag);
+  if (runs > 1) {
+    what = Concat(runs, " runs at a time, each with a ");
+    flags = Concat("--hidden, ", learner.store_flag, " or --jobs");
+  }
   throw BadInput(Concat("train: expected at most ", Gigabytes(static_cast<double>(available)),
-                        " of free memory, got ", Gigabytes(needed), " for ",
-                        runs > 1 ? Concat(runs, " runs at a time, each with a ") : "a ",
-                        "network of ", FormatCount(learner.parameters), " parameters and a ",
-                        learner.store, " of ", FormatCount(learner.capacity),
-                        " transitions; reduce --hidden", runs > 1 ? ", " : " or ",
-                        learner.store_flag, runs > 1 ? " or --jobs" : ""));
+                        " of free memory, got ", Gigabytes(needed), " for ", what, "network of ",
+                        FormatCount(learner.parameters), " parameters and a ", learner.store,
+                        " of ", FormatCount(learner.capacity), " transitions; reduce ", flags));
 }
 
 }  // namespace upswing

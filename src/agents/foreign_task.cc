@@ -79,10 +79,14 @@ bool IsForeign(std::string_view task) { return task.starts_with(kBeginning); }
 
 std::string ReplacementOf(std::string_view name) {
   if (name == "ppo-discrete") return "; use the agent ppo with --actions levels";
-  const std::string_view env = name.ends_with("pendulum-v1") ? "Pendulum-v1"
-                               : name.starts_with("acrobot") ? "Acrobot-v1"
-                                                             : "";
-  if (env.empty()) return "";
+  std::string_view env;
+  if (name.ends_with("pendulum-v1")) {
+    env = "Pendulum-v1";
+  } else if (name.starts_with("acrobot")) {
+    env = "Acrobot-v1";
+  } else {
+    return "";
+  }
   return Concat("; train on Gymnasium's ", env, " in Python: upswing.train(env=\"", env, "\")");
 }
 

@@ -38,10 +38,10 @@ std::string EstimateText(const Estimate& e, Formatter format) {
 
 /// A probability over pairs of runs.
 std::string PairsText(const Estimate& e) {
-  const char* agreement = e.value == 1   ? ", in every pair of runs"
-                          : e.value == 0 ? ", in no pair of runs"
-                                         : "";
-  return Concat("with probability ", EstimateText(e, Share), e.interval ? agreement : "");
+  std::string text = Concat("with probability ", EstimateText(e, Share));
+  if (e.interval && e.value == 1) text += ", in every pair of runs";
+  if (e.interval && e.value == 0) text += ", in no pair of runs";
+  return text;
 }
 
 void PrintScores(const char* name, const Scores& s, Formatter format, const std::string& unit) {

@@ -73,10 +73,13 @@ std::optional<Figure> TermsFigure(const fs::path& run) {
   for (size_t k = 1; k < names.size(); ++k) {
     Line line{.name = names[k]};
     for (size_t i = 0, end = 0; i < step.size(); i = end) {
+      // Episodes within 1% of the steps make one point.
+      const double beyond = step[i] + step.back() / 100;
       double sum = 0;
-      for (; end < step.size() && (end == i || step[end] < step[i] + step.back() / 100); ++end) {
+      do {
         sum += columns[k].values[end];
-      }
+        ++end;
+      } while (end < step.size() && step[end] < beyond);
       line.x.push_back(step[end - 1]);
       line.y.push_back(sum / static_cast<double>(end - i));
     }

@@ -123,20 +123,22 @@ class Worker {
   int Run() {
     std::vector<SeedRun> runs = RunsOf(plan_);
     // Repeat while a round trains a run, because another worker may have left a run meanwhile.
-    for (bool tried = true; tried && !stopped_;) {
+    bool tried = true;
+    while (tried && !stopped_) {
       tried = false;
       claimed_by_others_ = 0;
       for (SeedRun& run : runs) {
-        stopped_ = stopped_ || StopSignal() != 0;
+        if (StopSignal() != 0) stopped_ = true;
         if (stopped_) break;
-        tried = Try(run) || tried;
+        if (Try(run)) tried = true;
       }
     }
-    Say("{}: this worker finished {}, {} failed{}{}\n", Printable(plan_.folder.string()), done_,
-        failed_,
-        claimed_by_others_ > 0 ? fmt::format(", {} claimed by other workers", claimed_by_others_)
-                               : "",
-        stopped_ ? ", stopped" : "");
+    std::string counts = fmt::format("finished {}, {} failed", done_, failed_);
+    if (claimed_by_others_ > 0) {
+      counts += fmt::format(", {} claimed by other workers", claimed_by_others_);
+    }
+    if (stopped_) counts += ", stopped";
+    Say("{}: this worker {}\n", Printable(plan_.folder.string()), counts);
     if (stopped_) return kTryAgain;
     return failed_ > 0 ? 1 : 0;
   }
@@ -220,7 +222,7 @@ int PrintStudyStatus(const fs::path& folder, bool as_json) {
     run.Refresh();
     if (run.finished) {
       ++count["done"];
-      count["solved"] += run.state->solved ? 1 : 0;
+      if (run.state->solved) ++count["solved"];
     } else if (FileLock::IsHeld(run.claim())) {
       ++count["running"];
       lines.push_back(fmt::format("  {:<20} {:>11} steps  claimed by {}", run.name,

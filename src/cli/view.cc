@@ -164,7 +164,8 @@ void DescribeRecording(const ViewArguments& a, const fs::path& path, nlohmann::j
   const std::string kind = KindOf(a.record);
   const double usual = a.trial.is_of_eval() ? kEvaluationSeconds : 10;
   const double seconds = a.seconds < 0 ? usual : a.seconds;
-  const double fps = a.fps > 0 ? a.fps : kind == "gif" ? 25 : 50;
+  double fps = kind == "gif" ? 25 : 50;
+  if (a.fps > 0) fps = a.fps;
   const bool single = kind == "png";
   job["kind"] = kind;
   job["path"] = path;

@@ -88,12 +88,16 @@ double MpcPolicy::Torque(const StateVector& deviation, size_t env, Memory& memor
   Trajectory regulated =
       optimizer.Follow(cost_, x, upright, std::vector<Eigen::RowVector4d>(T, -lqr_.K));
   if (regulated.cost < trajectory.cost) trajectory = std::move(regulated);
-  optimizer.Improve(cost_, first ? kTolerance : 0,
-                    first ? kFirstIterations : static_cast<int>(config_.iterations), trajectory);
+  if (first) {
+    optimizer.Improve(cost_, kTolerance, kFirstIterations, trajectory);
+  } else {
+    optimizer.Improve(cost_, 0, static_cast<int>(config_.iterations), trajectory);
+  }
   K = optimizer.gains();
   // A fall may be faster than a few iterations can plan. The share of a torque that accelerates the
   // motor's joint: 1 up to 2/3 of the velocity, 0 at the velocity, -1 from 4/3 on.
-  const double w = x[plant().actuated_joint == 1 ? 2 : 3], u = trajectory.u[0];
+  const double w = x[plant().actuated_joint == 1 ? 2 : 3];
+  const double u = trajectory.u[0];
   return u * w > 0 ? u * std::clamp(3 * (1 - std::abs(w) / config_.velocity), -1.0, 1.0) : u;
 }
 

@@ -138,7 +138,10 @@ double TvlqrPolicy::Torque(const StateVector& deviation, size_t env, Memory& mem
   for (const double sign : {1.0, -1.0}) {
     for (int t = 0; t < T; ++t) {
       const double there = cost({t, sign});
-      if (there < least) std::tie(nearest, least) = std::tuple(Place{t, sign}, there);
+      if (there < least) {
+        nearest = {t, sign};
+        least = there;
+      }
     }
   }
   if (least < kCheaper * now) place = nearest;

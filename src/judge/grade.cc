@@ -62,11 +62,15 @@ fs::path PolicyFile(const fs::path& entry) {
   fs::path file = entry;
   if (fs::is_directory(status)) file /= RunFolder::kPolicy;
   if (IsOwnFile(file) && file.extension() == ".safetensors") return file;
-  throw BadInput(Concat("expected NAME.safetensors or NAME/policy.safetensors, got ",
-                        fs::is_symlink(status) || fs::is_symlink(file) ? "a link"
-                        : fs::is_directory(status)                     ? "a folder without it"
-                        : fs::is_regular_file(status)                  ? "another file"
-                                                                       : "no regular file"));
+  const char* got = "no regular file";
+  if (fs::is_symlink(status) || fs::is_symlink(file)) {
+    got = "a link";
+  } else if (fs::is_directory(status)) {
+    got = "a folder without it";
+  } else if (fs::is_regular_file(status)) {
+    got = "another file";
+  }
+  throw BadInput(Concat("expected NAME.safetensors or NAME/policy.safetensors, got ", got));
 }
 
 LoadedPolicy PolicyOfEntry(const fs::path& file) {

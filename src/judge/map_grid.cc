@@ -70,8 +70,10 @@ std::vector<EpisodeResult> RunRange(const MapConfig& config, const Policy& polic
     env_config.disturbances.push_back(point.disturbance);
   }
   PendulumEnv env(env_config);
-  for (int i = 0; config.start_given && i < count; ++i) {
-    env.SetState(i, config.PointOf((first + i) / config.episodes).start());
+  if (config.start_given) {
+    for (int i = 0; i < count; ++i) {
+      env.SetState(i, config.PointOf((first + i) / config.episodes).start());
+    }
   }
 
   std::vector<EpisodeResult> results;
@@ -149,11 +151,16 @@ MapAxis ParseMapAxis(const std::string& text, const MapPoint& training, const st
   const int64_t usual = step > 0 ? std::llround((to - from) / step) + 1 : kDefaultCells;
   const int64_t cells = pieces.size() == 3 ? ParseCells(pieces[2], place) : usual;
   for (int64_t i = 0; i < cells; ++i) {
-    // With these weights, the middle of the axis is exact.
-    const double between =
-        (from * static_cast<double>(cells - 1 - i) + to * static_cast<double>(i)) /
-        static_cast<double>(cells - 1);
-    axis.values.push_back(i == 0 ? from : i == cells - 1 ? to : between);
+    if (i == 0) {
+      axis.values.push_back(from);
+    } else if (i == cells - 1) {
+      axis.values.push_back(to);
+    } else {
+      // With these weights, the middle of the axis is exact.
+      axis.values.push_back(
+          (from * static_cast<double>(cells - 1 - i) + to * static_cast<double>(i)) /
+          static_cast<double>(cells - 1));
+    }
     options.Set(axis.name, FormatNumber(axis.values.back()), place);
   }
   return axis;

@@ -77,7 +77,8 @@ Figure MapFigure(const MapResult& map) {
 
 /// A figure with a success panel for each policy.
 Figure SuccessFigure(const std::vector<MapResult>& maps) {
-  const int count = static_cast<int>(maps.size()), columns = count == 4 ? 2 : std::min(3, count);
+  const int count = static_cast<int>(maps.size());
+  const int columns = count == 4 ? 2 : std::min(3, count);
   const int rows = (count + columns - 1) / columns;
   Figure figure{.columns = columns,
                 .width = 40 + 420 * columns,

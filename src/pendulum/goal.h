@@ -37,7 +37,8 @@ inline std::vector<std::string> PoseNames() {
 /// The state with its angles measured from `pose` in place of upright: rest in the pose becomes
 /// rest upright.
 inline PendulumState SeenFrom(const Pose& pose, const PendulumState& s) {
-  const double turn1 = pose.up1 ? 0 : std::numbers::pi, turn12 = pose.up2 ? 0 : std::numbers::pi;
+  const double turn1 = pose.up1 ? 0 : std::numbers::pi;
+  const double turn12 = pose.up2 ? 0 : std::numbers::pi;
   return {s.q1 + turn1, s.q2 + turn12 - turn1, s.w1, s.w2};
 }
 

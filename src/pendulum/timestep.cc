@@ -43,11 +43,12 @@ void CheckTimestep(const Plant& plant, const std::string& where, double h) {
   const double largest = kStable / h;
   if (decay.rate <= largest) return;
   const bool first = decay.joint == 1;
+  const double damping = first ? plant.damping1 : plant.damping2;
+  const double coulomb = first ? plant.coulomb1 : plant.coulomb2;
   throw BadInput(Concat(where, ": expected friction that stops the joints at a rate of at most ",
                         largest, "/s, because time steps of ", h, " s are unstable beyond it, got ",
-                        decay.rate, "/s: damping", decay.joint, " = ",
-                        first ? plant.damping1 : plant.damping2, " N·m·s/rad and coulomb",
-                        decay.joint, " = ", first ? plant.coulomb1 : plant.coulomb2, " N·m act on ",
+                        decay.rate, "/s: damping", decay.joint, " = ", damping,
+                        " N·m·s/rad and coulomb", decay.joint, " = ", coulomb, " N·m act on ",
                         decay.inertia, " kg·m²"));
 }
 

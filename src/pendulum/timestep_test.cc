@@ -64,11 +64,18 @@ TEST(Timestep, ThePlantsOfTheProgramAreStable) {
   EXPECT_EQ(ProblemOf(Plant(), box), "");
   // The machine of RealAIGym: much dry friction on light links.
   Plant machine;
-  machine.mass1 = 0.52, machine.mass2 = 0.63, machine.length1 = 0.2, machine.length2 = 0.3;
-  machine.center1 = 0.2, machine.center2 = 0.256, machine.inertia1 = 0.011;
-  machine.inertia2 = 0.00997, machine.armature = 0.00264;
+  machine.mass1 = 0.52;
+  machine.mass2 = 0.63;
+  machine.length1 = 0.2;
+  machine.length2 = 0.3;
+  machine.center1 = 0.2;
+  machine.center2 = 0.256;
+  machine.inertia1 = 0.011;
+  machine.inertia2 = 0.00997;
+  machine.armature = 0.00264;
   machine.damping1 = machine.damping2 = 0.001;
-  machine.coulomb1 = 0.16, machine.coulomb2 = 0.12;
+  machine.coulomb1 = 0.16;
+  machine.coulomb2 = 0.12;
   box.plant.fill(0.25);
   EXPECT_EQ(ProblemOf(machine, box), "");
 }

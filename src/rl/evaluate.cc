@@ -210,7 +210,7 @@ void TorqueTally::Add(std::span<const double> torque, bool at_goal) {
   }
   variation_ += change;
   goal_variation_ += change;
-  goal_changes_ += is_chatter ? 1 : 0;
+  if (is_chatter) ++goal_changes_;
   if (!at_goal) goal_since_ = -1;
   if (!at_goal || goal_since_ >= 0) return;
   goal_since_ = steps_;
@@ -257,11 +257,13 @@ Evaluation Summarize(std::span<const EvaluationEpisode> episodes, const Evaluati
   std::vector<double> seconds;
   for (const EvaluationEpisode* episode : all) seconds.push_back(episode->seconds);
   e.seconds = MomentsOf(seconds);
-  for (size_t body = 0; !successful.empty() && body < episodes.front().tilt.size(); ++body) {
-    std::vector<double> tilts;
-    tilts.reserve(successful.size());
-    for (const auto* episode : successful) tilts.push_back(std::abs(episode->tilt[body]));
-    e.tilt.push_back(MomentsOf(tilts));
+  if (!successful.empty()) {
+    for (size_t body = 0; body < episodes.front().tilt.size(); ++body) {
+      std::vector<double> tilts;
+      tilts.reserve(successful.size());
+      for (const auto* episode : successful) tilts.push_back(std::abs(episode->tilt[body]));
+      e.tilt.push_back(MomentsOf(tilts));
+    }
   }
   if (!episodes.empty()) e.term_means.resize(episodes.front().terms.size());
   const double share = 1 / static_cast<double>(std::max<size_t>(1, episodes.size()));

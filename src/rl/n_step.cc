@@ -31,11 +31,13 @@ void NStep::Complete(int env, std::span<const float> next_obs, bool terminal, bo
   // A full window adds its oldest step. The end of an episode adds all waiting steps.
   auto k = static_cast<int>(count_[env]);
   int first = 0;
-  for (; k == n_ || (done && k > 0); --k, ++first) {
+  while (k == n_ || (done && k > 0)) {
     double sum = 0;
     for (int i = first + k; i-- > first;) sum = reward(i, 0) + gamma_ * sum;
     const double discount = terminal ? 0.0 : std::pow(gamma_, static_cast<double>(k));
     replay.Add({obs.row(first), next_obs, action.row(first), sum, discount});
+    --k;
+    ++first;
   }
 
   // Move the steps that still wait to the front.

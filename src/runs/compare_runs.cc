@@ -206,13 +206,17 @@ void DropDuplicates(Found& found) {
   const auto key = [](const RunRecord& run) {
     return std::pair(run.config.train.seed, run.settings);
   };
-  std::map<std::pair<int64_t, std::string>, std::pair<int64_t, fs::path>> longest;
+  struct Longest {
+    int64_t steps = -1;
+    fs::path path;
+  };
+  std::map<std::pair<int64_t, std::string>, Longest> longest;  // by seed and settings
   for (const RunRecord& run : found.runs) {
-    std::pair<int64_t, fs::path>& kept = longest.try_emplace(key(run), -1, "").first->second;
-    if (LastStep(run) > kept.first) kept = {LastStep(run), run.path};
+    Longest& kept = longest[key(run)];
+    if (LastStep(run) > kept.steps) kept = {LastStep(run), run.path};
   }
   std::erase_if(found.runs, [&](const RunRecord& run) {
-    const fs::path& kept = longest.at(key(run)).second;
+    const fs::path& kept = longest.at(key(run)).path;
     if (run.path == kept) return false;
     found.LeaveOut(run.path, Concat("the same training as ", kept.string(),
                                     " (all settings and seed ", run.config.train.seed, ")"));

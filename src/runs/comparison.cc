@@ -42,12 +42,12 @@ Stability StabilityOf(const RunGroup& group) {
     for (size_t i = *solved_at + 2; i < run.evaluations.size(); ++i) {
       const double rate = run.evaluations[i].success_rate;
       ++s.evaluations;
-      s.steady_evaluations += rate >= kSteadyRate ? 1 : 0;
+      if (rate >= kSteadyRate) ++s.steady_evaluations;
       s.lowest = std::min(s.lowest, rate);
       steady = steady && rate >= kSteadyRate;
     }
     ++s.runs;
-    s.steady_runs += steady ? 1 : 0;
+    if (steady) ++s.steady_runs;
   }
   return s;
 }

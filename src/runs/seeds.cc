@@ -53,7 +53,8 @@ std::vector<int64_t> ParseSeeds(std::string_view text, const std::string& where)
 std::string SeedsText(const std::vector<int64_t>& seeds) {
   std::vector<std::string> pieces;
   for (size_t i = 0, end = 0; i < seeds.size(); i = end) {
-    for (end = i + 1; end < seeds.size() && seeds[end] == seeds[end - 1] + 1;) ++end;
+    end = i + 1;
+    while (end < seeds.size() && seeds[end] == seeds[end - 1] + 1) ++end;
     const std::string first = std::to_string(seeds[i]);
     pieces.push_back(end == i + 1 ? first : Concat(first, "-", seeds[end - 1]));
   }

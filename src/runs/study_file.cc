@@ -57,8 +57,16 @@ std::vector<Variant> ReadVariants(const toml::table& study, const std::string& w
     throw BadInput(
         Concat(where, ": expected at most ", kMostVariants, " variants, got ", variants->size()));
   }
-  std::vector<std::pair<uint32_t, Variant>> placed;
-  std::map<std::string, std::pair<uint32_t, std::string>> known;  // settings → line and name
+  struct Placed {
+    uint32_t line;
+    Variant variant;
+  };
+  struct Known {
+    uint32_t line;
+    std::string name;
+  };
+  std::vector<Placed> placed;
+  std::map<std::string, Known> known;  // by the settings
   for (const auto& [key, node] : *variants) {
     const std::string name(key.str());
     CheckVariantName(name, PlaceOf(node, where));
@@ -68,18 +76,19 @@ std::vector<Variant> ReadVariants(const toml::table& study, const std::string& w
     Variant variant{name, BuildVariant(name, settings, PlaceOf(node, where), where)};
     MakeReadyForMany(variant.config);
     const uint32_t line = node.source().begin.line;
-    const auto [same, is_new] = known.try_emplace(ConfigToml(variant.config, true), line, name);
+    const auto [same, is_new] =
+        known.try_emplace(ConfigToml(variant.config, true), Known{line, name});
     if (!is_new) {
       throw BadInput(Concat(PlaceOf(node, where), ": variant \"", name,
-                            "\": expected settings of its own, got those of \"",
-                            same->second.second, "\" in line ", same->second.first));
+                            "\": expected settings of its own, got those of \"", same->second.name,
+                            "\" in line ", same->second.line));
     }
-    placed.emplace_back(line, std::move(variant));
+    placed.push_back({line, std::move(variant)});
   }
-  std::ranges::stable_sort(placed, {}, [](const auto& entry) { return entry.first; });
+  std::ranges::stable_sort(placed, {}, &Placed::line);
   std::vector<Variant> in_order;
   in_order.reserve(placed.size());
-  for (auto& [line, variant] : placed) in_order.push_back(std::move(variant));
+  for (Placed& entry : placed) in_order.push_back(std::move(entry.variant));
   return in_order;
 }
 
