@@ -41,7 +41,7 @@ int ParsePort(std::string_view text, const std::string& link, int lowest) {
 }
 
 LinkAddress ParseSerial(std::string place, const std::string& link) {
-  LinkAddress address{LinkAddress::Kind::kSerial, std::move(place), kUsualBaud};
+  LinkAddress address{LinkAddress::Transport::kSerial, std::move(place), kUsualBaud};
   bool is_valid = true;
   const size_t colon = address.place.rfind(':');
   if (colon != std::string::npos) {
@@ -116,12 +116,12 @@ bool HasHungUp(int fd) {
 }  // namespace
 
 LinkAddress ParseLink(const std::string& text, bool listens) {
-  using Kind = LinkAddress::Kind;
+  using Transport = LinkAddress::Transport;
   if (text.starts_with("udp:")) {
     const std::string place = text.substr(4);
     const size_t colon = place.rfind(':');
     if (colon == std::string::npos && listens) {
-      return {Kind::kUdp, "127.0.0.1", ParsePort(place, text, 0)};
+      return {Transport::kUdp, "127.0.0.1", ParsePort(place, text, 0)};
     }
     if (colon == std::string::npos || colon == 0) {
       throw BadInput(Concat("--link ", Printable(text), ": expected udp:HOST:PORT"));
@@ -133,11 +133,11 @@ LinkAddress ParseLink(const std::string& text, bool listens) {
       throw BadInput(Concat("--link ", Printable(text),
                             ": expected an IPv6 address in brackets, udp:[ADDRESS]:PORT"));
     }
-    return {Kind::kUdp, host,
+    return {Transport::kUdp, host,
             ParsePort(std::string_view(place).substr(colon + 1), text, listens ? 0 : 1)};
   }
   if (listens) {
-    if (text == "pty") return {Kind::kPty, "pty", 0};
+    if (text == "pty") return {Transport::kPty, "pty", 0};
     throw BadInput(
         Concat("--link: expected udp:PORT, udp:HOST:PORT or pty, got \"", Printable(text), "\""));
   }
@@ -153,11 +153,11 @@ LinkAddress ParseLink(const std::string& text, bool listens) {
     throw BadInput(Concat("--link: expected udp:HOST:PORT, serial:DEVICE or a plant file, got \"",
                           Printable(text), "\""));
   }
-  return {Kind::kTwin, text, 0};
+  return {Transport::kTwin, text, 0};
 }
 
 Channel Channel::Connect(const LinkAddress& address) {
-  if (address.kind == LinkAddress::Kind::kUdp) {
+  if (address.transport == LinkAddress::Transport::kUdp) {
     return {OpenUdp(address, /*binds=*/false), true,
             Concat("udp:", address.place, ":", address.number)};
   }
@@ -176,7 +176,7 @@ Channel Channel::Connect(const LinkAddress& address) {
 }
 
 Channel Channel::Listen(const LinkAddress& address) {
-  if (address.kind == LinkAddress::Kind::kUdp) {
+  if (address.transport == LinkAddress::Transport::kUdp) {
     Descriptor fd = OpenUdp(address, /*binds=*/true);
     sockaddr_storage own{};
     socklen_t size = sizeof own;

@@ -14,8 +14,8 @@ namespace upswing::machine {
 /// The address of a link, such as `udp:192.168.1.5:4000`, `serial:/dev/ttyACM0:921600`, `pty`, or
 /// the file of a twin.
 struct LinkAddress {
-  enum class Kind { kTwin, kUdp, kSerial, kPty };
-  Kind kind = Kind::kTwin;
+  enum class Transport { kTwin, kUdp, kSerial, kPty };
+  Transport transport = Transport::kTwin;
   std::string place;  // file, host or device
   int number = 0;     // port, or bit/s
 };

@@ -51,15 +51,15 @@ std::string MeaningOf(double gain) {
 /// The finite difference of the angle that equals a joint's velocities in at least 99% of the rows;
 /// empty if none does.
 std::string DifferenceOf(Pieces pieces, int joint) {
-  struct Kind {
+  struct Stencil {
     const char* name;
     int back, ahead;  // rows
   };
-  for (const Kind& kind : {Kind{"backward", 1, 0}, {"central", 1, 1}, {"forward", 0, 1}}) {
+  for (const Stencil& stencil : {Stencil{"backward", 1, 0}, {"central", 1, 1}, {"forward", 0, 1}}) {
     double rows = 0, equal = 0;
     for (const MachineLog& piece : pieces) {
-      for (int k = kind.back; k + kind.ahead < piece.rows(); ++k) {
-        const int from = k - kind.back, to = k + kind.ahead;
+      for (int k = stencil.back; k + stencil.ahead < piece.rows(); ++k) {
+        const int from = k - stencil.back, to = k + stencil.ahead;
         const double seconds = piece.time[to] - piece.time[from];
         const double difference = piece.angle[to][joint] - piece.angle[from][joint];
         const double v = piece.velocity[k][joint];
@@ -67,7 +67,7 @@ std::string DifferenceOf(Pieces pieces, int joint) {
         equal += std::abs(v * seconds - difference) < 1e-6 * (seconds + std::abs(difference));
       }
     }
-    if (rows > 10 && equal >= 0.99 * rows) return kind.name;
+    if (rows > 10 && equal >= 0.99 * rows) return stencil.name;
   }
   return "";
 }

@@ -103,16 +103,16 @@ TEST(FaultyLine, Delays) {
 }
 
 TEST(LinkAddress, IsParsed) {
-  using Kind = LinkAddress::Kind;
+  using Transport = LinkAddress::Transport;
   EXPECT_EQ(ParseLink("udp:host:4000", false).number, 4000);
   EXPECT_EQ(ParseLink("udp:4000", true).place, "127.0.0.1");
   EXPECT_EQ(ParseLink("serial:/dev/ttyACM0", false).number, kUsualBaud);
   EXPECT_EQ(ParseLink("serial:/dev/ttyACM0:1000000", false).place, "/dev/ttyACM0");
   EXPECT_EQ(ParseLink("serial:/dev/ttyACM0:250000", false).number, 250000);
-  EXPECT_EQ(ParseLink("/dev/ttyACM0", false).kind, Kind::kSerial);
+  EXPECT_EQ(ParseLink("/dev/ttyACM0", false).transport, Transport::kSerial);
   EXPECT_EQ(ParseLink("udp:[::1]:4000", false).place, "::1");
-  EXPECT_EQ(ParseLink("twin.toml", false).kind, Kind::kTwin);
-  EXPECT_EQ(ParseLink("pty", true).kind, Kind::kPty);
+  EXPECT_EQ(ParseLink("twin.toml", false).transport, Transport::kTwin);
+  EXPECT_EQ(ParseLink("pty", true).transport, Transport::kPty);
   for (const char* wrong : {"udp:4000", "udp::4000", "udp:h:0", "udp:h:65536", "udp:h:x",
                             "serial:", "serial:/dev/tty:96", "tcp:h:1", "udp:::1:4000"}) {
     EXPECT_THROW(ParseLink(wrong, false), Error) << wrong;

@@ -24,13 +24,13 @@ constexpr double kMotion =
     0.1;  // of a joint since its encoder sticks, which has to be noticed, rad
 
 /// A fault from the beginning, or encoders that stick at a random moment.
-struct Kind {
+struct FaultCase {
   const char* name;
   MachineFaults faults = {};
   bool at_random = false;
 };
 
-std::vector<Kind> Kinds() {
+std::vector<FaultCase> FaultCases() {
   return {{"no fault"},
           {"both encoders dead", {.stuck_after = {0, 0}}},
           {"encoder 1 dead", {.stuck_after = {0, kNever}}},
@@ -63,15 +63,15 @@ struct Setting {
 };
 
 /// Runs a controller on a machine drawn from the twin.
-Outcome RunWithFault(const Kind& kind, const Setting& setting, const Twin& twin,
+Outcome RunWithFault(const FaultCase& fault, const Setting& setting, const Twin& twin,
                      const MachinePolicy& policy) {
   Rng rng(setting.seed, "faults");
   const Twin machine = DrawTwin(twin, rng);
-  FakeConfig fault;
-  fault.machine = kind.faults;
-  const double onset = kind.at_random ? rng.Uniform(0.3, kSeconds) : 0;
-  for (double& after : fault.machine.stuck_after) {
-    if (kind.at_random && after < kNever) after = onset;
+  FakeConfig config;
+  config.machine = fault.faults;
+  const double onset = fault.at_random ? rng.Uniform(0.3, kSeconds) : 0;
+  for (double& after : config.machine.stuck_after) {
+    if (fault.at_random && after < kNever) after = onset;
   }
   LoopBench bench;
   bench.twin = twin;
@@ -80,7 +80,7 @@ Outcome RunWithFault(const Kind& kind, const Setting& setting, const Twin& twin,
   bench.config.seconds = kSeconds;
   bench.config.compensation = setting.has_twin ? 0.95 : 0;
   bench.machine_controller = ControllerOf(policy);
-  bench.link = std::make_unique<FakeLink>(machine, fault, setting.seed);
+  bench.link = std::make_unique<FakeLink>(machine, config, setting.seed);
   bench.Make();
 
   const auto& link = dynamic_cast<const FakeLink&>(*bench.link);
@@ -107,7 +107,7 @@ Outcome RunWithFault(const Kind& kind, const Setting& setting, const Twin& twin,
     }
     const Joints motion{s.q1 - stuck.q1, s.q2 - stuck.q2};
     for (int j = 0; j < 2; ++j) {
-      const bool unseen = kind.faults.stuck_after[j] < kNever && std::abs(motion[j]) > kMotion;
+      const bool unseen = fault.faults.stuck_after[j] < kNever && std::abs(motion[j]) > kMotion;
       if (unseen && moved < 0) moved = link.Now();
     }
   }
@@ -130,30 +130,30 @@ TEST(Faults, LeaveLittleEnergyAndAreNoticed) {
   const Twin twin = ReadTwin("realaigym-twin", "twin");
   const MachinePolicy policy = GetMachinePolicy({"tvlqr", {}, {}}, "", twin);
   for (const bool has_twin : {true, false}) {
-    for (const Kind& kind : Kinds()) {
+    for (const FaultCase& fault : FaultCases()) {
       Outcome worst;
       int noticed = 0, all = 0;
       for (const int64_t hz : rates) {
         for (int i = 0; i < runs; ++i) {
           const auto seed = static_cast<uint64_t>(1000 + i);
-          const Outcome o = RunWithFault(kind, {hz, has_twin, seed}, twin, policy);
+          const Outcome o = RunWithFault(fault, {hz, has_twin, seed}, twin, policy);
           worst.energy = std::max(worst.energy, o.energy);
           worst.velocity = std::max(worst.velocity, o.velocity);
           worst.torque = std::max(worst.torque, o.torque);
           if (!o.reason.empty()) worst.late = std::max(worst.late, o.late);
           noticed += o.reason.empty() ? 0 : 1;
           ++all;
-          const std::string where = std::string(kind.name) + (has_twin ? ", twin, " : ", ") +
+          const std::string where = std::string(fault.name) + (has_twin ? ", twin, " : ", ") +
                                     std::to_string(hz) + " Hz, seed " + std::to_string(seed);
           EXPECT_LT(o.energy, 4) << where;
           if (!has_twin) continue;
-          const bool healthy = kind.name == std::string("no fault");
-          const bool rests = kind.name == std::string("both encoders stick");
+          const bool healthy = fault.name == std::string("no fault");
+          const bool rests = fault.name == std::string("both encoders stick");
           EXPECT_TRUE(rests || o.reason.empty() == healthy) << where << ": " << o.reason;
         }
       }
       if (wanted == nullptr) continue;
-      std::printf("| %s | %s | %d of %d | %.2f | %.1f | %.2f | %.2f |\n", kind.name,
+      std::printf("| %s | %s | %d of %d | %.2f | %.1f | %.2f | %.2f |\n", fault.name,
                   has_twin ? "yes" : "no", noticed, all, worst.energy, worst.velocity, worst.torque,
                   worst.late);
       std::fflush(stdout);

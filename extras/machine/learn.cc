@@ -75,11 +75,11 @@ std::vector<Candidate> CandidatesFor(const Plant& plant) {
 double ProcessorSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 /// A session of learning.
-class Learner {
+class LearningSession {
  public:
-  Learner(const LearnConfig& config, MachineLink& link, const std::filesystem::path& out,
-          ThreadPool* pool, const std::function<void(const std::string&)>& say,
-          const std::function<bool()>& stop)
+  LearningSession(const LearnConfig& config, MachineLink& link, const std::filesystem::path& out,
+                  ThreadPool* pool, const std::function<void(const std::string&)>& say,
+                  const std::function<bool()>& stop)
       : c_(config), link_(link), out_(out), pool_(pool), say_(say), stop_(stop) {
     twin_.plant.torque_limit = c_.limits.torque;
     twin_.plant.actuated_joint = c_.actuated_joint;
@@ -97,7 +97,8 @@ class Learner {
       ExpectMotion();
       Fit(kSmallMotion.window);
       // A link that hardly moved shows no twin that is good enough to estimate the state.
-      const bool has_twin = Larger(twin_.sensors.zero1, twin_.sensors.zero2) < kLargestZero;
+      const bool has_twin =
+          LargerMagnitude(twin_.sensors.zero1, twin_.sensors.zero2) < kLargestZero;
       if (!has_twin) twin_ = known;
       Excite(kLargeMotion, has_twin);
       while (true) {
@@ -155,8 +156,8 @@ class Learner {
     const double hanging = -body.At({}).energy;
     const auto level = [=, velocity = kLimitShare * l.velocity](const PendulumState& s) {
       // Lean and velocity add up as energies do: links that lean and move go on to lean further.
-      const double motion = std::hypot(Larger(Wrapped(s.q1), Wrapped(s.q1 + s.q2)) / lean,
-                                       Larger(s.w1, s.w2) / velocity);
+      const double motion = std::hypot(LargerMagnitude(Wrapped(s.q1), Wrapped(s.q1 + s.q2)) / lean,
+                                       LargerMagnitude(s.w1, s.w2) / velocity);
       return has_twin ? std::max(motion, (1 + body.At(s).energy / hanging) / energy) : motion;
     };
     say_(fmt::format("excite: torques grow until the links lean {:.2f} rad, {:g} s", lean,
@@ -183,8 +184,8 @@ class Learner {
     Joints angle{}, torque{};
     for (int k = 0; k < logs_.back().rows(); ++k) {
       for (int j = 0; j < 2; ++j) {
-        angle[j] = Larger(angle[j], logs_.back().angle[k][j]);
-        torque[j] = Larger(torque[j], logs_.back().commanded[k][j]);
+        angle[j] = LargerMagnitude(angle[j], logs_.back().angle[k][j]);
+        torque[j] = LargerMagnitude(torque[j], logs_.back().commanded[k][j]);
       }
     }
     say_(
@@ -195,7 +196,7 @@ class Learner {
     // A machine that does not answer gets no more torque.
     if (run.faulty) throw Ended{run.reason};
     const Joints& last = logs_.back().angle.back();
-    if (Larger(last[0], last[1]) > c_.limits.angle) {
+    if (LargerMagnitude(last[0], last[1]) > c_.limits.angle) {
       throw Ended{"the links hang beyond --max-angle: turn them back, or raise it"};
     }
     return run;
@@ -382,7 +383,7 @@ LearnResult Learn(const LearnConfig& config, MachineLink& link, const std::files
                   ThreadPool* pool, const std::function<void(const std::string&)>& say,
                   const std::function<bool()>& stop) {
   config.Check();
-  return Learner(config, link, out, pool, say, stop).Work();
+  return LearningSession(config, link, out, pool, say, stop).Work();
 }
 
 }  // namespace upswing::machine

@@ -34,7 +34,8 @@ std::string CommandOf(const LearnArguments& a, const LearnResult& r) {
     text += fmt::format(" {} {}", FlagOf(flag.name), ShellQuoted(flag.text));
   }
   for (const std::string& change : controller.made_for) text += " --made-for " + change;
-  const bool in_process = ParseLink(a.link, /*listens=*/false).kind == LinkAddress::Kind::kTwin;
+  const bool in_process =
+      ParseLink(a.link, /*listens=*/false).transport == LinkAddress::Transport::kTwin;
   const std::string twin = ShellQuoted((std::filesystem::path(a.out) / "twin.toml").string());
   text += in_process ? fmt::format(" --link {}", twin)
                      : fmt::format(" --link {} --twin {}", ShellQuoted(a.link), twin);
@@ -54,7 +55,7 @@ int RunLearn(const LearnArguments& a) {
   config.actuated_joint = static_cast<int>(*ParseRobot(a.robot));
   config.Check();
   const LinkAddress address = ParseLink(a.link, /*listens=*/false);
-  if (address.kind == LinkAddress::Kind::kTwin) {
+  if (address.transport == LinkAddress::Transport::kTwin) {
     g_learned =
         std::make_unique<TwinLink>(ReadTwin(address.place, "--link"), PendulumState(), config.seed);
   } else {

@@ -32,7 +32,7 @@ RunOutcome RunCycles(const LearnConfig& c, const RunRules& rules, const MachineS
     if (summary->driven == 0) first = s;
     if (summary->upright > 0) upright_at = summary->driven;
     const bool lost = summary->driven - upright_at > kLongestFall ||
-                      Larger(s.q1 - first.q1, s.q2 - first.q2) > kMostTurn;
+                      LargerMagnitude(s.q1 - first.q1, s.q2 - first.q2) > kMostTurn;
     return stop() || (rules.is_try && (lost || summary->upright >= c.hold));
   };
   LogWriter log(rules.log);

@@ -10,7 +10,7 @@
 namespace upswing::machine {
 
 /// The larger absolute value.
-inline double Larger(double a, double b) { return std::max(std::abs(a), std::abs(b)); }
+inline double LargerMagnitude(double a, double b) { return std::max(std::abs(a), std::abs(b)); }
 
 /// Longest time of a try without balance, s.
 inline constexpr double kLongestFall = 6;

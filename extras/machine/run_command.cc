@@ -36,10 +36,10 @@ void CompareWithTwin(const LoadedPolicy& policy, const Twin& twin) {
   constexpr double kSimilar = 0.2;  // relative difference that a policy usually withstands
   const Manipulator own = ManipulatorOf(policy.plant), body = BodyOf(twin);
   std::string text;
-  const auto compare = [&](const char* what, double made_for, double is, const char* unit) {
-    if (std::abs(made_for - is) <= kSimilar * std::abs(is)) return;
-    text += fmt::format("{}{} {:.3g} {} (twin {:.3g})", text.empty() ? "" : ", ", what, made_for,
-                        unit, is);
+  const auto compare = [&](const char* what, double of_policy, double of_twin, const char* unit) {
+    if (std::abs(of_policy - of_twin) <= kSimilar * std::abs(of_twin)) return;
+    if (!text.empty()) text += ", ";
+    text += fmt::format("{} {:.3g} {} (twin {:.3g})", what, of_policy, unit, of_twin);
   };
   // Upright at rest, with straight links: inertia about joint 1 and its moment of gravity.
   compare("inertia", own.Mass(1).M11, body.Mass(1).M11, "kg·m²");
@@ -54,7 +54,7 @@ void CompareWithTwin(const LoadedPolicy& policy, const Twin& twin) {
 void CheckBaud(const LinkAddress& link, int64_t hz) {
   constexpr int64_t kBitsPerByte = 10;  // start, 8 bits, stop
   const int64_t needed = hz * kBitsPerByte * static_cast<int64_t>(kFrameBytes);
-  if (link.kind == LinkAddress::Kind::kSerial && link.number < needed) {
+  if (link.transport == LinkAddress::Transport::kSerial && link.number < needed) {
     throw BadInput(Concat("--link: expected at least ", needed, " bit/s for ", hz,
                           " cycles per second, got ", link.number));
   }
@@ -108,7 +108,7 @@ int Drive(const RunArguments& a, const MachinePolicy& policy, const std::optiona
       .hz = hz, .seconds = a.seconds, .actuated_joint = joint, .compensation = a.compensation};
   config.stop = [] { return StopSignal() != 0; };
 
-  if (address.kind == LinkAddress::Kind::kTwin) {
+  if (address.transport == LinkAddress::Transport::kTwin) {
     const auto seed = static_cast<uint64_t>(a.seed);
     Rng rng(seed, "loop: machine");
     g_link = std::make_unique<TwinLink>(a.draw ? DrawTwin(*twin, rng) : *twin, start, seed);
@@ -148,7 +148,7 @@ int RunRun(const RunArguments& a) {
   CheckBaud(address, std::llround(a.hz));
   if (IsStandardStream(a.log)) throw BadInput("--log: expected a file, got standard output");
   if (!a.log.empty()) CheckWritable("--log", a.log);
-  const bool in_process = address.kind == LinkAddress::Kind::kTwin;
+  const bool in_process = address.transport == LinkAddress::Transport::kTwin;
   std::optional<Twin> twin;
   if (in_process || !a.twin.empty())
     twin = a.twin.empty() ? ReadTwin(address.place, "--link") : ReadTwin(a.twin, "--twin");
