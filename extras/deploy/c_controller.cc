@@ -179,8 +179,8 @@ CHeader ControllerHeaderOf(const LoadedPolicy& loaded, const std::string& prefix
       Concat("It is ", CommentText(loaded.name), ": ", CommentText(loaded.policy->description()));
   parts.limit = limit;
   parts.period = kControlPeriod;
-  parts.plant = "of which it knows all";
-  parts.made_for = config.plant;
+  parts.plant_use = "of which it knows all";
+  parts.plant = config.plant;
   parts.work = "a product of four numbers.";
   const auto gain = [&](const Lqr& lqr) {
     parts.constants.push_back({"gain", "N m/rad, N m s/rad", Floats(lqr.K)});

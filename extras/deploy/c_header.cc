@@ -58,13 +58,13 @@ uint32_t ChecksumOf(const std::vector<CArray>& arrays) {
 }
 
 std::string PlantParagraph(const CParts& parts) {
-  if (parts.plant.empty()) return "";
+  if (parts.plant_use.empty()) return "";
   std::vector<std::string> values;
-  for (const auto& [name, value] : PlantValues(parts.made_for)) {
+  for (const auto& [name, value] : PlantValues(parts.plant)) {
     values.push_back(Concat(name, ' ', FormatNumber(value)));
   }
-  return Paragraph(Concat("Made for this plant (kg, m, N m s/rad, m/s2, N m), ", parts.plant, ": ",
-                          Join(values, ", "), '.')) +
+  return Paragraph(Concat("Made for this plant (kg, m, N m s/rad, m/s2, N m), ", parts.plant_use,
+                          ": ", Join(values, ", "), '.')) +
          "\n *\n";
 }
 

@@ -30,13 +30,13 @@ std::vector<float> Floats(const auto& numbers) { return {numbers.begin(), number
 
 /// The parts of a C header. Names of macros and arrays lack the prefix.
 struct CParts {
-  ExportedTask task;   // its state gives the arguments of the control function
-  std::string origin;  // origin of the policy
-  double limit = 0;    // N m
-  double period = 0;   // s
-  std::string plant;   // what the policy takes from `made_for`; empty: nothing
-  Plant made_for;
-  std::string work;  // work of a call
+  ExportedTask task;      // its state gives the arguments of the control function
+  std::string origin;     // origin of the policy
+  double limit = 0;       // N m
+  double period = 0;      // s
+  Plant plant;            // of the training, or the design plant
+  std::string plant_use;  // what the policy takes from the plant; empty: nothing
+  std::string work;       // work of a call
   /// Name, and value with a comment.
   std::vector<std::pair<std::string, std::string>> macros;
   std::vector<CArray> constants;  // covered by the checksum

@@ -88,8 +88,8 @@ void AddPlant(const Plant& plant, CParts& parts) {
   // extras/deploy/c/pendulum.c uses the same limits.
   static_assert(kMaxVelocity1 == 10 && kMaxVelocity2 == 20);
   static_assert(kMemoryVelocity == 1 && kMemoryTorque == 5 && kMemorySize == 3);
-  parts.plant = "by which it computes energy and height";
-  parts.made_for = plant;
+  parts.plant_use = "by which it computes energy and height";
+  parts.plant = plant;
   parts.constants = {{"energy", "of the observed energy and height", EnergyConstants(plant)}};
 }
 
