@@ -13,7 +13,7 @@ namespace upswing {
 namespace {
 
 /// A controller's name and its factory.
-struct Controller {
+struct NamedController {
   const char* name;
   std::shared_ptr<const Policy> (*make)(const ControllerConfig& config);
   bool only_balances = false;
@@ -69,7 +69,7 @@ Made MakeHybrid(const ControllerConfig& config) {
                                         config.swing_up_policy, config.plant);
 }
 
-constexpr Controller kControllers[] = {
+constexpr NamedController kControllers[] = {
     {"energy", MakeEnergyShaping},
     {"hybrid", MakeHybrid},
     {"lqr",
@@ -104,12 +104,13 @@ void ControllerConfig::Describe(Options& o) {
 std::vector<std::string> ControllerNames() { return NamesOf(kControllers); }
 
 bool IsController(const std::string& name) {
-  return std::ranges::any_of(kControllers, [&](const Controller& c) { return name == c.name; });
+  return std::ranges::any_of(kControllers,
+                             [&](const NamedController& c) { return name == c.name; });
 }
 
 bool OnlyBalances(const std::string& name) {
   return std::ranges::any_of(
-      kControllers, [&](const Controller& c) { return name == c.name && c.only_balances; });
+      kControllers, [&](const NamedController& c) { return name == c.name && c.only_balances; });
 }
 
 bool HasSection(const std::string& controller, const std::string& section) {
@@ -118,7 +119,7 @@ bool HasSection(const std::string& controller, const std::string& section) {
 
 std::shared_ptr<const Policy> MakeController(const std::string& name,
                                              const ControllerConfig& config) {
-  for (const Controller& controller : kControllers) {
+  for (const NamedController& controller : kControllers) {
     if (name == controller.name) return controller.make(config);
   }
   throw BadInput(Concat("expected a controller, one of ", Join(ControllerNames(), ", "), ", got \"",

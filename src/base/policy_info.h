@@ -23,13 +23,13 @@ struct ObservationInfo {
   std::vector<std::string> goal = {};  // names of the inputs with the pose to reach; empty: none
 
   /// Past steps in an observation.
-  struct Memory {
+  struct PastSteps {
     int64_t steps = 0;
     std::vector<std::string> names;   // names of the numbers of each step
     double velocity = 0, torque = 0;  // rad/s, N·m; changes and torques are divided by them
-    bool operator==(const Memory&) const = default;
+    bool operator==(const PastSteps&) const = default;
   };
-  std::optional<Memory> memory = {};
+  std::optional<PastSteps> memory = {};
 };
 
 /// The metadata of a policy file, with types and checked ranges. Missing optional metadata are
