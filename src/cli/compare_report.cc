@@ -71,16 +71,16 @@ void PrintStability(const GroupSummary& summary) {
 /// Prints a figure over the runs of a group if at least one run has it.
 void PrintFigure(const RunFigure& figure, const Scores& scores, const std::string& torque_unit) {
   if (!std::isfinite(scores.low)) return;
-  if (figure.kind == RunFigure::Kind::kRatio && !std::isfinite(scores.high)) return;
-  using enum RunFigure::Kind;
-  static const std::map<RunFigure::Kind, Formatter> kFormats{
+  if (figure.unit == RunFigure::Unit::kRatio && !std::isfinite(scores.high)) return;
+  using enum RunFigure::Unit;
+  static const std::map<RunFigure::Unit, Formatter> kFormats{
       {kSeconds, Seconds}, {kSteps, Steps},       {kReturn, Whole}, {kShare, Percent},
       {kTorque, Torque},   {kTorqueRate, Torque}, {kRatio, Share}};
   std::string unit;
-  if (figure.kind == kTorque) unit = " " + torque_unit;
-  if (figure.kind == kTorqueRate) unit = Concat(" ", torque_unit, "/s");
-  PrintScores(figure.label, scores, kFormats.at(figure.kind), unit);
-  if (figure.kind == kRatio && ValueIsOff(scores.median, 1)) {
+  if (figure.unit == kTorque) unit = " " + torque_unit;
+  if (figure.unit == kTorqueRate) unit = Concat(" ", torque_unit, "/s");
+  PrintScores(figure.label, scores, kFormats.at(figure.unit), unit);
+  if (figure.unit == kRatio && ValueIsOff(scores.median, 1)) {
     fmt::print("  {:<16}the estimate is off by more than a quarter\n", "");
   }
 }

@@ -173,36 +173,36 @@ struct Verdict {
 };
 
 /// The quantities that the task's formulas use.
-struct Pose {
+struct Features {
   JointAngles<V> angles;
   V c12;
   V energy;  // Ê: hanging at rest 0, upright at rest 1
   V height;  // ĥ of the tip, in [-1, 1]
 };
 
-HWY_INLINE Pose PoseOf(const ClosedFormBatch& batch, size_t i, const State& x) {
-  Pose pose;
-  pose.angles = AnglesOf(x.q);
-  const auto& [s1, c1, s2, c2] = pose.angles;
-  pose.c12 = pose.angles.c12();
+HWY_INLINE Features FeaturesOf(const ClosedFormBatch& batch, size_t i, const State& x) {
+  Features features;
+  features.angles = AnglesOf(x.q);
+  const auto& [s1, c1, s2, c2] = features.angles;
+  features.c12 = features.angles.c12();
 
   // E = (T1 w1² + T2 w12²)/2 + b c2 w1 w12 - G1 c1 - G2 c12, with w12 = w1 + w2
   const V half = Constant(0.5);
   const V w1 = x.w.one, w12 = x.w.one + x.w.two;
   const V squares = MulAdd(LoadFrom(batch.T1, i), w1 * w1, LoadFrom(batch.T2, i) * (w12 * w12));
   const V kinetic = MulAdd(half, squares, (LoadFrom(batch.b, i) * c2) * (w1 * w12));
-  const V minus_potential = MulAdd(LoadFrom(batch.G1, i), c1, LoadFrom(batch.G2, i) * pose.c12);
-  pose.energy = MulAdd(kinetic - minus_potential, LoadFrom(batch.energy_scale, i), half);
-  pose.height =
-      hn::Neg(MulAdd(LoadFrom(batch.share1, i), c1, LoadFrom(batch.share2, i) * pose.c12));
-  return pose;
+  const V minus_potential = MulAdd(LoadFrom(batch.G1, i), c1, LoadFrom(batch.G2, i) * features.c12);
+  features.energy = MulAdd(kinetic - minus_potential, LoadFrom(batch.energy_scale, i), half);
+  features.height =
+      hn::Neg(MulAdd(LoadFrom(batch.share1, i), c1, LoadFrom(batch.share2, i) * features.c12));
+  return features;
 }
 
-HWY_INLINE void JudgeObservation(const Pose& pose, const State& x, Verdict& verdict) {
+HWY_INLINE void JudgeObservation(const Features& features, const State& x, Verdict& verdict) {
   const V obs[kObservationSize] = {
-      pose.angles.c1, pose.angles.s1, x.w.one * Constant(1 / kMaxVelocity1),
-      pose.angles.c2, pose.angles.s2, x.w.two * Constant(1 / kMaxVelocity2),
-      pose.energy,    pose.height};
+      features.angles.c1, features.angles.s1, x.w.one * Constant(1 / kMaxVelocity1),
+      features.angles.c2, features.angles.s2, x.w.two * Constant(1 / kMaxVelocity2),
+      features.energy,    features.height};
   const hn::Rebind<float, D> floats;
   HWY_UNROLL(8)
   for (size_t k = 0; k < kObservationSize; ++k) {
@@ -210,17 +210,18 @@ HWY_INLINE void JudgeObservation(const Pose& pose, const State& x, Verdict& verd
   }
 }
 
-HWY_INLINE void JudgeReward(const Pose& pose, const State& x, V tau, const RewardConfig& weights,
-                            Verdict& verdict) {
+HWY_INLINE void JudgeReward(const Features& features, const State& x, V tau,
+                            const RewardConfig& weights, Verdict& verdict) {
   const V minus_cos30 = Constant(-std::numbers::sqrt3 / 2);
-  const auto inverted = hn::And(hn::Le(pose.angles.c1, minus_cos30), hn::Le(pose.c12, minus_cos30));
+  const auto inverted =
+      hn::And(hn::Le(features.angles.c1, minus_cos30), hn::Le(features.c12, minus_cos30));
   hn::Store(hn::IfThenElseZero(inverted, Constant(1)), kDoubles, verdict.inverted);
 
   const V half = Constant(0.5);
   const V velocity_cost = Constant(-0.01) * MulAdd(x.w.one, x.w.one, x.w.two * x.w.two);
   const V terms[kRewardTerms] = {
-      hn::Min(hn::Max(pose.energy, Constant(0)), Constant(1.5)),
-      MulAdd(half, pose.height, half),
+      hn::Min(hn::Max(features.energy, Constant(0)), Constant(1.5)),
+      MulAdd(half, features.height, half),
       hn::IfThenElseZero(inverted, Constant(5)),
       hn::IfThenElseZero(inverted, velocity_cost),
       hn::IfThenElse(inverted, Constant(-0.05), Constant(-0.01)) * tau * tau,
@@ -247,9 +248,9 @@ HWY_INLINE void JudgeVector(const ClosedFormBatch& batch, const RewardConfig& we
                             Verdict& verdict) {
   const State x = LoadState(batch, i);
   const V tau = LoadFrom(batch.tau, i);
-  const Pose pose = PoseOf(batch, i, x);
-  JudgeObservation(pose, x, verdict);
-  JudgeReward(pose, x, tau, weights, verdict);
+  const Features features = FeaturesOf(batch, i, x);
+  JudgeObservation(features, x, verdict);
+  JudgeReward(features, x, tau, weights, verdict);
   const V turned = MotorAngleOf(batch, i, x) - LoadFrom(batch.angle_before, i);
   hn::Store(hn::Abs(tau * turned), kDoubles, verdict.work);
   hn::Store(hn::IfThenElse(IsSound(x), Constant(0), Constant(1)), kDoubles, verdict.blew_up);

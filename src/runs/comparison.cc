@@ -67,7 +67,7 @@ bool AllFinite(const std::vector<double>& values) {
 std::span<const RunFigure> RunFigures() {
   using R = const RunRecord&;
   using S = GroupSummary;
-  using enum RunFigure::Kind;
+  using enum RunFigure::Unit;
   static constexpr RunFigure kFigures[] = {
       {"solve_seconds", "time to solve", kSeconds, &S::solve_seconds, SolveSeconds},
       {"solve_steps", "steps to solve", kSteps, &S::solve_steps, SolveSteps},

@@ -53,10 +53,10 @@ GroupSummary Summarize(const RunGroup& group);
 
 /// A figure of a run; GroupSummary has the same figure over the runs of a group.
 struct RunFigure {
-  enum class Kind { kSeconds, kSteps, kReturn, kShare, kTorque, kTorqueRate, kRatio };
+  enum class Unit { kSeconds, kSteps, kReturn, kShare, kTorque, kTorqueRate, kRatio };
 
   const char *name, *label;  // in files; for readers
-  Kind kind;
+  Unit unit;
   Scores GroupSummary::*scores;
   double (*of)(const RunRecord&);  // infinite if not reached or unknown
 };
