@@ -73,11 +73,12 @@ CSamples DrawSamples(const ExportedPolicy& policy, const std::vector<LayerView>&
   std::vector<float> before;  // (D)
   double largest = 0, torque = 0;
   bool all_clear = true;
-  int draws = 0;
+  int unclear = 0;  // draws, of all samples together
   for (int i = 0; i < kSamples; ++i) {
     std::vector<double> state(policy.state_size()), outputs;
     std::vector<float> obs;
-    do {
+    bool is_clear = false;
+    while (true) {
       for (size_t k = 0; k < state.size(); ++k) {
         // Angles come first, then equally many velocities; values are rounded to float.
         const double bound = k < state.size() / 2 ? kPi : kVelocity;
@@ -85,13 +86,17 @@ CSamples DrawSamples(const ExportedPolicy& policy, const std::vector<LayerView>&
       }
       obs = ObservationOf(policy, state, before, torque);
       outputs = Evaluate(layers, obs);
-    } while (!IsClear(outputs) && ++draws < kMostDraws);
+      is_clear = IsClear(outputs);
+      if (is_clear) break;
+      ++unclear;
+      if (unclear >= kMostDraws) break;
+    }
     for (const double output : outputs) {
       if (std::abs(output) < kMostFloat) continue;
       throw BadInput(Concat(policy.loaded->path,
                             ": expected outputs within the range of float, got ", output));
     }
-    all_clear = all_clear && IsClear(outputs);
+    if (!is_clear) all_clear = false;
     policy.loaded->policy->Act({obs.data(), 1, policy.obs_size()}, {&torque, 1, 1}, *memory);
     before = obs;
     samples.states.insert(samples.states.end(), state.begin(), state.end());

@@ -87,7 +87,8 @@ void CheckVelocityLimit(Pieces pieces, int joint, const Reporter& report) {
                            std::abs(CentralDifference(piece, k, joint)) > 1.03 * limit;
       if (clipped) continue;
       const int rows = k - 1 - first;  // from first + 1 to k - 1
-      if (rows >= kRows && ++times > 0) {
+      if (rows >= kRows) {
+        ++times;
         const LogRows range = RangeOf(piece, first + 1, k - 1);
         if (!longest || range.last - range.first > longest->last - longest->first) longest = range;
       }
@@ -95,10 +96,9 @@ void CheckVelocityLimit(Pieces pieces, int joint, const Reporter& report) {
     }
   }
   if (!longest) return;
-  report(Severity::kFault,
-         fmt::format("saturates at {:.4g} rad/s{}", limit,
-                     times > 1 ? fmt::format("; {} times, longest", times) : ""),
-         longest, {{"limit", limit}, {"times", times}});
+  std::string text = fmt::format("saturates at {:.4g} rad/s", limit);
+  if (times > 1) text += fmt::format("; {} times, longest", times);
+  report(Severity::kFault, text, longest, {{"limit", limit}, {"times", times}});
 }
 
 void CheckVelocity(Pieces pieces, int joint, const Reporter& report) {

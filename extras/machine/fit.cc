@@ -276,11 +276,12 @@ class Problem {
 
   /// The covariance of a session's values that is assumed at first.
   MatrixXd FirstBetween() const {
-    VectorXd deviations(std::ssize(OwnOf(0)));
-    int k = 0;
-    for (const int i : OwnOf(0)) {
-      const double known = DeviationsOf(values_[i].name).sessions;
-      deviations(k++) = known > 0 ? known : std::abs(NumberIn(twin_, values_[i].name)) / 10;
+    const std::vector<int> own = OwnOf(0);
+    VectorXd deviations(std::ssize(own));
+    for (int k = 0; k < static_cast<int>(own.size()); ++k) {
+      const std::string& name = values_[own[k]].name;
+      const double known = DeviationsOf(name).sessions;
+      deviations(k) = known > 0 ? known : std::abs(NumberIn(twin_, name)) / 10;
     }
     return deviations.cwiseAbs2().asDiagonal();
   }

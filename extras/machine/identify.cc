@@ -24,7 +24,11 @@ std::vector<int> Folds(std::span<const MachineLog> logs, int folds) {
   }
   std::map<std::string, int> dealt;
   std::vector<int> fold;
-  for (const MachineLog& log : logs) fold.push_back(dealt[SessionOf(log.name)]++ % folds);
+  for (const MachineLog& log : logs) {
+    int& logs_before = dealt[SessionOf(log.name)];
+    fold.push_back(logs_before % folds);
+    ++logs_before;
+  }
   if (dealt.size() == logs.size()) {
     for (int i = 0; i < static_cast<int>(logs.size()); ++i) fold[i] = i % folds;
   }
@@ -157,16 +161,18 @@ void MeasureLoop(std::span<const MachineLog> logs, Twin& twin) {
     for (int k = 1; k < log.rows(); ++k) {
       own.push_back(log.time[k] - log.time[k - 1]);
       note_step(log.angle[k][0] - log.angle[k - 1][0], steps);
-      if (!log.measured.empty())
+      if (!log.measured.empty()) {
         note_step(log.measured[k][0] - log.measured[k - 1][0], torque_steps);
+      }
     }
     if (own.empty()) continue;
     const double period = Median(own);
     double squares = 0, on_time = 0;
     for (const double p : own) {
+      if (p > 5 * period) continue;  // a gap
       if (p > 1.25 * period) {
-        late += p > 5 * period ? 0 : 1;  // longer ones are gaps
-        if (p <= 5 * period) twin.loop.late = std::max(twin.loop.late, p - period);
+        ++late;
+        twin.loop.late = std::max(twin.loop.late, p - period);
       } else {
         squares += (p - period) * (p - period);
         ++on_time;

@@ -154,16 +154,19 @@ class LearningSession {
     const double lean = std::min({e.lean, kLimitShare * l.angle, std::acos(1 - 2 * energy)});
     const Manipulator body = BodyOf(twin_);
     const double hanging = -body.At({}).energy;
-    const auto level = [=, velocity = kLimitShare * l.velocity](const PendulumState& s) {
+    const double velocity = kLimitShare * l.velocity;
+    const auto level = [=](const PendulumState& s) {
       // Lean and velocity add up as energies do: links that lean and move go on to lean further.
       const double motion = std::hypot(LargerMagnitude(Wrapped(s.q1), Wrapped(s.q1 + s.q2)) / lean,
                                        LargerMagnitude(s.w1, s.w2) / velocity);
-      return has_twin ? std::max(motion, (1 + body.At(s).energy / hanging) / energy) : motion;
+      if (!has_twin) return motion;
+      return std::max(motion, (1 + body.At(s).energy / hanging) / energy);
     };
     say_(fmt::format("excite: torques grow until the links lean {:.2f} rad, {:g} s", lean,
                      e.seconds));
-    Run({.limits = l, .seconds = e.seconds},
-        has_twin ? Estimator(twin_, 1 / c_.hz) : Estimator(twin_.sensors, 1 / c_.hz),
+    const Estimator estimator =
+        has_twin ? Estimator(twin_, 1 / c_.hz) : Estimator(twin_.sensors, 1 / c_.hz);
+    Run({.limits = l, .seconds = e.seconds}, estimator,
         Excitation(l.torque, c_.actuated_joint, level, c_.seed));
   }
 
@@ -285,7 +288,8 @@ class LearningSession {
   bool Try() {
     const auto policy = Choose();
     ExpectBudget();
-    say_(fmt::format("try {}: {}", ++result_.tries, policy->name));
+    ++result_.tries;
+    say_(fmt::format("try {}: {}", result_.tries, policy->name));
     const RunOutcome run =
         Run(TryRules(result_.compensation), Estimator(twin_, 1 / c_.hz), ControllerOf(policy));
     result_.balanced = run.summary.upright;

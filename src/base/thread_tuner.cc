@@ -48,7 +48,8 @@ void ThreadTuner::End() {
   block_seconds_ += seconds;
   double& fastest = fastest_[candidate()];
   if (++calls_ % kBlock != 0) return;
-  fastest = std::min(fastest, std::exchange(block_seconds_, 0));
+  fastest = std::min(fastest, block_seconds_);
+  block_seconds_ = 0;
   if (calls_ < kBlock * kRounds * static_cast<int>(choices_.size())) return;
   // The trial ends. Fewer threads are enough if they are nearly as fast as the fastest number.
   const double enough = *std::ranges::min_element(fastest_) / kWorthwhile;
@@ -56,7 +57,8 @@ void ThreadTuner::End() {
   chosen_ = static_cast<size_t>(first - fastest_.begin());
   std::ranges::fill(fastest_, kNever);
   calls_ = 0;
-  until_trial_ = std::exchange(trial_seconds_, 0) / kTrialShare;
+  until_trial_ = trial_seconds_ / kTrialShare;
+  trial_seconds_ = 0;
 }
 
 }  // namespace upswing

@@ -132,7 +132,10 @@ double TvlqrPolicy::Torque(const StateVector& deviation, size_t env, Memory& mem
     return d.dot(plan_.P[static_cast<size_t>(there.step)] * d);
   };
   double now = std::numeric_limits<double>::infinity();
-  if (place.step >= 0 && ++place.step < T) now = cost(place);
+  if (place.step >= 0) {
+    ++place.step;
+    if (place.step < T) now = cost(place);
+  }
   Place nearest;
   double least = std::numeric_limits<double>::infinity();
   for (const double sign : {1.0, -1.0}) {
