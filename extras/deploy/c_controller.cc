@@ -164,7 +164,8 @@ CHeader ControllerHeaderOf(const LoadedPolicy& loaded, const std::string& prefix
         Concat(kind, ": expected lqr, energy, pfl, tvlqr or a learned policy for C, got ", what));
   }
   const ControllerConfig config = ConfigOf(loaded);
-  const double limit = config.plant.torque_limit, tolerance = kTorqueShare * limit;
+  const double limit = config.plant.torque_limit;
+  const double tolerance = kTorqueShare * limit;
   const bool simulates = kind != "lqr";
   CHeader header;
   header.prefix = prefix;

@@ -88,7 +88,8 @@ std::string PendulumInputs(const CParts& parts, const std::string& states) {
 }
 
 std::string HeadComment(const CParts& parts, const CHeader& header) {
-  const std::string &name = header.prefix, caps = UpperCase(name);
+  const std::string& name = header.prefix;
+  const std::string caps = UpperCase(name);
   const std::string period = FormatNumber(parts.period);
   const bool foreign = parts.task.state.empty();
   std::string states;
@@ -138,7 +139,8 @@ std::string HeadComment(const CParts& parts, const CHeader& header) {
 
 void WriteHeader(const CParts& parts, CHeader& header) {
   for (const CArray& array : parts.constants) header.constant_bytes += 4 * array.values.size();
-  const std::string &name = header.prefix, caps = UpperCase(name);
+  const std::string& name = header.prefix;
+  const std::string caps = UpperCase(name);
   std::string& text = header.text;
   text = Concat(HeadComment(parts, header), "#ifndef UPSWING_", caps, "_H\n#define UPSWING_", caps,
                 "_H\n\n#include <math.h>\n#include <stdint.h>\n\n");

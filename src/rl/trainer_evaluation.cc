@@ -15,8 +15,10 @@ void Trainer::Evaluate(bool scheduled) {
 
   // Confirm the second passed evaluation in a row, and once solved each that would be the best.
   const EvaluationRule& rule = env_.spec().evaluation;
+  const bool is_second = scheduled && s.streak == 1;
+  const bool may_count = s.solved ? s.IsBest(e, rule) : is_second;
   std::optional<Evaluation> confirmed;
-  if (e.passed && (s.solved ? s.IsBest(e, rule) : scheduled && s.streak == 1)) {
+  if (e.passed && may_count) {
     for (TrainObserver* observer : observers_) observer->OnConfirm(s);
     confirmed = evaluator_.Confirm(*policy, s.steps);
     if (confirmed) e = *confirmed;

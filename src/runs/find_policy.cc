@@ -110,7 +110,8 @@ std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
     ExpectPendulum(policies.back());
     std::error_code none;
     const auto file = fs::canonical(policies.back().path, none);
-    if (!seen.insert(none ? fs::path(name) : file).second) {
+    const fs::path key = none ? fs::path(name) : file;
+    if (!seen.insert(key).second) {
       throw BadInput(Concat(Printable(name), ": expected each policy once, got it twice"));
     }
   }
