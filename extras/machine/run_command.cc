@@ -62,9 +62,9 @@ void CheckBaud(const LinkAddress& link, int64_t hz) {
 
 void PrintSummary(const LoopSummary& s, const LinkCounts& counts, const Supervisor& supervisor,
                   bool simulated) {
-  fmt::print("  ran      {:.2f} s, {}\n", s.driven,
-             s.upright > 0 ? fmt::format("the last {:.2f} s upright", s.upright)
-                           : std::string("not upright at its end"));
+  std::string end = "not upright at its end";
+  if (s.upright > 0) end = fmt::format("the last {:.2f} s upright", s.upright);
+  fmt::print("  ran      {:.2f} s, {}\n", s.driven, end);
   const double share = static_cast<double>(s.on_time) / static_cast<double>(s.cycles);
   fmt::print(
       "  cycles   {}, {:.3f}% begin within {:g} ms of the deadline, the latest after {:.2f} ms, {} "

@@ -91,9 +91,14 @@ void PrintHardware(const HardwareReport& report) {
   print("", {"", "s", "J", "N²m²s", "N·m", "rad²/s", "S"});
   for (const HardwareRun& run : report.runs) {
     const BoardOutcome& o = run.outcome;
+    std::string success = "no";
+    std::string seconds = "–";
+    if (o.above_line) {
+      success = "yes";
+      seconds = number(o.swing_up_seconds, 2);
+    }
     print(Printable(run.name),
-          {o.above_line ? "yes" : "no", o.above_line ? number(o.swing_up_seconds, 2) : "–",
-           number(o.energy, 2), number(o.torque_cost, 2), number(o.smoothness, 3),
+          {success, seconds, number(o.energy, 2), number(o.torque_cost, 2), number(o.smoothness, 3),
            number(o.velocity_cost, 1), number(run.score, 3)});
   }
   print("mean", {fmt::format("{}/{}", report.successes(), report.runs.size()), "–", "–", "–", "–",

@@ -42,10 +42,10 @@ double UprightSince(const std::vector<RolloutRow>& rows) {
 /// The caption below the title: the episode, and how it differs from the training.
 std::string Caption(const PlotArguments& a, const RolloutConfig& config, const Rollout& rollout,
                     const LoadedPolicy& loaded) {
-  std::vector<std::string> parts{
-      a.trial.is_of_eval() ? Concat("episode ", a.trial.episode, " of eval")
-                           : Concat("start ", a.trial.start.empty() ? "0,0,0,0" : a.trial.start),
-      Concat("seed ", a.trial.seed), a.trial.physics};
+  std::string start = Concat("start ", a.trial.start);
+  if (a.trial.start.empty()) start = "start 0,0,0,0";
+  if (a.trial.is_of_eval()) start = Concat("episode ", a.trial.episode, " of eval");
+  std::vector<std::string> parts{start, Concat("seed ", a.trial.seed), a.trial.physics};
   if (rollout.goal) parts.push_back(Concat("goal ", PoseName(*rollout.goal)));
   for (const auto& [now, before] : Differences(OptionsOf(rollout.plant), OptionsOf(loaded.plant))) {
     parts.push_back(fmt::format("{} {:.4g} {} ({}: {:.4g})", now.name, now.number(), now.unit,
@@ -111,8 +111,10 @@ int RunPlot(const PlotArguments& a) {
   fmt::print("{}\n", Printable(loaded.name));
   fmt::print("  plant      {}, physics {}\n", EpisodeText(rollout), a.trial.physics);
   const double since = UprightSince(rollout.rows);
-  fmt::print("  {:<10} {}\n", config.env.any_pose ? "at goal" : "upright",
-             since < 0 ? "not at the end" : fmt::format("from {:.2f} s to the end", since));
+  const char* place = config.env.any_pose ? "at goal" : "upright";
+  std::string when = "not at the end";
+  if (since >= 0) when = fmt::format("from {:.2f} s to the end", since);
+  fmt::print("  {:<10} {}\n", place, when);
   fmt::print("  torque     {}\n", TorqueText(rollout));
   fmt::print("  reward     {}\n", RewardText(rollout));
   if (a.trial.is_of_eval()) {
