@@ -78,7 +78,7 @@ std::pair<std::string, std::string> EvaluateHandle(const PolicyHandle& policy,
   ThreadPool pool(ResolveThreads(threads), threads == 0);
   const EvalReport report =
       EvaluatePolicy(policy.loaded(), trial, episodes, pool, std::ref(python_progress));
-  return {EvalJson(report), EpisodesCsv(report)};
+  return {EvalJson({&report, 1}), EpisodesCsv({&report, 1})};
 }
 
 /// The numbers of a map as a new array (ny × nx).

@@ -39,8 +39,8 @@ class CommandLineTest(ProgramTest):
         self.refuse(["trian"], "trian", "did you mean train?")
 
     def test_too_much_or_too_little(self):
-        self.refuse(["eval"], "policy")
-        self.refuse(["eval", "a", "b"], "b")
+        self.refuse(["eval"], "policies")
+        self.refuse(["info", "a", "b"], "b")
         self.refuse(["train", "--gamma"], "--gamma")
         self.refuse(["train", "something"], "something")
 

@@ -152,14 +152,16 @@ class NumberTest(ProgramTest):
             (["doc", "train"], 'got "doc"'),
             (["--help", "doc"], 'got "doc"'),
             (["--version", "x"], 'got "x"'),
-            (["eval"], "eval: expected POLICY|RUN (policy.safetensors, a run folder, a shipped "
+            (["eval"], "eval: expected POLICY|RUN (policy.safetensors, run folders, shipped "
+                       "policies or controllers (energy, hybrid, lqr, mpc, pfl, tvlqr)"),
+            (["plot"], "plot: expected POLICY|RUN (policy.safetensors, a run folder, a shipped "
                        "policy such as sac, or a controller "
                        "(energy, hybrid, lqr, mpc, pfl, tvlqr)), got none"),
             (["compare"], "compare: expected RUN|FOLDER"),
             (["study"], "study: expected FILE.toml"),
             (["train", "--gamma"], "--gamma: expected a value, got none"),
             (["train", "--out", "a", "--out", "b"], "--out: expected a value, got several"),
-            (["eval", "a", "b"], "expected no argument b"),
+            (["plot", "a", "b"], "expected no argument b"),
             (["eval", "a", "--json=3"], "--json: expected no value, got one"))
 
     def test_integers_may_have_an_exponent(self):

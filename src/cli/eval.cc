@@ -18,12 +18,29 @@ namespace upswing {
 namespace {
 
 struct EvalArguments {
-  PolicyArguments policy;
+  std::vector<std::string> policies;
+  PolicyArguments controllers;  // of the controllers among the policies
   std::string episodes_csv;
   TrialArguments trial;
   int64_t episodes = 100, threads = 0;
   bool as_json = false;
 };
+
+/// Evaluates the policies on the same episodes.
+std::vector<EvalReport> Evaluate(const EvalArguments& a) {
+  const std::vector<LoadedPolicy> policies = GetPolicies(a.policies, a.controllers);
+  std::vector<EvalReport> reports;
+  for (const LoadedPolicy& loaded : policies) {
+    reports.push_back(PlanEvaluation(loaded, a.trial, a.episodes));
+  }
+  CheckSameEpisodes(reports);
+  ThreadPool pool(ResolveThreads(a.threads), a.threads == 0);
+  for (size_t i = 0; i < reports.size(); ++i) {
+    EpisodeProgress progress(a.as_json);  // removed before the table is printed
+    RunEvaluation(reports[i], policies[i], pool, std::ref(progress));
+  }
+  return reports;
+}
 
 int RunEval(const EvalArguments& a) {
   const bool to_output = IsStandardStream(a.episodes_csv);
@@ -32,19 +49,18 @@ int RunEval(const EvalArguments& a) {
         "--json: expected a file for --episodes-csv, got - (standard output), where the JSON goes");
   }
   if (!a.episodes_csv.empty()) CheckWritable("--episodes-csv", a.episodes_csv);
-  const LoadedPolicy loaded = GetPolicy(a.policy);
-  ThreadPool pool(ResolveThreads(a.threads), a.threads == 0);
-  const EvalReport report = [&] {
-    EpisodeProgress progress(a.as_json);  // removed before the table is printed
-    return EvaluatePolicy(loaded, a.trial, a.episodes, pool, std::ref(progress));
-  }();
-  if (!a.episodes_csv.empty()) WriteOutput(a.episodes_csv, EpisodesCsv(report));
+  const std::vector<EvalReport> reports = Evaluate(a);
+  if (!a.episodes_csv.empty()) WriteOutput(a.episodes_csv, EpisodesCsv(reports));
   if (to_output) return 0;  // only the rows, for another program
   if (a.as_json) {
-    fmt::print("{}\n", EvalJson(report));
+    fmt::print("{}\n", EvalJson(reports));
     return 0;
   }
-  PrintEvalTable(report);
+  if (reports.size() > 1) {
+    PrintEvalComparison(reports);
+  } else {
+    PrintEvalTable(reports.front());
+  }
   if (!a.episodes_csv.empty()) fmt::print("  written        {}\n", Printable(a.episodes_csv));
   return 0;
 }
@@ -53,8 +69,10 @@ int RunEval(const EvalArguments& a) {
 
 void AddEval(CommandLine& line) {
   EvalArguments& a = line.Runs(RunEval);
-  AddPolicy(line, a.policy);
-  line.Require("policy");
+  line.Texts("policies", a.policies, "POLICY|RUN",
+             Concat(PolicyWords(), "; several are compared on the same episodes"));
+  line.Require("policies");
+  AddControllers(line, a.controllers);
   Options own;
   DescribeEvalEpisodes(own, &a.episodes);
   line.Arguments(own);
@@ -73,8 +91,13 @@ void AddEval(CommandLine& line) {
       "the standard weights, over the first {} s. A link within 9° of upright is settled.\n"
       "Steady tilt, chatter and torque once upright are means over successful episodes.\n"
       "Torque changes below a thousandth of the limit are no chatter.\n\n"
+      "Several policies get the same episodes: start, plant and noise. The table and the JSON "
+      "have\n"
+      "the mean difference of each policy to the first, with a 95% bootstrap interval of pairs.\n"
+      "All need one plant and one goal; --plant, --goal set them.\n\n"
       "Examples:\n"
       "  ./upswing eval runs/d3qn-seed1\n"
+      "  ./upswing eval d3qn sac mpc runs/d3qn-seed1 --episodes 200\n"
       "  ./upswing eval policy.safetensors --episodes 1000 --seed 7 --json\n"
       "  ./upswing eval runs/d3qn-seed1 --set mass2=1.05 --set gravity=9.7\n"
       "  ./upswing eval runs/d3qn-seed1 --plant realaigym\n"

@@ -72,6 +72,55 @@ void PrintTorques(const Evaluation& e, const char* reached) {
   }
 }
 
+/// A mean difference with its interval, such as `+45.2 (+42.1 to +48.0)`.
+std::string DifferenceText(const PairedFigure& figure, double scale, int decimals) {
+  const Estimate& e = figure.difference;
+  if (figure.episodes == 0) return "none in both";
+  if (!e.interval) return fmt::format("{:+.{}f}", scale * e.value, decimals);
+  return fmt::format("{:+.{}f} ({:+.{}f} to {:+.{}f})", scale * e.value, decimals,
+                     scale * e.interval->low, decimals, scale * e.interval->high, decimals);
+}
+
+/// A row of the comparison's table.
+struct ComparisonRow {
+  std::string policy, success, reward_sum, swing_up, variation;
+};
+
+void PrintRow(size_t width, const ComparisonRow& row) {
+  fmt::print("  {:<{}}  {:<20}  {:<28}  {:<23}  {}\n", row.policy, width, row.success,
+             row.reward_sum, row.swing_up, row.variation);
+}
+
+ComparisonRow FiguresRow(const EvalReport& report) {
+  const Evaluation& e = report.figures;
+  return {
+      .policy = Printable(report.title),
+      .success = fmt::format("{:.1f} ({} of {})", 100 * e.success_rate(), e.successes, e.episodes),
+      .reward_sum = MomentsText(e.reward_sum),
+      .swing_up = e.successes > 0 ? fmt::format("{:.2f}", e.swing_up_seconds.median) : "none",
+      .variation = MomentsText(e.torque_variation)};
+}
+
+ComparisonRow DifferencesRow(const EvalReport& report, const EvalReport& first) {
+  ComparisonRow row;
+  row.policy = Printable(report.title);
+  for (const PairedFigure& figure : PairedFigures(report, first)) {
+    if (figure.name == "success_rate") row.success = DifferenceText(figure, 100, 1);
+    if (figure.name == "return") row.reward_sum = DifferenceText(figure, 1, 1);
+    if (figure.name == "swing_up_seconds") row.swing_up = DifferenceText(figure, 1, 2);
+    if (figure.name == "torque_variation") row.variation = DifferenceText(figure, 1, 2);
+  }
+  return row;
+}
+
+/// Prints the plant and the other conditions.
+void PrintConditions(const EvalReport& report) {
+  fmt::print("  plant          {}, physics {}\n", PlantText(report.env.plant(0)),
+             report.env.engine->name);
+  const std::string changes = ChangesText(report.env);
+  if (!changes.empty()) fmt::print("  {:<15}{}\n", "with", changes);
+}
+
 }  // namespace
 
 bool ValueIsOff(double expected, double attained) {
@@ -81,10 +130,7 @@ bool ValueIsOff(double expected, double attained) {
 void PrintEvalTable(const EvalReport& report) {
   const Evaluation& e = report.figures;
   fmt::print("{}\n", Printable(report.policy));
-  fmt::print("  plant          {}, physics {}\n", PlantText(report.env.plant(0)),
-             report.env.engine->name);
-  const std::string changes = ChangesText(report.env);
-  if (!changes.empty()) fmt::print("  {:<15}{}\n", "with", changes);
+  PrintConditions(report);
   if (report.known_plant) {
     fmt::print(
         "  designed for   the plant of each episode; {} of {} plants have no such controller\n",
@@ -116,6 +162,27 @@ void PrintEvalTable(const EvalReport& report) {
   fmt::print("  energy used    {} J   in {}\n", MomentsText(e.work), LengthText(e.seconds));
   PrintTorques(e, Reached(report.env.any_pose));
   fmt::print("  ± is the standard deviation over the episodes\n");
+}
+
+void PrintEvalComparison(std::span<const EvalReport> reports) {
+  const EvalReport& first = reports.front();
+  size_t width = 0;
+  for (const EvalReport& report : reports) {
+    width = std::max(width, Printable(report.title).size());
+  }
+  fmt::print("The same {} for all\n", Counted(first.figures.episodes, "episode"));
+  PrintConditions(first);
+  fmt::print("\n");
+  PrintRow(width, {"", "success [%]", "return", "swing-up [s]", "torque change [N·m/s]"});
+  for (const EvalReport& report : reports) PrintRow(width, FiguresRow(report));
+  fmt::print("\n  less {}, in the same episodes\n", Printable(first.title));
+  for (const EvalReport& report : reports.subspan(1)) {
+    PrintRow(width, DifferencesRow(report, first));
+  }
+  fmt::print(
+      "\n  ± is the standard deviation over the episodes; swing-up is a median.\n"
+      "  Differences are means over the episodes, of swing-up over those in which both succeed.\n"
+      "  Brackets: 95% interval, bootstrap of pairs; none if all pairs differ by the same.\n");
 }
 
 }  // namespace upswing

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <span>
+
 #include "judge/eval_report.h"
 
 namespace upswing {
@@ -9,5 +11,8 @@ bool ValueIsOff(double expected, double attained);
 
 /// Prints an evaluation on standard output.
 void PrintEvalTable(const EvalReport& report);
+
+/// Prints several evaluations of the same episodes, and the difference of each to the first.
+void PrintEvalComparison(std::span<const EvalReport> reports);
 
 }  // namespace upswing

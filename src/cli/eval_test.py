@@ -58,6 +58,59 @@ class EvalTest(ProgramTest):
             "velocity_window": 0, "velocity_filter": 0})
         self.assertEqual(set(result["randomize"].values()), {0})
 
+    def test_several_policies_get_the_same_episodes(self):
+        names = ["sac", "d3qn", "any-pose", "d3qn-adaptive", "energy"]
+        flags = ["--episodes", 12, "--seed", 3, "--physics", "closed-form", "--goal", "up-up",
+                 "--sensor-noise", 0.02, "--randomize", 0.05]
+        rows = list(csv.DictReader(self.succeed("eval", *names, *flags, "--episodes-csv",
+                                                "-").splitlines()))
+        both = json.loads(self.succeed("eval", *names, *flags, "--json"))
+        self.assertEqual([row["policy"] for row in rows[::12]], names)
+        columns = ["q1", "q2", "w1", "w2", "mass1", "length2", "sensor_noise"]
+        for name, alone in zip(names, both["policies"]):
+            mine = [row for row in rows if row["policy"] == name]
+            for row, first in zip(mine, rows):
+                self.assertEqual([row[c] for c in columns], [first[c] for c in columns])
+            self.assertEqual(alone, json.loads(self.succeed("eval", name, *flags, "--json")))
+        # Each difference is the mean over the pairs, and lies in its interval.
+        self.assertEqual([d["policy"] for d in both["differences"]], names[1:])
+        first, *others = [[row for row in rows if row["policy"] == name] for name in names]
+        for difference, other in zip(both["differences"], others):
+            self.assertEqual(difference["less"], "sac")
+            for figure, column in (("return", "return"), ("success_rate", "success"),
+                                   ("swing_up_seconds", "swing_up_seconds")):
+                pairs = [float(x[column]) - float(y[column]) for x, y in zip(other, first)
+                         if x[column] and y[column]]
+                got = difference[figure]
+                self.assertEqual(got["episodes"], len(pairs))
+                self.assertAlmostEqual(got["mean"], math.fsum(pairs) / len(pairs), delta=1e-9)
+                if len(set(pairs)) == 1:
+                    self.assertIsNone(got["interval_95"])
+                else:
+                    low, high = got["interval_95"]
+                    self.assertTrue(low <= got["mean"] <= high)
+
+    def test_the_table_of_several_policies(self):
+        table = self.succeed("eval", "sac", self.policy, "lqr", "--episodes", 3, "--plant",
+                             "realaigym", "--physics", "closed-form").splitlines()
+        self.assertEqual(table[0], "The same 3 episodes for all")
+        rows = [line.split()[0] for line in table if line.startswith("  ")]
+        self.assertEqual(rows.count("lqr"), 2)
+        self.assertEqual(rows.count("sac"), 1)
+        self.assertIn("less sac, in the same episodes", "\n".join(table))
+        # No episode in which both swing up has a difference.
+        self.assertIn("none in both", next(line for line in reversed(table) if "lqr" in line))
+
+    def test_policies_that_cannot_share_episodes_are_refused(self):
+        self.refuse(["eval", "sac", "missing"], "missing: no such file")
+        self.refuse(["eval", "sac", "d3qn", "sac"], "sac: expected each policy once, got it twice")
+        self.refuse(["eval", "sac", self.policy], "expected the plant of sac (damping1 0.2, damping2 0.2, "
+                    "gravity 9.81), got damping1 1, damping2 1, gravity 0.05", "--plant")
+        self.refuse(["eval", "sac", "any-pose"], "any-pose: expected the goal of sac (up-up), got "
+                    "another one in each episode", "--goal up-up")
+        self.refuse(["eval", "mpc", "sac", "--known-plant"], "--known-plant", "got sac")
+        self.refuse(["eval", "sac", "d3qn", "--mpc-seconds", 2], "--mpc-seconds", "sac, d3qn")
+
     def test_on_a_terminal_the_bar_is_gone_when_the_table_comes(self):
         lines = self.screen("eval", self.policy, "--episodes", 40, "--threads", 1)
         self.assertEqual([line for line in lines if "episodes/s" in line], [])

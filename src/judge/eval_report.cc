@@ -11,6 +11,7 @@
 #include "base/json.h"
 #include "base/text.h"
 #include "pendulum/upright_modes.h"
+#include "runs/find_policy.h"
 
 namespace upswing {
 namespace {
@@ -38,8 +39,17 @@ bool IsKnown(const EvaluationFigure& figure, bool upright, bool settled, bool va
          (figure.known == kSettled && settled) || (figure.known == kValued && valued);
 }
 
-/// Adds conditions and figures of an episode to its row.
-void AddCells(const EvalReport& report, const JudgedEpisode& episode, CsvTable& csv) {
+/// The value of a figure in an episode; nothing if the episode has none.
+std::optional<double> KnownValue(const EvaluationFigure& figure, const EvaluationEpisode& e,
+                                 bool valued) {
+  const bool upright = e.swing_up_seconds.has_value(), settled = e.settling_seconds.has_value();
+  if (!IsKnown(figure, upright, settled, valued)) return std::nullopt;
+  return figure.Of(e);
+}
+
+/// Adds conditions and figures of an episode to its row, which has cells for a goal if `has_goal`.
+void AddCells(const EvalReport& report, const JudgedEpisode& episode, bool has_goal,
+              CsvTable& csv) {
   const EvaluationEpisode& e = episode.result;
   const auto add = [&](const std::string& name, double value, bool known = true) {
     csv.Add(name, known ? FormatNumber(value) : "");
@@ -48,8 +58,8 @@ void AddCells(const EvalReport& report, const JudgedEpisode& episode, CsvTable& 
   add("q2", episode.start.q2);
   add("w1", episode.start.w1);
   add("w2", episode.start.w2);
-  if (const auto& goal = episode.goal) {
-    const auto [goal1, goal2] = GoalInputs(*goal);
+  if (has_goal) {
+    const auto [goal1, goal2] = GoalInputs(episode.goal.value_or(Pose()));
     add("goal1", goal1);
     add("goal2", goal2);
   }
@@ -64,9 +74,8 @@ void AddCells(const EvalReport& report, const JudgedEpisode& episode, CsvTable& 
   }
   for (size_t k = 0; k < e.terms.size(); ++k) add(kRewardTermNames[k], e.terms[k] + 0.0);
   for (const EvaluationFigure& figure : EvaluationFigures()) {
-    add(figure.name, figure.Of(e).value_or(0),
-        IsKnown(figure, e.swing_up_seconds.has_value(), e.settling_seconds.has_value(),
-                report.knows_values));
+    const auto value = KnownValue(figure, e, report.knows_values);
+    add(figure.name, value.value_or(0), value.has_value());
   }
 }
 
@@ -137,10 +146,70 @@ void JudgeEpisodes(const Policy& policy, const DesignFor* design_for,
   }
 }
 
+/// The document of one report.
+ordered_json ReportJson(const EvalReport& report) {
+  ordered_json j;
+  j["policy"] = report.policy;
+  j["seed"] = report.env.seed;
+  j["physics"] = report.env.engine->name;
+  j["task"] = kDoublePendulum;
+  for (const auto& [name, value] : PlantValues(report.env.plant(0))) j["plant"][name] = value;
+  j["unknown_plant"] = report.env.assumed_plant.has_value();
+  if (report.known_plant) j["known_plant"] = NumDesigned(report);
+  const TrialConditions conditions{report.env.disturbance(0), report.env.randomization};
+  const Options options = OptionsOf(conditions);
+  for (const Option& option : options.all()) {
+    if (option.name == "posterior" && conditions.randomization.posterior.empty()) continue;
+    j[option.section][option.name] = JsonOf(option);
+  }
+  AddFigures(report, j);
+  for (const auto& [name, t] : TransitionsOf(report)) {
+    j["transitions"][name] = {{"episodes", t.episodes}, {"successes", t.successes}};
+  }
+  return j;
+}
+
+/// A difference with its number of episodes; null if no episode has the figure for both policies.
+ordered_json PairedJson(const PairedFigure& figure) {
+  if (figure.episodes == 0) return nullptr;
+  const auto& interval = figure.difference.interval;
+  ordered_json j{{"mean", figure.difference.value}, {"interval_95", nullptr}};
+  if (interval) j["interval_95"] = {interval->low, interval->high};
+  j["episodes"] = figure.episodes;
+  return j;
+}
+
+/// Throws BadInput if two evaluations have different plants.
+void CheckSamePlant(const EvalReport& first, const EvalReport& other) {
+  const Plant expected = first.env.plant(0), got = other.env.plant(0);
+  std::vector<std::string> before, now;
+  for (const auto& [option, value] : Differences(OptionsOf(got), OptionsOf(expected))) {
+    before.push_back(Concat(option.name, " ", value->text()));
+    now.push_back(Concat(option.name, " ", option.text()));
+  }
+  if (now.empty()) return;
+  throw BadInput(Concat(Printable(other.policy), ": expected the plant of ",
+                        Printable(first.policy), " (", Join(before, ", "), "), got ",
+                        Join(now, ", "), "; --plant gives all policies one plant"));
+}
+
+/// Throws BadInput if two evaluations have different goals.
+void CheckSameGoal(const EvalReport& first, const EvalReport& other) {
+  const auto text = [](const PendulumEnvConfig& env) {
+    if (env.any_pose && !env.goal) return std::string("another one in each episode");
+    return PoseName(env.goal.value_or(Pose()));
+  };
+  const std::string expected = text(first.env), got = text(other.env);
+  if (got == expected) return;
+  throw BadInput(Concat(Printable(other.policy), ": expected the goal of ", Printable(first.policy),
+                        " (", expected, "), got ", got,
+                        "; --goal up-up gives all policies one goal"));
+}
+
 }  // namespace
 
-EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& trial, int64_t episodes,
-                          ThreadPool& pool, const Progress& progress) {
+EvalReport PlanEvaluation(const LoadedPolicy& loaded, const TrialArguments& trial,
+                          int64_t episodes) {
   if (trial.known_plant && !loaded.design_for) {
     throw BadInput(Concat("--known-plant: expected a controller, which has a design plant, got ",
                           loaded.name));
@@ -150,19 +219,33 @@ EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& tria
   }
   EvalReport report;
   report.policy = loaded.name;
+  report.title = ShortTitle(loaded);
   report.known_plant = trial.known_plant;
   report.env = TrialEnvironments(trial, &loaded, true);
   report.env.num_envs = static_cast<int>(episodes);
   report.knows_values = loaded.policy->info().gamma.value_or(0) > 0;
   report.only_balances = OnlyBalances(loaded.policy->kind());
+  return report;
+}
+
+void CheckSameEpisodes(std::span<const EvalReport> reports) {
+  for (const EvalReport& report : reports) {
+    CheckSamePlant(reports.front(), report);
+    CheckSameGoal(reports.front(), report);
+  }
+}
+
+void RunEvaluation(EvalReport& report, const LoadedPolicy& loaded, ThreadPool& pool,
+                   const Progress& progress) {
   constexpr int64_t kAtOnce = 4096;
+  const int64_t episodes = report.env.num_envs;
   for (int64_t done = 0; done < episodes; done += kAtOnce) {
     PendulumEnvConfig config = report.env;
     config.pool = &pool;
     config.first_index += static_cast<uint64_t>(done);
     config.num_envs = static_cast<int>(std::min(kAtOnce, episodes - done));
     JudgeEpisodes(
-        *loaded.policy, trial.known_plant ? &loaded.design_for : nullptr, config,
+        *loaded.policy, report.known_plant ? &loaded.design_for : nullptr, config,
         [&](double part, double) {
           if (progress) progress(static_cast<double>(done) + part, static_cast<double>(episodes));
         },
@@ -171,6 +254,12 @@ EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& tria
   std::vector<EvaluationEpisode> results;
   for (const JudgedEpisode& episode : report.episodes) results.push_back(episode.result);
   report.figures = Summarize(results, PendulumSpec(report.env).evaluation);
+}
+
+EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& trial, int64_t episodes,
+                          ThreadPool& pool, const Progress& progress) {
+  EvalReport report = PlanEvaluation(loaded, trial, episodes);
+  RunEvaluation(report, loaded, pool, progress);
   return report;
 }
 
@@ -191,34 +280,53 @@ int64_t NumDesigned(const EvalReport& report) {
   return std::ranges::count(report.episodes, true, &JudgedEpisode::for_its_plant);
 }
 
-std::string EvalJson(const EvalReport& report) {
-  ordered_json j;
-  j["policy"] = report.policy;
-  j["seed"] = report.env.seed;
-  j["physics"] = report.env.engine->name;
-  j["task"] = kDoublePendulum;
-  for (const auto& [name, value] : PlantValues(report.env.plant(0))) j["plant"][name] = value;
-  j["unknown_plant"] = report.env.assumed_plant.has_value();
-  if (report.known_plant) j["known_plant"] = NumDesigned(report);
-  const TrialConditions conditions{report.env.disturbance(0), report.env.randomization};
-  const Options options = OptionsOf(conditions);
-  for (const Option& option : options.all()) {
-    if (option.name == "posterior" && conditions.randomization.posterior.empty()) continue;
-    j[option.section][option.name] = JsonOf(option);
+std::vector<PairedFigure> PairedFigures(const EvalReport& report, const EvalReport& other) {
+  std::vector<PairedFigure> figures;
+  const auto add = [&](const char* name, auto value) {
+    std::vector<double> x, y;
+    for (size_t i = 0; i < report.episodes.size(); ++i) {
+      const std::optional<double> a = value(report.episodes[i].result);
+      const std::optional<double> b = value(other.episodes[i].result);
+      if (!a || !b) continue;
+      x.push_back(*a);
+      y.push_back(*b);
+    }
+    figures.push_back({name, std::ssize(x), EstimatePairedDifference(x, y)});
+  };
+  add("success_rate",
+      [](const EvaluationEpisode& e) { return std::optional(e.success ? 1.0 : 0); });
+  for (const EvaluationFigure& figure : EvaluationFigures()) {
+    if (figure.known == EvaluationFigure::Known::kValued) continue;
+    add(figure.name, [&](const EvaluationEpisode& e) { return KnownValue(figure, e, false); });
   }
-  AddFigures(report, j);
-  for (const auto& [name, t] : TransitionsOf(report)) {
-    j["transitions"][name] = {{"episodes", t.episodes}, {"successes", t.successes}};
+  return figures;
+}
+
+std::string EvalJson(std::span<const EvalReport> reports) {
+  if (reports.size() == 1) return PrintableJson(ReportJson(reports.front()));
+  ordered_json j;
+  for (const EvalReport& report : reports) j["policies"].push_back(ReportJson(report));
+  for (const EvalReport& report : reports.subspan(1)) {
+    ordered_json difference{{"policy", report.policy}, {"less", reports.front().policy}};
+    for (const PairedFigure& figure : PairedFigures(report, reports.front())) {
+      difference[figure.name] = PairedJson(figure);
+    }
+    j["differences"].push_back(difference);
   }
   return PrintableJson(j);
 }
 
-std::string EpisodesCsv(const EvalReport& report) {
+std::string EpisodesCsv(std::span<const EvalReport> reports) {
   CsvTable csv;
-  for (size_t i = 0; i < report.episodes.size(); ++i) {
-    csv.Add("episode", i);
-    AddCells(report, report.episodes[i], csv);
-    csv.EndRow();
+  const bool has_goal =
+      std::ranges::any_of(reports, [](const EvalReport& report) { return report.env.any_pose; });
+  for (const EvalReport& report : reports) {
+    for (size_t i = 0; i < report.episodes.size(); ++i) {
+      if (reports.size() > 1) csv.Add("policy", report.policy);
+      csv.Add("episode", i);
+      AddCells(report, report.episodes[i], has_goal, csv);
+      csv.EndRow();
+    }
   }
   return csv.text();
 }

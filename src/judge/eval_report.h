@@ -2,12 +2,14 @@
 
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "agents/loaded_policy.h"
 #include "judge/trial.h"
 #include "pendulum/pendulum_env.h"
+#include "report/statistics.h"
 #include "rl/evaluate.h"
 
 /// Evaluations of a policy over many episodes, and their reports.
@@ -26,6 +28,7 @@ struct JudgedEpisode {
 /// A finished evaluation.
 struct EvalReport {
   std::string policy;     // path
+  std::string title;      // ShortTitle
   PendulumEnvConfig env;  // common settings of all episodes
   std::vector<JudgedEpisode> episodes;
   Evaluation figures;
@@ -34,9 +37,20 @@ struct EvalReport {
   bool only_balances = false;  // true for a controller that does not swing up
 };
 
-/// Evaluates a policy over `episodes` episodes of a trial's environments. With trial.known_plant a
-/// controller is designed for each episode's plant; if that fails, the given one is used.
-/// `progress` counts episodes. Throws BadInput.
+/// The evaluation of a policy over `episodes` episodes of a trial's environments, before it runs.
+/// Throws BadInput.
+EvalReport PlanEvaluation(const LoadedPolicy& loaded, const TrialArguments& trial,
+                          int64_t episodes);
+
+/// Throws BadInput unless all planned evaluations have the same episodes: their plants and goals.
+void CheckSameEpisodes(std::span<const EvalReport> reports);
+
+/// Runs a planned evaluation of this policy. With known_plant a controller is designed for each
+/// episode's plant; if that fails, the given one is used. `progress` counts episodes.
+void RunEvaluation(EvalReport& report, const LoadedPolicy& loaded, ThreadPool& pool,
+                   const Progress& progress);
+
+/// PlanEvaluation, then RunEvaluation.
 EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& trial, int64_t episodes,
                           ThreadPool& pool, const Progress& progress);
 
@@ -51,11 +65,23 @@ std::map<std::string, TransitionCount> TransitionsOf(const EvalReport& report);
 /// Number of episodes with a controller designed for their plant.
 int64_t NumDesigned(const EvalReport& report);
 
-/// The report as a JSON document.
-std::string EvalJson(const EvalReport& report);
+/// A figure of one policy less that of another, over the episodes in which both have it.
+struct PairedFigure {
+  std::string name;  // as in EvalJson
+  int64_t episodes = 0;
+  Estimate difference = {};  // mean of the differences, with the interval of pairs
+};
+
+/// The figures of a report less those of another with the same episodes: the success rate, then
+/// every figure but the values, whose unit may differ.
+std::vector<PairedFigure> PairedFigures(const EvalReport& report, const EvalReport& other);
+
+/// The report as a JSON document. Several reports, which have the same episodes, get a list of
+/// these documents, and the differences of each to the first.
+std::string EvalJson(std::span<const EvalReport> reports);
 
 /// A row for each episode, counted from 0. A missing figure is empty, such as the swing-up time of
-/// an episode that is not upright at the end.
-std::string EpisodesCsv(const EvalReport& report);
+/// an episode that is not upright at the end. Several reports have the policy in the first column.
+std::string EpisodesCsv(std::span<const EvalReport> reports);
 
 }  // namespace upswing

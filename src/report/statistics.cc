@@ -1,6 +1,8 @@
 #include "report/statistics.h"
 
 #include <algorithm>
+#include <functional>
+#include <iterator>
 #include <numeric>
 
 #include "base/rng.h"
@@ -114,6 +116,13 @@ Estimate EstimateIqmDifference(const std::vector<double>& x, const std::vector<d
     return InterquartileMean(s[0]) - InterquartileMean(s[1]);
   };
   return {difference({x, y}), BootstrapInterval({x, y}, difference)};
+}
+
+Estimate EstimatePairedDifference(std::span<const double> x, std::span<const double> y) {
+  std::vector<double> differences;
+  std::ranges::transform(x, y, std::back_inserter(differences), std::minus<>());
+  const auto mean = [](const Strata& s) { return MomentsOf(s[0]).mean; };
+  return {mean({differences}), BootstrapInterval({differences}, mean)};
 }
 
 Estimate EstimateImprovement(const std::vector<double>& x, const std::vector<double>& y) {

@@ -24,7 +24,7 @@ using Strata = std::vector<std::vector<double>>;
 int64_t ResamplesOf(int64_t scores, int64_t most = kResamples);
 
 /// An estimated statistic with its 95% interval. There is no interval if a stratum has fewer than
-/// two runs or if all resamples agree. The runs then give no information about the error.
+/// two scores or if all resamples agree. The scores then give no information about the error.
 struct Estimate {
   double value = 0;
   std::optional<Interval> interval = {};
@@ -62,6 +62,10 @@ Estimate EstimateIqm(const std::vector<double>& scores, int64_t resamples = kRes
 
 /// Interquartile mean of `x` minus interquartile mean of `y`. All scores must be finite.
 Estimate EstimateIqmDifference(const std::vector<double>& x, const std::vector<double>& y);
+
+/// Mean of x[i] - y[i], where both scores are from the same episode. Resamples draw whole pairs, so
+/// what an episode does to both scores cancels. Without pairs the value is 0.
+Estimate EstimatePairedDifference(std::span<const double> x, std::span<const double> y);
 
 /// Probability that a run of `x` has a higher score than a run of `y`. If the bootstrap interval
 /// has no width, the interval is ImprovementScoreInterval.

@@ -55,6 +55,24 @@ TEST(Statistics, InterquartileMeanByHand) {
   EXPECT_EQ(InterquartileMean({kInfinity, kInfinity, 2, 6}), kInfinity);
 }
 
+TEST(Statistics, PairedDifferenceByHand) {
+  // Three differences are 1 and one is 5. A resample's mean is 1 plus the number of times that it
+  // has the 5: 1 to 5 with the binomial probabilities 0.316, 0.422, 0.211, 0.047 and 0.004. Their
+  // sums up to 3 and 4 are 0.949 and 0.996, far from 0.975, which therefore lies at 4.
+  const std::vector<double> x{101, 13, 6, 5}, y{100, 12, 1, 4};
+  const Estimate e = EstimatePairedDifference(x, y);
+  EXPECT_DOUBLE_EQ(e.value, 2);
+  ASSERT_TRUE(e.interval);
+  EXPECT_DOUBLE_EQ(e.interval->low, 1);
+  EXPECT_DOUBLE_EQ(e.interval->high, 4);
+  // The interval of two unpaired means would be as wide as the episodes differ.
+  const std::vector<double> same{101, 13, 2, 5};
+  EXPECT_EQ(EstimatePairedDifference(same, y).value, 1);
+  EXPECT_FALSE(EstimatePairedDifference(same, y).interval);  // all pairs differ by 1
+  EXPECT_FALSE(EstimatePairedDifference({}, {}).interval);
+  EXPECT_EQ(EstimatePairedDifference({}, {}).value, 0);
+}
+
 TEST(Statistics, ProbabilityOfImprovementByHand) {
   const std::vector<double> x{1, 3, 3}, y{2, 3};
   EXPECT_DOUBLE_EQ(ProbabilityOfImprovement(x, y), (0 + 0 + 1 + 0.5 + 1 + 0.5) / 6);
