@@ -1,5 +1,6 @@
 // The command `study`: variants of the settings, each trained with many seeds.
 #include <algorithm>
+#include <cstdio>
 
 #include "agents/config_checks.h"
 #include "base/error.h"
@@ -7,10 +8,12 @@
 #include "cli/commands.h"
 #include "cli/compare_report.h"
 #include "cli/say.h"
+#include "cli/signals.h"
 #include "cli/study_work.h"
 #include "cli/train_many.h"
 #include "os/file.h"
 #include "os/host.h"
+#include "os/lock_check.h"
 #include "runs/seeds.h"
 
 namespace upswing {
@@ -20,7 +23,7 @@ namespace fs = std::filesystem;
 
 /// The arguments of `study`.
 struct StudyArguments {
-  std::string file, out, seeds, keep, work;
+  std::string file, out, seeds, keep, work, check_locks;
   int64_t jobs = 0;  // 0: one per processor
   bool status = false, prepare = false, as_json = false;
 
@@ -80,7 +83,33 @@ int CompareStudy(const StudyPlan& plan) {
   return 0;
 }
 
+/// Tests the locks of a folder with the same command on another host. Returns the exit code.
+int CheckLocksOf(const fs::path& folder) {
+  if (!fs::is_directory(folder)) {
+    throw BadInput(Concat("--check-locks: expected a folder, got ", folder.string()));
+  }
+  constexpr double kPatience = 300;  // s
+  Say("Start the same command on another host that shares {}; waiting at most {:.0f} s\n",
+      Printable(folder.string()), kPatience);
+  std::fflush(stdout);
+  InstallSignalHandlers("");
+  const auto check = CheckLocks(folder, kPatience, [] { return StopSignal() != 0; });
+  if (!check) return 128 + StopSignal();
+  const std::string processes = Printable(Concat(check->mine, " and ", check->other));
+  if (!check->excludes) {
+    throw Failure(
+        Concat(folder.string(), ": locks do not exclude: ", processes,
+               " held one at the same time; expected NFSv4 without nolock and local_lock"));
+  }
+  Say("Locks exclude: of {}, neither got a lock that the other held\n", processes);
+  if (check->same_host) {
+    Say("Both processes ran on this host. Two hosts tell whether locks exclude between them.\n");
+  }
+  return 0;
+}
+
 int RunStudy(const StudyArguments& arguments) {
+  if (!arguments.check_locks.empty()) return CheckLocksOf(arguments.check_locks);
   if (!arguments.work.empty()) return WorkOnStudy(arguments.work);
   if (arguments.status) {
     const bool is_folder = fs::is_directory(arguments.file);
@@ -109,7 +138,10 @@ int RunStudy(const StudyArguments& arguments) {
 
 /// Throws if the arguments contradict each other.
 void CheckArguments(const StudyArguments& arguments) {
-  if (arguments.work.empty() == arguments.file.empty()) {
+  if (!arguments.check_locks.empty() && !arguments.file.empty()) {
+    throw BadInput("--check-locks: expected no FILE.toml with it");
+  }
+  if (arguments.check_locks.empty() && arguments.work.empty() == arguments.file.empty()) {
     throw BadInput(arguments.file.empty()
                        ? "study: expected FILE.toml or --work FOLDER, got neither"
                        : "--work: expected no FILE.toml with it");
@@ -142,6 +174,9 @@ void AddStudy(CommandLine& line) {
   line.Text("--work", arguments.work, "FOLDER",
             "work on the study in this folder, on any host that shares it: claim and train runs "
             "until none is left");
+  line.Text("--check-locks", arguments.check_locks, "FOLDER",
+            "with the same command on another host: test whether locks in this folder exclude each "
+            "other, as workers on several hosts need, and exit");
   line.Footer(
       "A study file:\n"
       "  title = \"What does layer normalisation do?\"\n"
@@ -157,12 +192,15 @@ void AddStudy(CommandLine& line) {
       "  ./upswing study configs/studies/post.toml --seeds 3 --out runs/short\n"
       "  ./upswing study configs/studies/post.toml --status\n"
       "  ./upswing study --work runs/post          one more worker, on any host\n"
+      "  ./upswing study --check-locks runs        on two hosts at the same time, before a study\n"
       "\nThe folder of a run is FOLDER/VARIANT/seedN, its log is FOLDER/VARIANT/seedN.log. The\n"
       "same command resumes stopped and killed runs; finished runs stay unchanged.\n"
       "Exit code 0: done; 1: a run failed; 2: bad usage or input; 130 or 143: stopped. A\n"
       "worker that a signal stops has exit code 75; any worker can resume its run.\n");
   line.Check([&arguments] { CheckArguments(arguments); });
   line.Excludes("--work", {"--out", "--seeds", "--jobs", "--keep", "--status", "--prepare"});
+  line.Excludes("--check-locks",
+                {"--out", "--seeds", "--jobs", "--keep", "--status", "--prepare", "--work"});
   line.Excludes("--status", {"--seeds", "--jobs", "--keep", "--prepare"});
 }
 

@@ -6,10 +6,11 @@ import json
 import re
 import shutil
 import signal
+import subprocess
 import tomllib
 import unittest
 
-from testing import ROOT, ProgramTest, small, snapshot
+from testing import ROOT, UPSWING, ProgramTest, small, snapshot
 
 HEAD = """title = "Little"
 seeds = 2
@@ -56,6 +57,31 @@ class StudyTest(ProgramTest):
         shown = 'Training "\\x1b[2J\\nTraining \\u202e" in runs/s\n'
         self.assertTrue(output.startswith(shown), output)
         self.assertTrue(all(line.isprintable() for line in output.splitlines()), repr(output))
+
+    def test_locks_are_checked_by_two_processes(self):
+        (self.folder / "shared").mkdir()
+        first, second = (subprocess.Popen([UPSWING, "study", "--check-locks", "shared"],
+                                          cwd=self.folder, stdout=subprocess.PIPE, encoding="utf-8")
+                         for _ in range(2))
+        for process, other in ((first, second), (second, first)):
+            output, _ = process.communicate(timeout=300)
+            self.assertEqual(process.returncode, 0)
+            self.assertIn("Locks exclude: of ", output)
+            self.assertIn(f" {process.pid} and ", output)
+            self.assertIn(f" {other.pid}, neither got a lock", output)
+            self.assertIn("Both processes ran on this host.", output)
+        self.assertEqual(list((self.folder / "shared").iterdir()), [])
+
+    def test_a_check_of_locks_can_be_stopped_and_refuses_bad_input(self):
+        (self.folder / "shared").mkdir()
+        process = self.start("study", "--check-locks", "shared", wait=False)
+        self.assertIn("waiting at most 300 s", process.stdout.readline())
+        self.wait_for(lambda: list((self.folder / "shared").iterdir()))
+        self.assertEqual(self.end(process, signal.SIGINT)[0], 130)
+        self.assertEqual(list((self.folder / "shared").iterdir()), [])
+        self.refuse(["study", "--check-locks", "missing"], "--check-locks: expected a folder, got missing")
+        self.refuse(["study", "s.toml", "--check-locks", "shared"], "expected no FILE.toml")
+        self.refuse(["study", "--check-locks", "shared", "--status"], "--check-locks: expected no --status")
 
     def test_each_run_equals_a_single_run(self):
         self.write("little.toml", STUDY)

@@ -2,19 +2,13 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
-#include <linux/filter.h>
-#include <linux/seccomp.h>
-#include <sys/prctl.h>
 #include <sys/stat.h>
-#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <array>
 #include <atomic>
 #include <cerrno>
 #include <chrono>
-#include <cstddef>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -25,6 +19,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "os/lock_testing.h"
 #include "os/testing.h"
 
 namespace upswing {
@@ -38,31 +33,9 @@ class LockTest : public ::testing::Test {
   fs::path folder_ = temp_.path();
 };
 
-/// Makes flock and fcntl's locks fail in this process with `error_number`, as on a file system
-/// without locks; false if the system cannot.
-bool ForbidLocks(int error_number) {
-  const auto answer = static_cast<uint32_t>(SECCOMP_RET_ERRNO | error_number);
-  constexpr uint32_t kCall = offsetof(seccomp_data, nr), kCommand = offsetof(seccomp_data, args[1]);
-  std::array<sock_filter, 7> program{{
-      BPF_STMT(BPF_LD | BPF_W | BPF_ABS, kCall),
-      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_flock, 3, 0),
-      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_fcntl, 0, 3),
-      BPF_STMT(BPF_LD | BPF_W | BPF_ABS, kCommand),
-      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, F_OFD_SETLK, 0, 1),
-      BPF_STMT(BPF_RET | BPF_K, answer),
-      BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW),
-  }};
-  const sock_fprog filter{program.size(), program.data()};
-  return prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 &&
-         prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &filter) == 0;
-}
-
 /// Runs `call` in a process without locks. Returns its result; 77 if there can be no such process.
 int ResultWithoutLocks(int error_number, const std::function<int()>& call) {
-  const pid_t child = fork();
-  if (child == 0) _exit(ForbidLocks(error_number) ? call() : 77);
-  int status = 0;
-  return waitpid(child, &status, 0) == child && WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  return ExitCodeOf(StartWithFakeLocks(error_number, call));
 }
 
 /// 0 if `call` throws NoLocks with the cause in its message.
