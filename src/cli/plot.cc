@@ -26,6 +26,7 @@ struct PlotArguments {
   std::string out;
   TrialArguments trial;
   double seconds = -1;  // negative: not given
+  bool phase = false;
 };
 
 /// Start (s) of the last upright stretch, which lasts to the end; negative if the end is not
@@ -101,6 +102,7 @@ int RunPlot(const PlotArguments& a) {
   MakeNewFolder(folder);
   std::vector<std::pair<std::string, Figure>> figures{
       {"episode", EpisodeFigure(rollout, *loaded.policy)}};
+  if (a.phase) figures.emplace_back("phase", PhaseFigure(rollout));
   if (auto terms = TermsFigure(a.policy.name)) figures.emplace_back("terms", std::move(*terms));
   std::vector<std::string> files;
   for (auto& [name, figure] : figures) {
@@ -138,11 +140,14 @@ void AddPlot(CommandLine& line) {
   seconds.usual = "10; 20 with --episode";
   line.Arguments(own);
   AddTrialOptions(line, a.trial, "noise, random plants and the start of --episode");
+  line.Flag("--phase", a.phase,
+            "draw phase portraits, too: the angle of each joint against its velocity");
   line.Text("--out", a.out, "FOLDER", "new folder for the figures (default RUN/plot)");
   line.Footer(
       "episode.svg and .png show angles, velocities, energy, torque, reward terms and the\n"
       "policy's estimates over time: Q-values, or the actor's mean torque with its central\n"
       "68% interval, and V.\n"
+      "With --phase, phase.svg and .png show q1 against w1 and q2 against w2.\n"
       "Of a run folder, terms.svg and .png show the sums of the reward's terms over training.\n"
       "`simulate` writes the same episode as a table.\n\n"
       "Without --out, the figures go into plot in the run folder, or into runs/plot-NAME for\n"
@@ -151,6 +156,7 @@ void AddPlot(CommandLine& line) {
       "  ./upswing plot runs/d3qn-seed1\n"
       "  ./upswing plot runs/d3qn-seed1 --start 3.0,0,0,0 --seconds 5 --out caught\n"
       "  ./upswing plot runs/d3qn-seed1 --set mass2=1.3\n"
+      "  ./upswing plot mpc --phase --seconds 4\n"
       "  ./upswing plot runs/d3qn-seed1 --randomize 0.25 --episode 17\n");
 }
 

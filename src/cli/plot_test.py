@@ -78,6 +78,25 @@ class PlotTest(ProgramTest):
                 for path in re.findall(r"<path stroke='[^']*' +d='M([^']*)'", text)
                 for stroke in path.split("M")]
 
+    def test_phase_portraits(self):
+        self.succeed("plot", self.policy, "--seconds", 2, "--start", "3,0.5,-9,4", "--phase", "--out",
+                     "out")
+        text, _ = self.svg("out/phase.svg")
+        for words in ("joint 1", "q1 (°)", "w1 (rad/s)", "joint 2", "q2 (°)", "w2 (rad/s)", "start",
+                      "goal", "start 3,0.5,-9,4"):
+            self.assertIn(words, text)
+        self.assertTrue((self.folder / "out/phase.png").is_file())
+        # The longest stroke of joint 1 follows the numbers of `simulate`: pixels are linear in them.
+        rows = list(csv.DictReader(self.succeed("simulate", self.policy, "--seconds", 2, "--start",
+                                                "3,0.5,-9,4").splitlines()))
+        velocities = [float(row["qvel0"]) for row in rows]
+        path = next(curve for curve in self.curves("out/phase.svg") if len(curve) > 20)
+        low, high = path[1][1] - path[0][1], path[15][1] - path[0][1]
+        self.assertAlmostEqual(low / high, (velocities[1] - velocities[0]) /
+                               (velocities[15] - velocities[0]), delta=0.05)
+        self.succeed("plot", self.policy, "--seconds", 0.1, "--out", "without")
+        self.assertFalse((self.folder / "without/phase.svg").exists())
+
     def test_texts_of_the_figures(self):
         self.succeed("plot", self.policy, "--seconds", 0.2, "--set", "mass2=1.3", "--delay", 0.04,
                      "--start", "3,0,0,0", "--seed", 5, "--out", "out")

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "base/format.h"
+#include "base/text.h"
 
 namespace upswing {
 namespace {
@@ -16,8 +17,8 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 // Angles wrap here, degrees: hanging and upright are well away from it.
 constexpr double kLow = -135;
 
-double Link1(const PendulumState& s) { return s.q1 * kDegrees; }
-double Link2(const PendulumState& s) { return (s.q1 + s.q2) * kDegrees; }
+double Link1(const RolloutRow& row) { return row.state.q1 * kDegrees; }
+double Link2(const RolloutRow& row) { return (row.state.q1 + row.state.q2) * kDegrees; }
 
 /// A curve through the rows.
 template <typename Y>
@@ -30,32 +31,62 @@ Line OverTime(const std::string& name, const Rows& rows, Y y) {
   return line;
 }
 
-/// A curve of an angle (degrees) that wraps within [kLow, kLow + 360). At a wrap, it ends at one
-/// edge and starts again at the other.
-Line AngleOverTime(const std::string& name, const Rows& rows,
-                   double (*angle_of)(const PendulumState&)) {
-  Line line{.name = name};
+/// A quantity of a row, such as an angle.
+using Quantity = double (*)(const RolloutRow&);
+
+/// Passes the points (angle, other) of a curve to `push`, with the angle (degrees) wrapped within
+/// [low, low + 360). At a wrap, the curve ends at one edge and starts again at the other.
+template <typename Push>
+void Wrap(const Rows& rows, double low, Quantity angle_of, Quantity other_of, Push push) {
   double last_angle = 0, last_turns = 0;
-  const auto push = [&](double t, double angle) {
-    line.x.push_back(t);
-    line.y.push_back(angle);
-  };
   for (size_t i = 0; i < rows.size(); ++i) {
-    const double angle = angle_of(rows[i].state), turns = std::floor((angle - kLow) / 360);
+    const double angle = angle_of(rows[i]), other = other_of(rows[i]);
+    const double turns = std::floor((angle - low) / 360);
     if (i > 0 && turns != last_turns) {
-      const double edge = kLow + 360 * std::max(turns, last_turns);
+      const double edge = low + 360 * std::max(turns, last_turns);
       const double at_edge =
-          std::lerp(rows[i - 1].t, rows[i].t, (edge - last_angle) / (angle - last_angle));
+          std::lerp(other_of(rows[i - 1]), other, (edge - last_angle) / (angle - last_angle));
       const bool up = turns > last_turns;
-      push(at_edge, up ? kLow + 360 : kLow);
+      push(up ? low + 360 : low, at_edge);
       push(kNone, kNone);  // a gap
-      push(at_edge, up ? kLow : kLow + 360);
+      push(up ? low : low + 360, at_edge);
     }
-    push(rows[i].t, angle - 360 * turns);
+    push(angle - 360 * turns, other);
     last_angle = angle;
     last_turns = turns;
   }
+}
+
+/// A curve of an angle (degrees) over time.
+Line AngleOverTime(const std::string& name, const Rows& rows, Quantity angle_of) {
+  Line line{.name = name};
+  const auto time_of = [](const RolloutRow& row) { return row.t; };
+  Wrap(rows, kLow, angle_of, time_of, [&](double angle, double t) {
+    line.x.push_back(t);
+    line.y.push_back(angle);
+  });
   return line;
+}
+
+/// A panel of a joint's angle against its velocity, with the start (dot) and the goal (cross). The
+/// angle wraps half a turn away from the middle of its axis.
+Panel PhasePortrait(const Rows& rows, const std::string& joint, double middle, double goal,
+                    Quantity angle_of, Quantity velocity_of) {
+  const double low = middle - 180;
+  Line path;
+  Wrap(rows, low, angle_of, velocity_of, [&](double angle, double velocity) {
+    path.x.push_back(angle);
+    path.y.push_back(velocity);
+  });
+  Panel panel{
+      .title = Concat("joint ", joint),
+      .x_label = Concat("q", joint, " (°)"),
+      .y_label = Concat("w", joint, " (rad/s)"),
+      .lines = {path,
+                {.name = "start", .x = {path.x[0]}, .y = {path.y[0]}, .points = true},
+                {.name = "goal", .x = {goal}, .y = {0}, .points = true, .marker = Marker::kCross}}};
+  panel.x_range = {low, low + 360};
+  return panel;
 }
 
 /// A step curve: a row's value holds until the next row.
@@ -195,6 +226,19 @@ Figure EpisodeFigure(const Rollout& rollout, const Policy& policy) {
   figure.height = kPanelHeight * static_cast<int>(figure.panels.size());
   for (Panel& panel : figure.panels) panel.x_range = {0, rows.back().t};
   figure.panels.back().x_label = "time (s)";
+  return figure;
+}
+
+Figure PhaseFigure(const Rollout& rollout) {
+  const Pose goal = rollout.goal.value_or(Pose());
+  // q1 wraps where that of EpisodeFigure does, and q2 where link 2 is folded back.
+  Figure figure{.columns = 2, .width = 1000, .height = 450};
+  figure.panels = {PhasePortrait(rollout.rows, "1", kLow + 180, goal.up1 ? 180 : 0, Link1,
+                                 [](const RolloutRow& row) { return row.state.w1; }),
+                   PhasePortrait(
+                       rollout.rows, "2", 0, goal.up1 == goal.up2 ? 0 : 180,
+                       [](const RolloutRow& row) { return row.state.q2 * kDegrees; },
+                       [](const RolloutRow& row) { return row.state.w2; })};
   return figure;
 }
 
