@@ -12,6 +12,7 @@ from pathlib import Path
 
 ROOT = Path(os.environ.get("UPSWING_ROOT", Path(__file__).resolve().parent.parent))
 UPSWING = Path(os.environ.get("UPSWING", ROOT / "build/release/bin/upswing"))
+BENCHMARKS = UPSWING.with_name("benchmarks")
 sys.dont_write_bytecode = True
 sys.path[:0] = [str(ROOT / "tools/peers"), str(ROOT / "tools/results")]
 import actors  # noqa: E402  pylint: disable=wrong-import-position
@@ -43,6 +44,10 @@ class Results(unittest.TestCase):
     def test_recipes(self):
         for table, words in (("first-training", "steps"), ("perf-c", "`d3qn`")):
             self.assertIn(words, self.succeed("tools/results/results.py", "measure", table, "--try"))
+
+    @unittest.skipUnless(BENCHMARKS.exists(), "needs Google Benchmark")
+    def test_benchmarks_have_the_names_of_the_table(self):
+        self.assertIn("`mpc`", self.succeed("tools/results/results.py", "measure", "perf-parts", "--try"))
 
     def test_upright_modes(self):
         self.assertIn("|delta|", self.succeed("tools/results/upright_modes.py", "fast", "--episodes", 4,

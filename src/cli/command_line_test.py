@@ -361,8 +361,13 @@ class LauncherTest(ProgramTest):
             with self.subTest(words=words):
                 self.assert_one_line(self.launch("--no-setup", "test", *words), 2,
                                      "expected flags of ctest, such as -R dqn, got foo")
-        self.assert_one_line(self.launch("--no-setup", "test", "--preset=debug", "--cluster"), 2,
-                             "expected --cluster")
+        for word in ("--cluster", "--benchmarks"):
+            self.assert_one_line(self.launch("--no-setup", "test", "--preset=debug", word), 2,
+                                 f"expected {word}")
+
+    def test_benchmarks_that_are_not_built(self):
+        self.assert_one_line(self.launch("--no-setup", "test", "--benchmarks"), 1,
+                             "run ./upswing test --benchmarks without --no-setup")
 
     def test_tests_that_are_not_built(self):
         done = self.launch("--no-setup", "test", "-R", "rl.Dqn")

@@ -414,6 +414,33 @@ def exported_headers(lab):
     return ["agent", "header [KB]", "constants [B]", "state [B]", "stack [B]", "multiply-adds"], rows
 
 
+OPERATIONS = {
+    "BM_Update/fast/manual_time": "update of `fast`", "BM_Update/d3qn/manual_time": "update of `d3qn`",
+    "BM_Update/sac/manual_time": "update of `sac`", "BM_Update/ppo/manual_time": "update of `ppo`",
+    "BM_MpcDecision/manual_time": "decision of `mpc`",
+    "BM_LinearForward/B:128/in:256/out:256": "layer of 256 × 256, 128 rows",
+    "BM_Adam/100000": "Adam, 100,000 parameters",
+    "BM_ReplaySample/1000000": "minibatch of 64 out of 1,000,000",
+    "BM_AdvanceAndJudge/N:1024": "step of 1,024 pendulums"}
+
+
+@recipe("perf-parts")
+def parts(lab):
+    """Processor time of operations on one thread: medians of five repetitions."""
+    few = ["--benchmark_min_time=0.001"] if lab.few else []
+    text = lab.run("test", "--benchmarks", "--benchmark_format=json", *few,
+                   "--benchmark_repetitions=" + ("2" if lab.few else "5"),
+                   "--benchmark_filter=" + "|".join(f"^{name}$" for name in OPERATIONS))
+    lab.commands = ["./upswing test --benchmarks --benchmark_repetitions=5"]
+    medians = {}
+    for each in json.loads(text)["benchmarks"]:
+        if each.get("aggregate_name") == "median":
+            time_of = each["real_time" if "manual_time" in each["run_name"] else "cpu_time"]
+            medians[each["run_name"]] = time_of * {"ns": 1e-3, "us": 1, "ms": 1e3}[each["time_unit"]]
+    return ["operation", "time [µs]"], [[label, format_number(medians[name], 2)]
+                                        for name, label in OPERATIONS.items()]
+
+
 @recipe("time-to-solve")
 def time_to_solve(lab):
     rows = []
