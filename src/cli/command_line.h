@@ -102,6 +102,9 @@ struct CommandEntry {
   std::string_view program;     // that has the command; empty: only the launcher has it
 };
 
+/// All commands, in the order of --help: the rows of commands.tsv, which the launcher reads, too.
+std::span<const CommandEntry> CommandTable();
+
 /// A command that this program has.
 struct Command {
   std::string_view name;

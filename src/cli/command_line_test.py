@@ -335,6 +335,14 @@ class LauncherTest(ProgramTest):
         return subprocess.run([self.folder / "upswing", *arguments], check=False,
                               capture_output=True, encoding="utf-8", **more)
 
+    def test_an_unknown_command_is_refused_before_anything_is_built(self):
+        self.assertEqual(self.launch("trian").stdout, "ran: trian\n")  # the program suggests one
+        (self.folder / "build/release/bin/upswing").unlink()
+        done = self.launch("tr\x1bian", "--agent", "fast")
+        self.assertEqual((done.returncode, done.stdout), (2, ""))
+        self.assertIn("upswing: expected a command, one of train, eval, ", done.stderr)
+        self.assertTrue(done.stderr.endswith('; got "trian"\n'), done.stderr)
+
     def test_no_setup_in_the_wrong_place_or_misspelt(self):
         for words in (["info", "--no-setup"], ["info", "--nosetup"], ["test", "-R", "x",
                                                                       "--no-setup"]):

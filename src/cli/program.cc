@@ -12,7 +12,6 @@
 #include <exception>
 #include <filesystem>
 #include <iostream>
-#include <iterator>
 #include <system_error>
 #include <vector>
 
@@ -26,32 +25,6 @@
 
 namespace upswing {
 namespace {
-
-/// The only list of commands, in the order of --help: name, help, program. The launcher ./upswing
-/// reads it, one line each.
-constexpr CommandEntry kTable[] = {
-    {"train", "Train an agent until it solves the task", "upswing"},
-    {"eval", "Evaluate a policy over many episodes", "upswing"},
-    {"grade", "Rank the policies of a class, as a table and a page", "upswing"},
-    {"simulate", "Write one rollout of a policy or of given torques as CSV", "upswing"},
-    {"map", "Map success over two quantities of plant, sensors or start", "upswing"},
-    {"plot", "Draw one episode of a policy as figures", "upswing"},
-    {"view", "Show policies in a window, or record them as a film or pictures", "upswing"},
-    {"info", "Describe and check a policy or a run, or describe this machine", "upswing"},
-    {"compare", "Compare runs over their seeds, with intervals and curves", "upswing"},
-    {"study", "Train variants of the settings, each with many seeds", "upswing"},
-    {"completion", "Print completions for bash, zsh or fish", "upswing"},
-    {"export", "Export policies as ONNX or C, or into the page", "upswing-deploy"},
-    {"realaigym", "Score policies and logs by the rules of RealAIGym", "upswing-realaigym"},
-    {"machine", "Check logs of a real machine, identify its twin, validate it", "upswing-machine"},
-    {"run", "Drive a real machine or its twin with a policy", "upswing-machine"},
-    {"fake", "Play a machine for `run`: a twin behind UDP or a terminal", "upswing-machine"},
-    {"demo", "Serve the page in which policies swing up the pendulum live", "upswing-deploy"},
-    {"docs", "Build the documentation, or the whole web site", ""},
-    {"package", "Build packages: tarball, Debian package, Python wheels", ""},
-    {"python", "Run Python with the package upswing", ""},
-    {"test", "Build and run all tests", ""},
-};
 
 constexpr const char* kExamples =
     "Examples:\n"
@@ -91,10 +64,10 @@ void ChooseVectors() {
 
 /// Runs another program instead if the called command is one of its own.
 void RunOtherProgram(int argc, char** argv, std::span<const Command> own) {
+  const std::span<const CommandEntry> table = CommandTable();
   const std::string_view name = CalledCommand(argc, argv);
-  const auto* entry = std::ranges::find(kTable, name, &CommandEntry::name);
-  if (entry == std::end(kTable) || std::ranges::find(own, name, &Command::name) != own.end())
-    return;
+  const auto entry = std::ranges::find(table, name, &CommandEntry::name);
+  if (entry == table.end() || std::ranges::find(own, name, &Command::name) != own.end()) return;
   const std::filesystem::path program = ProgramPath().replace_filename(entry->program);
   if (!entry->program.empty()) execv(program.c_str(), argv);
   throw BadInput(Concat(name, ": expected ./upswing ", name, " in the source repository",
@@ -119,7 +92,7 @@ int Main(int argc, char** argv, std::span<const Command> own) {
   try {
     RunOtherProgram(argc, argv, own);
     ChooseVectors();
-    return Finish(RunProgram(argc, argv, kTable, own, kExamples));
+    return Finish(RunProgram(argc, argv, CommandTable(), own, kExamples));
   } catch (const Error& error) {
     SayError(OneLine(error.what()));
     return error.exit_code();
