@@ -41,7 +41,14 @@ LAYERS = {
     "web": PRODUCT | EXTRAS,
     "examples": PRODUCT | EXTRAS,
 }
-COMMAND = re.compile(r"extras/\w+/(\w+_command|main)\.cc$")
+COMMAND = re.compile(r"extras/\w+/(commands/)?(\w+_command|main)\.cc$")
+
+# Rooms of a folder by floor, from the ground up; "": files of the folder itself. A file may include
+# its own room and lower floors, a test any room.
+ROOMS = {
+    "src/rl": [{"replay"}, {""}, {"dqn", "sac", "ppo"}, {"train"}],
+    "extras/machine": [{"logs"}, {"twin"}, {"drive"}],
+}
 
 # Files that may include each foreign library.
 ALLOWED_FILES = {
@@ -70,6 +77,24 @@ def layer_of(path):
         return "commands"
     parts = path.split("/")
     return next((name for name in ("/".join(parts[:2]), parts[0]) if name in LAYERS), None)
+
+
+def room_of(path, folder):
+    """The room of a file of a folder, and its floor; None for a room that ROOMS lacks."""
+    inner = path.removeprefix(f"{folder}/")
+    room = inner.split("/")[0] if "/" in inner else ""
+    floors = (floor for floor, rooms in enumerate(ROOMS[folder]) if room in rooms)
+    return room, next(floors, None)
+
+
+def upward(file, path, folder):
+    """The problem of an include between the rooms of a folder, or None."""
+    (room, floor), (other, below) = room_of(file, folder), room_of(path, folder)
+    if floor is None:
+        return f"{folder}/{room}/ is no room of {folder}/"
+    if room == other or (below is not None and below < floor):
+        return None
+    return f'{"/".join(filter(None, (folder, room)))} may not include the room {other or folder}: {path}'
 
 
 def place_of(root, included):
@@ -110,6 +135,8 @@ def offence(root, file, quote, included):
         return f'"{included}": expected "folder/file.h" with one of our folders'
     if not (root / path).is_file():
         return f'"{included}" does not exist'
+    if target == folder and folder in ROOMS and not file.endswith("_test.cc"):
+        return upward(file, path, folder)
     if target != folder and target not in LAYERS[folder]:
         allowed = ", ".join(sorted(LAYERS[folder])) or "no other folder"
         return f'{folder}/ may not include "{included}" (allowed: {allowed})'

@@ -85,6 +85,19 @@ class CheckLayers(unittest.TestCase):
         self.assertEqual(lines[1], "src/base/rng.h:1: a cycle between folders: src/base -> src/nn -> "
                                    "src/base (and src/nn/linear.h:2)")
 
+    def test_rooms_have_floors(self):
+        self.assertEqual(self.check({"src/rl/replay/replay.h": "",
+                                     "src/rl/agent.h": '#include "rl/replay/replay.h"\n',
+                                     "src/rl/sac/sac.h": '#include "rl/agent.h"\n',
+                                     "src/rl/sac/sac_test.cc": '#include "rl/train/trainer.h"\n',
+                                     "src/rl/train/trainer.h": '#include "rl/sac/sac.h"\n'}), (0, []))
+        self.assert_one_offender({"src/rl/sac/sac.h": '#include "rl/ppo/ppo.h"\n',
+                                  "src/rl/ppo/ppo.h": ""}, "src/rl/sac/sac.h:1",
+                                 "src/rl/sac may not include the room ppo: src/rl/ppo/ppo.h")
+        self.assert_one_offender({"src/rl/agent.h": '#include "rl/sac/sac.h"\n',
+                                  "src/rl/sac/sac.h": ""}, "src/rl/agent.h:1",
+                                 "src/rl may not include the room sac: src/rl/sac/sac.h")
+
     def test_an_operating_system_is_for_upper_layers(self):
         self.assert_one_offender({"src/rl/dqn.h": "#include <filesystem>\n"},
                                  "src/rl/dqn.h:1", "src/rl/ must not need an operating system")

@@ -225,7 +225,7 @@ def headers_of(layer):
     """The headers that cmake --install installs, as they are included, with their paths."""
     return {path.relative_to(root).as_posix(): path
             for root, folder in ((ROOT / "src", layer), (ROOT, f"extras/{layer}"))
-            for path in sorted((root / folder).glob("*.h"))
+            for path in sorted((root / folder).rglob("*.h"))
             if not path.name.endswith(("testing.h", "-inl.h"))}
 
 

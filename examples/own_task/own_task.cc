@@ -9,10 +9,10 @@
 #include "base/options.h"
 #include "base/thread_pool.h"
 #include "pendulum_v1.h"
-#include "rl/evaluate.h"
-#include "rl/ppo_config.h"
-#include "rl/sac_config.h"
-#include "rl/trainer.h"
+#include "rl/ppo/ppo_config.h"
+#include "rl/sac/sac_config.h"
+#include "rl/train/evaluate.h"
+#include "rl/train/trainer.h"
 
 using namespace upswing;
 

@@ -5,7 +5,7 @@
 
 #include "base/json.h"
 #include "base/text.h"
-#include "extras/machine/control_loop.h"
+#include "extras/machine/drive/control_loop.h"
 #include "extras/realaigym/hardware.h"
 #include "runs/plant_file.h"
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "base/sample.h"
-#include "extras/machine/policy_controller.h"
+#include "extras/machine/drive/policy_controller.h"
 #include "extras/realaigym/simulation.h"
 #include "extras/realaigym/uptime.h"
 

@@ -15,8 +15,8 @@
 
 #include "base/error.h"
 #include "base/text.h"
-#include "extras/machine/identify.h"
-#include "extras/machine/testing.h"
+#include "extras/machine/twin/identify.h"
+#include "extras/machine/twin/testing.h"
 #include "extras/realaigym/machine_trials.h"
 
 namespace upswing::realaigym {

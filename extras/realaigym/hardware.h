@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "extras/machine/log.h"
+#include "extras/machine/logs/log.h"
 #include "extras/realaigym/rules.h"
 
 /// Scores of runs on the real robot by the rules of RealAIGym's hardware boards, version 2

@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 #include "base/text.h"
-#include "extras/machine/testing.h"
+#include "extras/machine/twin/testing.h"
 
 namespace upswing::realaigym {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "base/rng.h"
 #include "base/text.h"
-#include "extras/machine/estimator.h"
+#include "extras/machine/drive/estimator.h"
 
 namespace upswing::realaigym {
 namespace {

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "extras/machine/twin.h"
+#include "extras/machine/twin/twin.h"
 #include "extras/realaigym/hardware.h"
 #include "extras/realaigym/simulation.h"
 #include "extras/realaigym/uptime.h"

@@ -17,7 +17,7 @@
 #include "cli/commands.h"
 #include "cli/progress.h"
 #include "cli/say.h"
-#include "extras/machine/check.h"
+#include "extras/machine/logs/check.h"
 #include "extras/realaigym/boards.h"
 #include "extras/realaigym/hardware.h"
 #include "extras/realaigym/machine_trials.h"

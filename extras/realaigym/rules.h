@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "extras/machine/policy_controller.h"
+#include "extras/machine/drive/policy_controller.h"
 #include "extras/realaigym/plant.h"
 
 /// The rules of RealAIGym's simulation boards, version 2 (docs/howto/realaigym.md): the

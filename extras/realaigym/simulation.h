@@ -6,7 +6,7 @@
 
 #include "base/progress.h"
 #include "base/thread_pool.h"
-#include "extras/machine/simulated_machine.h"
+#include "extras/machine/twin/simulated_machine.h"
 #include "extras/realaigym/rules.h"
 #include "extras/realaigym/uptime.h"
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/rng.h"
-#include "extras/machine/log.h"
+#include "extras/machine/logs/log.h"
 #include "extras/realaigym/plant.h"
 
 /// The rules of RealAIGym's boards of ICRA 2025, score version 3 (docs/howto/realaigym.md). A run

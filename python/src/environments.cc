@@ -20,7 +20,7 @@
 #include "os/host.h"
 #include "pendulum/pendulum_env.h"
 #include "python/src/bindings.h"
-#include "rl/ppo_config.h"
+#include "rl/ppo/ppo_config.h"
 #include "rl/torque_levels.h"
 #include "runs/config_files.h"
 #include "runs/plant_file.h"

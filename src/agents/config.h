@@ -11,10 +11,10 @@
 #include "agents/foreign_task.h"
 #include "base/options.h"
 #include "pendulum/task_config.h"
-#include "rl/dqn_config.h"
-#include "rl/ppo_config.h"
-#include "rl/sac_config.h"
-#include "rl/trainer.h"
+#include "rl/dqn/dqn_config.h"
+#include "rl/ppo/ppo_config.h"
+#include "rl/sac/sac_config.h"
+#include "rl/train/trainer.h"
 
 namespace upswing {
 

@@ -6,7 +6,7 @@
 #include "agents/config.h"
 #include "base/tensors.h"
 #include "base/thread_pool.h"
-#include "rl/trainer.h"
+#include "rl/train/trainer.h"
 
 namespace upswing {
 

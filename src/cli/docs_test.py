@@ -350,7 +350,7 @@ class Site(ProgramTest):
             for address in loaded:
                 self.assertFalse(re.match(r"(?:[a-z]+:)?//", address), f"{page.name}: {address}")
             self.assertNotIn('href="/', text, page.name)
-        for header in ("base/env.h", "rl/dqn.h"):
+        for header in ("base/env.h", "rl/dqn/dqn.h"):
             page = site / "reference/cpp-api" / f"{header.split('/', maxsplit=1)[0]}.html"
             self.assertIn(header, page.read_text(encoding="utf-8"))
         self.assertIn("Dqn", (site / "reference/cpp-api/rl.html").read_text(encoding="utf-8"))

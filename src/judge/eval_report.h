@@ -10,7 +10,7 @@
 #include "judge/trial.h"
 #include "pendulum/pendulum_env.h"
 #include "report/statistics.h"
-#include "rl/evaluate.h"
+#include "rl/train/evaluate.h"
 
 /// Evaluations of a policy over many episodes, and their reports.
 namespace upswing {

@@ -8,7 +8,7 @@
 #include "base/options.h"
 #include "base/progress.h"
 #include "base/thread_pool.h"
-#include "rl/evaluate.h"
+#include "rl/train/evaluate.h"
 
 /// Grades of all policies of a class. The same files give the same grades on every machine: with
 /// any vector instructions, C library and number of threads.

@@ -9,7 +9,7 @@
 
 #include "base/error.h"
 #include "base/text.h"
-#include "rl/evaluate.h"
+#include "rl/train/evaluate.h"
 
 namespace upswing {
 namespace {

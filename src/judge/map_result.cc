@@ -11,7 +11,7 @@
 #include "base/json.h"
 #include "os/file.h"
 #include "report/figure.h"
-#include "rl/evaluate.h"
+#include "rl/train/evaluate.h"
 
 namespace upswing {
 namespace {

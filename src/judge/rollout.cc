@@ -10,7 +10,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "judge/trial.h"
-#include "rl/evaluate.h"
+#include "rl/train/evaluate.h"
 
 namespace upswing {
 namespace {

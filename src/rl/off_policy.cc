@@ -6,7 +6,7 @@
 
 #include "base/error.h"
 #include "base/text.h"
-#include "rl/mirror.h"
+#include "rl/replay/mirror.h"
 #include "rl/schedule.h"
 
 namespace upswing {

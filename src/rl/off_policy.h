@@ -5,9 +5,9 @@
 
 #include "base/thread_tuner.h"
 #include "rl/agent.h"
-#include "rl/n_step.h"
 #include "rl/off_policy_config.h"
-#include "rl/replay.h"
+#include "rl/replay/n_step.h"
+#include "rl/replay/replay.h"
 
 namespace upswing {
 

@@ -11,7 +11,7 @@
 #include "nn/adam.h"
 #include "nn/network.h"
 #include "nn/network_policy.h"
-#include "rl/slices.h"
+#include "rl/replay/slices.h"
 
 namespace upswing {
 

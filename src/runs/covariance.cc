@@ -17,7 +17,7 @@ namespace {
 constexpr size_t kMostUncertain = 32;
 constexpr double kRounding = 1e-6;
 
-/// The numbers of a twin that are not settings of its plant (extras/machine/twin.h).
+/// The numbers of a twin that are not settings of its plant (extras/machine/twin/twin.h).
 constexpr std::array kOfMachine{
     "delay",           "lag",     "passive_limit",  "current_delay",
     "current_inertia", "quantum", "angle_range",    "torque_quantum",

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "rl/trainer.h"
+#include "rl/train/trainer.h"
 #include "runs/run_conditions.h"
 
 namespace upswing {

@@ -10,7 +10,7 @@
 #include "base/tensors.h"
 #include "os/file.h"
 #include "os/lock.h"
-#include "rl/trainer.h"
+#include "rl/train/trainer.h"
 
 namespace upswing {
 

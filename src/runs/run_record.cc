@@ -6,7 +6,7 @@
 #include "base/steps.h"
 #include "base/text.h"
 #include "os/file.h"
-#include "rl/evaluate.h"
+#include "rl/train/evaluate.h"
 #include "runs/run_folder.h"
 
 namespace upswing {

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "base/text.h"
-#include "extras/machine/frame.h"
+#include "extras/machine/drive/frame.h"
 #include "tools/fuzz/target.h"
 
 namespace upswing {

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "extras/machine/check.h"
+#include "extras/machine/logs/check.h"
 #include "os/gzip.h"
 #include "tools/fuzz/target.h"
 

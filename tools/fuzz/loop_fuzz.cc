@@ -1,6 +1,6 @@
 // Target: the faults of encoders, clock, firmware and line in a run of the control loop. Accepted:
 // a run without a fault.
-#include "extras/machine/adverse_testing.h"
+#include "extras/machine/drive/adverse_testing.h"
 #include "tools/fuzz/target.h"
 
 namespace upswing {

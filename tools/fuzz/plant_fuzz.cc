@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "extras/machine/twin.h"
+#include "extras/machine/twin/twin.h"
 #include "pendulum/posterior.h"
 #include "runs/plant_file.h"
 #include "tools/fuzz/target.h"

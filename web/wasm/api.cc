@@ -18,7 +18,7 @@
 #include "pendulum/observation.h"
 #include "pendulum/sensors.h"
 #include "pendulum/timestep.h"
-#include "rl/softmax.h"
+#include "rl/ppo/softmax.h"
 #include "web/wasm/learner.h"
 #include "web/wasm/step.h"
 

@@ -45,8 +45,8 @@ STACK = 1 << 20
 LAYERS = ["base", "nn", "pendulum", "rl", "control", "agents"]
 # Sources compiled for speed, because trainings spend their time there. All others are compiled for
 # size.
-FAST = ["nn/linear", "nn/product", "pendulum/closed_form", "control/trajectory", "control/pendulum_model", "rl/replay", "rl/sum_tree", "rl/n_step",
-        "rl/sac_update"]
+FAST = ["nn/linear", "nn/product", "pendulum/closed_form", "control/trajectory", "control/pendulum_model", "rl/replay/replay", "rl/replay/sum_tree",
+        "rl/replay/n_step", "rl/sac/sac_update"]
 
 # The needed sources of muParser.
 PARSER = ["", "Base", "Bytecode", "Callback", "Error", "TokenReader"]
@@ -71,7 +71,7 @@ def include(*folders):
 
 
 def own_sources():
-    sources = [path for layer in LAYERS for path in sorted((SOURCE / layer).glob("*.cc"))
+    sources = [path for layer in LAYERS for path in sorted((SOURCE / layer).rglob("*.cc"))
                if not path.stem.endswith(("_test", "_bench")) and path.name != "thread_pool.cc"]
     return sources + sorted(HERE.glob("*.cc"))
 

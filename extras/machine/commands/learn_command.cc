@@ -1,0 +1,124 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "base/error.h"
+#include "base/format.h"
+#include "base/text.h"
+#include "cli/commands.h"
+#include "cli/say.h"
+#include "cli/signals.h"
+#include "extras/machine/drive/learn.h"
+#include "extras/machine/drive/policy_controller.h"
+#include "os/file.h"
+#include "os/host.h"
+
+namespace upswing::machine {
+namespace {
+
+struct LearnArguments {
+  std::string link, out, robot = "pendubot";
+  LearnConfig config;
+  int64_t seed = 1, threads = 0;
+};
+
+std::unique_ptr<MachineLink> g_learned;  // global for signal handlers, which may come until the end
+
+/// The command that runs the controller again.
+std::string CommandOf(const LearnArguments& a, const LearnResult& r) {
+  const PolicyArguments& controller = r.controller;
+  std::string text = fmt::format("{} run {}", LaunchCommand(), controller.name);
+  for (const FlagValue& flag : controller.flags) {
+    text += fmt::format(" {} {}", FlagOf(flag.name), ShellQuoted(flag.text));
+  }
+  for (const std::string& change : controller.made_for) text += " --made-for " + change;
+  const bool in_process =
+      ParseLink(a.link, /*listens=*/false).transport == LinkAddress::Transport::kTwin;
+  const std::string twin = ShellQuoted((std::filesystem::path(a.out) / "twin.toml").string());
+  text += in_process ? fmt::format(" --link {}", twin)
+                     : fmt::format(" --link {} --twin {}", ShellQuoted(a.link), twin);
+  return text + fmt::format(
+                    " --compensation {} --passive-torque {} --max-torque {} "
+                    "--max-angle {} --max-velocity {} --max-energy {} --hz {}",
+                    r.compensation, a.config.passive_torque, a.config.limits.torque,
+                    a.config.limits.angle, a.config.limits.velocity, a.config.limits.energy,
+                    a.config.hz);
+}
+
+int RunLearn(const LearnArguments& a) {
+  if (a.link.empty()) throw BadInput("machine learn: expected --link, got none");
+  if (a.out.empty()) throw BadInput("machine learn: expected --out FOLDER, got none");
+  LearnConfig config = a.config;
+  config.seed = static_cast<uint64_t>(a.seed);
+  config.actuated_joint = static_cast<int>(*ParseRobot(a.robot));
+  config.Check();
+  const LinkAddress address = ParseLink(a.link, /*listens=*/false);
+  if (address.transport == LinkAddress::Transport::kTwin) {
+    g_learned =
+        std::make_unique<TwinLink>(ReadTwin(address.place, "--link"), PendulumState(), config.seed);
+  } else {
+    g_learned = std::make_unique<ChannelLink>(Channel::Connect(address));
+  }
+  CheckFree(a.out);
+  NewFolder folder(a.out);
+  GuardMotors([] { g_learned->SwitchOffAtOnce(); });
+  ThreadPool pool(ResolveThreads(a.threads));
+  std::string report;
+  const auto say = [&](const std::string& line) {
+    fmt::print(stderr, "{}\n", Printable(line));
+    report += line + "\n";
+  };
+  LearnResult r;
+  try {
+    r = Learn(config, *g_learned, a.out, &pool, say, [] { return StopSignal() != 0; });
+  } catch (const Error&) {  // there was no run, so that the command can be repeated
+    std::error_code error;
+    std::filesystem::remove(std::filesystem::path(a.out) / "log-01.csv", error);
+    throw;
+  }
+  folder.Keep();
+  const std::string used = fmt::format("{:.1f} s of motion, {:.1f} s of computing, {}", r.motion,
+                                       r.computing, Counted(r.tries, "attempt"));
+  report += r.reason.empty() ? "balanced: " : fmt::format("not balanced, {}: ", r.reason);
+  report += used + "\n";
+  if (r.tries > 0) report += CommandOf(a, r) + "\n";
+  WriteNamedFile(std::filesystem::path(a.out) / "report.txt", report);
+  if (StopSignal() != 0) {
+    fmt::print(stderr, "stopped: {}; written {}\n", used, Printable(a.out));
+    return 128 + StopSignal();
+  }
+  if (!r.reason.empty()) throw Failure(fmt::format("not balanced: {} ({})", r.reason, used));
+  fmt::print("balanced for {:.1f} s: {}\n{}\nwritten {}\n", r.balanced, used, CommandOf(a, r),
+             Printable(a.out));
+  return 0;
+}
+
+}  // namespace
+
+void AddLearn(CommandLine& line) {
+  LearnArguments& a = line.Runs(RunLearn);
+  line.Text("--link", a.link, "LINK",
+            "machine: udp:HOST:PORT or serial:DEVICE[:BAUD], or a twin (file or shipped plant) to "
+            "play it in simulated time");
+  line.Text("--out", a.out, "FOLDER", "new folder to write: logs, twin.toml, report.txt");
+  line.Text("--robot", a.robot, "ROBOT",
+            "pendubot (motor at joint 1) or acrobot (joint 2) (default pendubot)");
+  line.Arguments(OptionsOf(a.config));
+  AddSeed(line, a.seed, "the excitations and of simulated tries");
+  AddThreads(line, a.threads);
+  line.Footer(
+      "The links must hang at rest. Torques grow until they move. The program identifies a twin\n"
+      "from this motion, designs a controller on it and tries it. After a failed try it\n"
+      "identifies the twin again. You need to know --max-torque, --encoder-counts and the signs\n"
+      "of angles and torques (docs/howto/real-machine.md). Beyond a limit and at Ctrl-C the loop\n"
+      "brakes. A second Ctrl-C switches the motors off at once.\n"
+      "Exit code: 0 if the machine balanced for --hold, 130 after Ctrl-C, else 1.\n\n"
+      "Examples:\n"
+      "  ./upswing machine learn --link realaigym-twin --encoder-counts 16384 --out rehearsal\n"
+      "  ./upswing machine learn --link serial:/dev/ttyACM0 --encoder-counts 4096 \\\n"
+      "    --max-torque 3 --max-velocity 15 --out today\n");
+}
+
+}  // namespace upswing::machine

@@ -1,0 +1,226 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "base/error.h"
+#include "base/text.h"
+#include "cli/commands.h"
+#include "cli/signals.h"
+#include "extras/machine/drive/control_loop.h"
+#include "extras/machine/drive/policy_controller.h"
+#include "os/streams.h"
+
+namespace upswing::machine {
+namespace {
+
+struct RunArguments {
+  PolicyArguments policy;
+  std::string link, twin, robot, log, start = "hanging";
+  Limits limits;
+  MachineSensors sensors{.velocity_share = 0.2, .velocity_dead_zone = 0.1};
+  int64_t seed = 1;
+  double hz = 500, seconds = 10, compensation = 0, passive_torque = 0.5;
+  bool differences = false, draw = false;
+};
+
+std::unique_ptr<MachineLink> g_link;  // global for signal handlers, which may come until the end
+
+/// Says how the plant that a policy was made for differs from the twin: times and torques that
+/// decide how the machine answers. The controllers of `run` are made for the twin itself.
+void CompareWithTwin(const LoadedPolicy& policy, const Twin& twin) {
+  constexpr double kSimilar = 0.2;  // relative difference that a policy usually withstands
+  const Manipulator own = ManipulatorOf(policy.plant), body = BodyOf(twin);
+  std::string text;
+  const auto compare = [&](const char* what, double of_policy, double of_twin, const char* unit) {
+    if (std::abs(of_policy - of_twin) <= kSimilar * std::abs(of_twin)) return;
+    if (!text.empty()) text += ", ";
+    text += fmt::format("{} {:.3g} {} (twin {:.3g})", what, of_policy, unit, of_twin);
+  };
+  // Upright at rest, with straight links: inertia about joint 1 and its moment of gravity.
+  compare("inertia", own.Mass(1).M11, body.Mass(1).M11, "kg·m²");
+  compare("moment of gravity", own.G1 + own.G2, body.G1 + body.G2, "N·m");
+  compare("inertia of link 2", own.J2, body.J2, "kg·m²");
+  compare("torque limit", policy.plant.torque_limit, twin.plant.torque_limit, "N·m");
+  if (text.empty()) return;
+  fmt::print(stderr, "warning: {} was made for another plant: {}\n", Printable(policy.name), text);
+}
+
+/// Throws BadInput if a serial line is too slow for a frame per cycle in each direction.
+void CheckBaud(const LinkAddress& link, int64_t hz) {
+  constexpr int64_t kBitsPerByte = 10;  // start, 8 bits, stop
+  const int64_t needed = hz * kBitsPerByte * static_cast<int64_t>(kFrameBytes);
+  if (link.transport == LinkAddress::Transport::kSerial && link.number < needed) {
+    throw BadInput(Concat("--link: expected at least ", needed, " bit/s for ", hz,
+                          " cycles per second, got ", link.number));
+  }
+}
+
+void PrintSummary(const LoopSummary& s, const LinkCounts& counts, const Supervisor& supervisor,
+                  bool simulated) {
+  std::string end = "not upright at its end";
+  if (s.upright > 0) end = fmt::format("the last {:.2f} s upright", s.upright);
+  fmt::print("  ran      {:.2f} s, {}\n", s.driven, end);
+  const double share = static_cast<double>(s.on_time) / static_cast<double>(s.cycles);
+  fmt::print(
+      "  cycles   {}, {:.3f}% begin within {:g} ms of the deadline, the latest after {:.2f} ms, {} "
+      "left out\n",
+      s.cycles, 100 * share, 1e3 * LoopSummary::kOnTime, 1e3 * s.latest, s.missed);
+  if (!simulated) {
+    fmt::print(
+        "  link     {} commands, {} readings; {} cycles without one, {} lost, {} doubled, "
+        "{} too old, {} broken bytes\n",
+        counts.sent, counts.received, s.unanswered, counts.lost, counts.duplicates, counts.old,
+        counts.broken);
+  }
+  fmt::print("  torque   cut in {} cycles; the controller takes up to {:.2f} ms\n",
+             supervisor.clipped(), 1e3 * s.longest_act);
+}
+
+int Drive(const RunArguments& a, const MachinePolicy& policy, const std::optional<Twin>& twin,
+          const LinkAddress& address) {
+  const PendulumState start = ParsePendulumStart(a.start);
+  const int joint = static_cast<int>(RobotOf(*policy));
+  const auto hz = std::llround(a.hz);
+  const double period = 1 / a.hz;
+  // A first call of another controller touches memory that is not there yet.
+  ControllerOf(policy)(0, {});
+  MachineController controller = ControllerOf(policy);
+  const StateSource source = a.differences ? StateSource::kDifferences : StateSource::kTwin;
+  Estimator estimator = twin ? Estimator(*twin, period, source) : Estimator(a.sensors, period);
+
+  Joints motor{a.passive_torque, a.passive_torque};
+  motor[joint - 1] = twin ? twin->plant.torque_limit : a.limits.torque;
+  const MachineSensors sensors = twin ? twin->sensors : a.sensors;
+  Supervisor supervisor({.limits = a.limits,
+                         .start = start,
+                         .motor_limit = motor,
+                         .actuated_joint = joint,
+                         .angle_range = sensors.angle_range,
+                         .quantum = sensors.quantum,
+                         .period = period});
+
+  LoopConfig config{
+      .hz = hz, .seconds = a.seconds, .actuated_joint = joint, .compensation = a.compensation};
+  config.stop = [] { return StopSignal() != 0; };
+
+  if (address.transport == LinkAddress::Transport::kTwin) {
+    const auto seed = static_cast<uint64_t>(a.seed);
+    Rng rng(seed, "loop: machine");
+    g_link = std::make_unique<TwinLink>(a.draw ? DrawTwin(*twin, rng) : *twin, start, seed);
+  } else {
+    g_link = std::make_unique<ChannelLink>(Channel::Connect(address));
+  }
+  MachineLink& link = *g_link;
+  LogWriter log(a.log);
+  fmt::print("{} on {}, {} Hz, {}\n", Printable(policy->name), Printable(a.link), a.hz,
+             NameOf(RobotOf(*policy)));
+  if (!link.simulated()) {
+    const std::string missing = EnterRealTime();
+    if (!missing.empty()) fmt::print("  not permitted: {}; cycles may be late\n", missing);
+  }
+  std::fflush(stdout);
+  GuardMotors([] { g_link->SwitchOffAtOnce(); });
+  ControlLoop loop(config, link, estimator, supervisor, std::move(controller), log);
+  loop.Run();
+  log.Finish();
+  PrintSummary(loop.summary(), link.counts(), supervisor, link.simulated());
+  if (log.dropped() > 0) fmt::print("  log      {} rows left out\n", log.dropped());
+  if (!a.log.empty()) fmt::print("written {}\n", Printable(a.log));
+  if (!supervisor.reason().empty()) throw Failure(supervisor.reason());
+  if (StopSignal() != 0) return 128 + StopSignal();
+  // Without torque the loop only reads.
+  if (a.limits.torque > 0 && loop.summary().upright == 0) {
+    throw Failure("the links were not upright at the end of the run");
+  }
+  return 0;
+}
+
+int RunRun(const RunArguments& a) {
+  if (a.policy.name.empty()) throw BadInput("run: expected a policy or a controller, got none");
+  if (a.link.empty()) throw BadInput("run: expected --link, got none");
+  ParseRobot(a.robot);  // throws
+  const LinkAddress address = ParseLink(a.link, /*listens=*/false);
+  CheckBaud(address, std::llround(a.hz));
+  if (IsStandardStream(a.log)) throw BadInput("--log: expected a file, got standard output");
+  if (!a.log.empty()) CheckWritable("--log", a.log);
+  const bool in_process = address.transport == LinkAddress::Transport::kTwin;
+  std::optional<Twin> twin;
+  if (in_process || !a.twin.empty())
+    twin = a.twin.empty() ? ReadTwin(address.place, "--link") : ReadTwin(a.twin, "--twin");
+  if (in_process && !a.twin.empty()) {
+    throw BadInput("--twin: expected a link by UDP or a serial line with it, got a twin as --link");
+  }
+  if (a.draw && (!in_process || twin->covariance.empty()))
+    throw BadInput("--draw: expected a twin with [covariance] as --link, got none");
+  if (!twin && a.compensation > 0)
+    throw BadInput("--compensation: expected --twin with it, got none");
+  const MachinePolicy policy = GetMachinePolicy(a.policy, a.robot, twin);
+  if (twin) CompareWithTwin(*policy, *twin);
+  return Drive(a, policy, twin, address);
+}
+
+}  // namespace
+
+void AddRun(CommandLine& line) {
+  RunArguments& a = line.Runs(RunRun);
+  AddPolicy(line, a.policy);
+  line.Text("--link", a.link, "LINK",
+            "machine: a twin (file or shipped plant), udp:HOST:PORT or serial:DEVICE[:BAUD] "
+            "(default 921600 bit/s)");
+  line.Text("--twin", a.twin, "FILE",
+            "twin of the machine at a UDP or serial link, for the estimate of its state");
+  line.Text("--robot", a.robot, "ROBOT",
+            "pendubot or acrobot: the motor of a controller's design (default: the policy's own)");
+  line.Text("--log", a.log, "FILE",
+            "new CSV file to write, a row per reading; `machine check` reads it");
+  line.Text(
+      "--start", a.start, "STATE",
+      "state in which the controller takes over: hanging, upright or q1,q2,w1,w2 [rad, rad/s] "
+      "(default hanging)");
+  Options own;
+  own.Section("loop");
+  own.Add(&a.hz, "hz", {100, 1000}, "1/s", "cycles per second").step = 50;
+  own.Add(&a.seconds, "seconds", {0.1, 86400}, "s", "time in which the controller drives");
+  own.Add(&a.passive_torque, "passive_torque", {0, 1000}, "N·m",
+          "largest torque of the joint without the controller's motor");
+  own.Add(&a.compensation, "compensation", kUnit, "",
+          "share of both joints' estimated dry friction that the motors compensate; needs a twin");
+  own.Add(&a.sensors.velocity_share, "velocity_share", {0.001, 1}, "",
+          "without a twin: share of the newest difference in the low-passed velocities");
+  own.Add(&a.sensors.velocity_dead_zone, "velocity_dead_zone", {0, 100}, "rad/s",
+          "without a twin: velocity below which the controller sees 0");
+  a.limits.Describe(own);
+  line.Arguments(own);
+  AddSeed(line, a.seed, "the twin's cycles and of --draw");
+  line.Flag("--differences", a.differences,
+            "estimate velocities by differences of the angles, without the twin's prediction");
+  line.Flag("--draw", a.draw,
+            "with a twin as --link: play a machine drawn from the twin's covariance");
+  line.Excludes("--compensation", {"--differences"}, ", which estimates no friction");
+  line.Footer(
+      "The loop waits for readings (idle), then for the start state (armed). From hanging links,\n"
+      "a pulse of the motor then has to move both joints (probing). Then the controller drives\n"
+      "(running). Afterwards, at Ctrl-C and beyond a limit it brakes until\n"
+      "the links hang; a second Ctrl-C switches the motors off at once. So does a fault: no\n"
+      "reading for --max-age, a reading that is no number, an angle that jumps, an encoder that\n"
+      "sticks or saturates (docs/howto/protection.md).\n"
+      "Exit code: 0 if the links are upright at the end (with --max-torque 0: in any case), or 1\n"
+      "with the reason in a line.\n\n"
+      "A controller is designed for the twin without dry friction. --made-for changes this\n"
+      "plant.\n"
+      "Read docs/howto/real-machine.md before you switch on motors.\n\n"
+      "Examples:\n"
+      "  ./upswing run tvlqr --link twin.toml --compensation 0.95 --log rehearsal.csv\n"
+      "  ./upswing fake twin.toml --link udp:4000        in another terminal\n"
+      "  ./upswing run runs/d3qn-seed1 --link udp:127.0.0.1:4000 --twin twin.toml\n"
+      "  ./upswing run runs/d3qn-seed1 --link serial:/dev/ttyACM0:921600 --twin twin.toml \\\n"
+      "    --max-torque 2 --max-velocity 10 --seconds 5 --log first.csv\n"
+      "  ./upswing machine check first.csv\n");
+}
+
+}  // namespace upswing::machine

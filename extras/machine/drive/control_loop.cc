@@ -1,0 +1,137 @@
+#include "extras/machine/drive/control_loop.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "base/stopwatch.h"
+
+namespace upswing::machine {
+namespace {
+
+constexpr double kAnswerShare = 0.5;  // share of a cycle that waits for the answer
+
+}  // namespace
+
+MachineController PerCycle(MachineController controller, int64_t hz) {
+  constexpr int64_t kControllerHz = 50;
+  static_assert(kControlPeriod * kControllerHz == 1);
+  return [controller = std::move(controller), hz, last = int64_t{-1}, torque = 0.0](
+             int64_t cycle, const PendulumState& state) mutable {
+    // After missed cycles only the last of the missed actions is made up.
+    const int64_t step = cycle * kControllerHz / hz;
+    if (step != last) torque = controller(step, state);
+    last = step;
+    return torque;
+  };
+}
+
+ControlLoop::ControlLoop(const LoopConfig& config, MachineLink& link, Estimator& estimator,
+                         Supervisor& supervisor, MachineController controller, LogWriter& log)
+    : config_(config),
+      link_(link),
+      estimator_(estimator),
+      supervisor_(supervisor),
+      controller_(PerCycle(std::move(controller), config.hz)),
+      log_(log),
+      period_(1 / static_cast<double>(config.hz)) {
+  // The first deadline lies in the future.
+  cycle_ = static_cast<int64_t>(link.Now() * static_cast<double>(config.hz)) + 1;
+}
+
+CycleFacts ControlLoop::FactsOf(double now, const std::optional<LinkReading>& reading) {
+  CycleFacts facts{.time = now, .fresh = reading.has_value()};
+  if (reading) {
+    last_reading_ = reading->time;
+    facts.read_at = reading->time;
+    facts.received = reading->received;
+    facts.angle = reading->angle;
+    facts.torque = reading->torque;
+    facts.locked = reading->locked;
+  } else if (last_reading_ >= 0) {
+    ++summary_.unanswered;
+  }
+  facts.age = last_reading_ < 0 ? 0 : now - last_reading_;
+  facts.zero = estimator_.zero();
+  facts.state = estimator_.now();
+  facts.ahead = estimator_.ahead();
+  facts.energy = estimator_.energy();
+  facts.expected = estimator_.expectation();
+  const bool over = running_cycle_ > 0 && static_cast<double>(cycle_ - running_cycle_) * period_ >=
+                                              config_.seconds - period_ / 2;
+  facts.stop = over || (config_.stop && config_.stop());
+  return facts;
+}
+
+Joints ControlLoop::ControllerTorque() {
+  Joints torque = estimator_.CompensationTorque(config_.compensation);
+  torque[config_.actuated_joint - 1] += controller_(cycle_ - running_cycle_, estimator_.ahead());
+  return torque;
+}
+
+bool ControlLoop::Cycle() {
+  const double deadline = static_cast<double>(cycle_) * period_;
+  link_.WaitUntil(deadline);
+  const double now = link_.Now(), late = now - deadline;
+  ++summary_.cycles;
+  if (late <= LoopSummary::kOnTime) ++summary_.on_time;
+  summary_.latest = std::max(summary_.latest, late);
+  const auto missed = static_cast<int64_t>(std::max(0.0, late / period_));
+  summary_.missed += missed;
+  cycle_ += missed;
+
+  // After a pause of this process the torques of the cycle before are too old to be sent.
+  if (enabled_ && !supervisor_.CheckAge(now - last_reading_ - period_)) {
+    torque_ = {};
+    enabled_ = false;
+  }
+  // A late cycle waits for its answer, too.
+  const double until = std::max(deadline, now - period_ / 4) + kAnswerShare * period_;
+  const auto reading = link_.Exchange(torque_, enabled_, until);
+  estimator_.Update(now, torque_, reading ? &*reading : nullptr);
+  const CycleFacts facts = FactsOf(now, reading);
+  const LoopState state = supervisor_.Step(facts);
+
+  Joints wanted{};
+  if (state == LoopState::kRunning) {
+    if (running_cycle_ == 0) running_cycle_ = cycle_;
+    summary_.driven = static_cast<double>(cycle_ - running_cycle_) * period_;
+    if (!Inverted(facts.state)) upright_since_ = -1;
+    if (Inverted(facts.state) && upright_since_ < 0) upright_since_ = now;
+    summary_.upright = upright_since_ < 0 ? 0 : now - upright_since_;
+    const Stopwatch watch;
+    wanted = ControllerTorque();
+    summary_.longest_act = std::max(summary_.longest_act, watch.seconds());
+  }
+  torque_ = supervisor_.Torque(wanted, facts);
+  const LoopState after = supervisor_.state();
+  enabled_ = state != LoopState::kIdle && after != LoopState::kFault;
+  if (MayDrive(after)) ++summary_.moving;
+  if (reading) {
+    const LoopRow row{reading->time, reading->angle,  {facts.state.w1, facts.state.w2},
+                      torque_,       reading->torque, static_cast<int>(after),
+                      late};
+    log_.Add(row, link_.simulated());
+  }
+  ++cycle_;
+  return !supervisor_.ended();
+}
+
+void ControlLoop::SwitchOff() {
+  for (int i = 0; i < kFarewells; ++i) {
+    link_.Exchange({}, /*enabled=*/false, link_.Now() + kAnswerShare * period_);
+    link_.WaitUntil(link_.Now() + kAnswerShare * period_);
+  }
+}
+
+void ControlLoop::Run() {
+  try {
+    while (Cycle()) {
+    }
+  } catch (...) {
+    SwitchOff();
+    throw;
+  }
+  SwitchOff();
+}
+
+}  // namespace upswing::machine

@@ -1,0 +1,393 @@
+#include "extras/machine/drive/learn.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "base/error.h"
+#include "base/format.h"
+#include "base/text.h"
+#include "extras/machine/drive/excitation.h"
+#include "extras/machine/drive/learning_run.h"
+#include "extras/machine/drive/policy_controller.h"
+#include "extras/machine/logs/check.h"
+#include "extras/machine/twin/first_twin.h"
+#include "extras/machine/twin/identify.h"
+#include "os/file.h"
+#include "pendulum/runge_kutta.h"
+
+namespace upswing::machine {
+namespace {
+
+/// An excitation: its length, the lean of the links (rad) and the energy (1: upright) that it aims
+/// at, and the windows (s) in which a model predicts its motion.
+struct Excitement {
+  double seconds, lean, energy, window;
+};
+constexpr Excitement kSmallMotion{4, 0.8, 0.2, 0.3}, kLargeMotion{6, 2, 0.6, 0.5};
+constexpr double kLimitShare = 0.6;  // share of the user's limits that an excitation aims at
+
+constexpr double kLargestError = 0.1;    // of a fit, rad
+constexpr double kLargestZero = 0.2;     // of the encoders, rad
+constexpr double kLongestSwinging = 60;  // until the links rest, s
+constexpr int kDraws = 5;                // machines of the posterior that judge a controller
+
+/// A controller to choose, and the share of dry friction that motors compensate under it.
+struct Candidate {
+  PolicyArguments arguments;
+  double compensation;
+};
+
+/// The candidates for a twin, the best first. The last two need milliseconds for a decision. They
+/// plan with dry friction, because noise makes its compensation shake a light link. Damping of the
+/// joint without a motor stands for its friction in the linear model of the regulator.
+std::vector<Candidate> CandidatesFor(const Plant& plant) {
+  constexpr double kUsualCompensation = 0.95;
+  const auto with = [](const char* name, const std::vector<FlagValue>& flags) {
+    return Candidate{{name, flags, {}}, kUsualCompensation};
+  };
+  const std::vector<FlagValue> stiff{{"lqr_q1", "100"}, {"lqr_q2", "100"}, {"lqr_torque", "0.3"}};
+  std::vector<FlagValue> ahead = stiff;
+  ahead.insert(ahead.end(), {{"mpc_seconds", "0.3"}, {"mpc_angle_range", "9"}});
+  const Candidate rubbing{
+      {"mpc",
+       {{"mpc_seconds", "1"}},
+       {Concat("coulomb1=", plant.coulomb1), Concat("coulomb2=", plant.coulomb2)}},
+      0};
+  Candidate damped = rubbing;
+  constexpr double kDamping = 2;  // for dry friction, s/rad
+  damped.arguments.made_for.push_back(
+      plant.actuated_joint == 1 ? Concat("damping2=", plant.damping2 + kDamping * plant.coulomb2)
+                                : Concat("damping1=", plant.damping1 + kDamping * plant.coulomb1));
+  return {with("tvlqr", {}),
+          with("tvlqr", stiff),
+          with("tvlqr", {{"tvlqr_seconds", "6"}, {"tvlqr_reserve", "0.1"}}),
+          with("mpc", ahead),
+          rubbing,
+          damped};
+}
+
+double ProcessorSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+/// A session of learning.
+class LearningSession {
+ public:
+  LearningSession(const LearnConfig& config, MachineLink& link, const std::filesystem::path& out,
+                  ThreadPool* pool, const std::function<void(const std::string&)>& say,
+                  const std::function<bool()>& stop)
+      : c_(config), link_(link), out_(out), pool_(pool), say_(say), stop_(stop) {
+    twin_.plant.torque_limit = c_.limits.torque;
+    twin_.plant.actuated_joint = c_.actuated_joint;
+    twin_.actuator.passive_limit = c_.passive_torque;
+    twin_.sensors.quantum = 2 * std::numbers::pi / c_.encoder_counts;
+    twin_.sensors.velocity_share = 0.2;
+    twin_.sensors.velocity_dead_zone = 0.1;
+    twin_.loop.period = 1 / c_.hz;
+  }
+
+  LearnResult Work() {
+    try {
+      const Twin known = twin_;
+      Excite(kSmallMotion, /*has_twin=*/false);
+      ExpectMotion();
+      Fit(kSmallMotion.window);
+      // A link that hardly moved shows no twin that is good enough to estimate the state.
+      const bool has_twin =
+          LargerMagnitude(twin_.sensors.zero1, twin_.sensors.zero2) < kLargestZero;
+      if (!has_twin) twin_ = known;
+      Excite(kLargeMotion, has_twin);
+      while (true) {
+        Fit(kLargeMotion.window);
+        if (result_.tries == 0) WarnOfFalls();
+        if (Try()) return result_;
+      }
+    } catch (const Ended& ended) {
+      result_.reason = ended.reason;
+    }
+    return result_;
+  }
+
+ private:
+  /// The session ends without balance.
+  struct Ended {
+    std::string reason;
+  };
+
+  void ExpectBudget() const {
+    if (stop_()) throw Ended{"stopped"};
+    if (result_.motion >= c_.motion) throw Ended{"the time of motion is used up"};
+    if (result_.computing >= c_.computing) throw Ended{"the time of computing is used up"};
+  }
+
+  /// Ends the session unless the first excitation moved a link.
+  void ExpectMotion() const {
+    constexpr double kLeast = 0.05;  // rad
+    const Pieces last(&logs_.back(), 1);
+    const double range = std::max(AngleRange(last, 0), AngleRange(last, 1));
+    if (range > kLeast) return;
+    throw Ended{fmt::format(
+        "the links moved by {:.3f} rad only under torques up to {:g} N·m: does anything hold them?",
+        range, c_.limits.torque)};
+  }
+
+  /// Runs work that computes, and counts its processor time.
+  template <typename Work>
+  void Compute(const Work& work) {
+    const double begin = ProcessorSeconds();
+    try {
+      work();
+    } catch (const Error& error) {
+      throw Ended{error.what()};
+    }
+    result_.computing += ProcessorSeconds() - begin;
+  }
+
+  void Excite(const Excitement& e, bool has_twin) {
+    const Limits& l = c_.limits;
+    const double energy = std::min(e.energy, kLimitShare * l.energy);
+    // Links that swing to this lean have this energy.
+    const double lean = std::min({e.lean, kLimitShare * l.angle, std::acos(1 - 2 * energy)});
+    const Manipulator body = BodyOf(twin_);
+    const double hanging = -body.At({}).energy;
+    const double velocity = kLimitShare * l.velocity;
+    const auto level = [=](const PendulumState& s) {
+      // Lean and velocity add up as energies do: links that lean and move go on to lean further.
+      const double motion = std::hypot(LargerMagnitude(Wrapped(s.q1), Wrapped(s.q1 + s.q2)) / lean,
+                                       LargerMagnitude(s.w1, s.w2) / velocity);
+      if (!has_twin) return motion;
+      return std::max(motion, (1 + body.At(s).energy / hanging) / energy);
+    };
+    say_(fmt::format("excite: torques grow until the links lean {:.2f} rad, {:g} s", lean,
+                     e.seconds));
+    const Estimator estimator =
+        has_twin ? Estimator(twin_, 1 / c_.hz) : Estimator(twin_.sensors, 1 / c_.hz);
+    Run({.limits = l, .seconds = e.seconds}, estimator,
+        Excitation(l.torque, c_.actuated_joint, level, c_.seed));
+  }
+
+  RunOutcome Run(RunRules rules, const Estimator& estimator, MachineController controller) {
+    ExpectBudget();
+    rules.seconds = std::min(rules.seconds, c_.motion - result_.motion);
+    rules.log = (out_ / fmt::format("log-{:02}.csv", logs_.size() + 1)).string();
+    if (!logs_.empty()) rules.limits.patience = std::max(rules.limits.patience, kLongestSwinging);
+    RunOutcome run =
+        RunCycles(c_, rules, twin_.sensors, estimator, std::move(controller), link_, stop_);
+    if (run.motion == 0) {
+      if (stop_()) throw Ended{"stopped"};
+      if (logs_.empty()) throw Failure(run.reason);
+      throw Ended{run.reason};
+    }
+    result_.motion += run.motion;
+    logs_.push_back(ReadLog(rules.log).front());
+    Joints angle{}, torque{};
+    for (int k = 0; k < logs_.back().rows(); ++k) {
+      for (int j = 0; j < 2; ++j) {
+        angle[j] = LargerMagnitude(angle[j], logs_.back().angle[k][j]);
+        torque[j] = LargerMagnitude(torque[j], logs_.back().commanded[k][j]);
+      }
+    }
+    say_(
+        fmt::format("  {}: {:.1f} s, angles up to {:.2f} and {:.2f} rad, torques {:.2f} and "
+                    "{:.2f} N·m{}",
+                    rules.log, run.motion, angle[0], angle[1], torque[0], torque[1],
+                    run.reason.empty() ? "" : "; " + run.reason));
+    // A machine that does not answer gets no more torque.
+    if (run.faulty) throw Ended{run.reason};
+    const Joints& last = logs_.back().angle.back();
+    if (LargerMagnitude(last[0], last[1]) > c_.limits.angle) {
+      throw Ended{"the links hang beyond --max-angle: turn them back, or raise it"};
+    }
+    return run;
+  }
+
+  /// Identifies the twin from all logs, the last of which counts twice.
+  void Fit(double window) {
+    ExpectBudget();
+    say_(fmt::format("identify: {}", Counted(std::ssize(logs_), "log")));
+    Compute([&] {
+      const Twin guess = FirstTwin(logs_, twin_);
+      if (logs_.size() == 1 || ErrorOf(guess) < ErrorOf(twin_)) twin_ = guess;
+      FitConfig config{.windows = {window, window}, .iterations = 30, .tolerance = 1e-4};
+      std::vector<std::string> values =
+          Structures(/*has_motors=*/true, /*one_body=*/false).back().values;
+      values.emplace_back("length1");
+      std::vector<MachineLog> logs = logs_;
+      if (result_.tries > 0) logs.push_back(logs_.back());
+      const double quantum = twin_.sensors.quantum;
+      const FitResult fit = machine::Fit(logs, twin_, {"", values}, config, pool_);
+      if (!(fit.error < kLargestError)) {
+        throw Failure(
+            fmt::format("no twin follows the motion (error {:.2f} rad): are the signs of "
+                        "angles and torques right?",
+                        fit.error));
+      }
+      // Today's zeros and friction are known now.
+      twin_ = InSession(fit.twin, logs_.back());
+      MeasureLoop(logs_, twin_);
+      twin_.sensors.quantum = quantum;
+      twin_.name = "learned";
+      KeepValidCovariance();
+      WriteFileAtomically(out_ / "twin.toml", TwinText(twin_));
+      const Manipulator m = BodyOf(twin_);
+      say_(fmt::format(
+          "  error {:.4f} rad; gravity {:.2f} and {:.2f} N·m, dry friction {:.3f} and {:.3f} "
+          "N·m, delay {:.1f} ms, lag {:.1f} ms",
+          fit.error, m.G1, m.G2, m.f1, m.f2, 1e3 * twin_.actuator.delay, 1e3 * twin_.actuator.lag));
+    });
+  }
+
+  double ErrorOf(const Twin& twin) const {
+    std::vector<std::vector<double>> errors;
+    for (const MachineLog& log : logs_) errors.push_back(WindowErrors(log, twin, 0.3, false));
+    return PooledMedian(errors);
+  }
+
+  /// Few windows give a covariance that rounding makes invalid. Then the values count as
+  /// independent.
+  void KeepValidCovariance() {
+    try {
+      Rng rng(c_.seed, "machine: draws");
+      DrawTwin(twin_, rng);
+    } catch (const Error&) {
+      const size_t n = twin_.uncertain.size();
+      for (size_t i = 0; i < n * n; ++i) twin_.covariance[i] *= i % (n + 1) == 0 ? 1 : 0;
+    }
+  }
+
+  /// Says which limits a fall from upright exceeds. A motor cannot hold links that fall.
+  void WarnOfFalls() {
+    constexpr double kLean = 0.1, kStep = 1e-3, kSeconds = 3;  // rad, s
+    const Manipulator body = BodyOf(twin_);
+    const auto falling = [&](const PendulumState& s, double /*share*/) {
+      return body.Acceleration(s, {});
+    };
+    double angle = 0, velocity = 0;
+    for (const double lean : {-kLean, kLean}) {
+      PendulumState s{std::numbers::pi + lean, 0, 0, 0};
+      for (int i = 0; i < kSeconds / kStep; ++i) {
+        s = RungeKuttaStep(s, falling(s, 0), kStep, falling);
+        angle = std::max(angle, Larger(s.q1, s.q2));
+        velocity = std::max(velocity, Larger(s.w1, s.w2));
+      }
+    }
+    const auto warn = [&](const char* flag, double limit, double reached, const char* unit) {
+      if (reached <= limit) return;
+      say_(fmt::format("  warning: a fall from upright reaches {:.1f} {}, beyond {} {:g}", reached,
+                       unit, flag, limit));
+    };
+    warn("--max-angle", c_.limits.angle, angle, "rad");
+    warn("--max-velocity", c_.limits.velocity, velocity, "rad/s");
+  }
+
+  /// Designs a controller and tries it. Returns whether the machine balanced.
+  bool Try() {
+    const auto policy = Choose();
+    ExpectBudget();
+    ++result_.tries;
+    say_(fmt::format("try {}: {}", result_.tries, policy->name));
+    const RunOutcome run =
+        Run(TryRules(result_.compensation), Estimator(twin_, 1 / c_.hz), ControllerOf(policy));
+    result_.balanced = run.summary.upright;
+    say_(fmt::format("  balanced {:.1f} s; used {:.1f} s of motion, {:.1f} s of computing",
+                     result_.balanced, result_.motion, result_.computing));
+    return result_.balanced >= c_.hold;
+  }
+
+  RunRules TryRules(double compensation) const {
+    return {.limits = c_.limits,
+            .seconds = 2 * kLongestFall + c_.hold,
+            .is_try = true,
+            .compensation = compensation};
+  }
+
+  /// The first controller that balances all machines drawn from the posterior, or most of them.
+  MachinePolicy Choose() {
+    ExpectBudget();
+    MachinePolicy best;
+    Compute([&] {
+      int most = -1;
+      for (const Candidate& candidate : CandidatesFor(twin_.plant)) {
+        try {
+          const MachinePolicy policy = GetMachinePolicy(candidate.arguments, "", twin_);
+          const int held = HeldBy(policy, candidate.compensation);
+          say_(fmt::format("design: {}: {} of {} machines of the twin", candidate.arguments.name,
+                           held, kDraws));
+          if (held <= most) continue;
+          most = held;
+          best = policy;
+          result_.controller = candidate.arguments;
+          result_.compensation = candidate.compensation;
+        } catch (const Error& error) {
+          say_(fmt::format("design: {}", error.what()));
+        }
+        if (most == kDraws) break;
+      }
+    });
+    if (best == nullptr) throw Ended{"no controller exists for the twin"};
+    return best;
+  }
+
+  /// Number of machines, of kDraws of the posterior, that a controller balances.
+  int HeldBy(const MachinePolicy& policy, double compensation) const {
+    int held = 0;
+    for (int i = 0; i < kDraws; ++i) {
+      Rng rng(c_.seed, "machine: draws", static_cast<uint64_t>(i));
+      TwinLink link(DrawTwin(twin_, rng), {}, c_.seed);
+      const RunOutcome run =
+          RunCycles(c_, TryRules(compensation), twin_.sensors, Estimator(twin_, 1 / c_.hz),
+                    ControllerOf(policy), link, stop_);
+      if (stop_()) throw Ended{"stopped"};
+      if (run.summary.upright >= c_.hold) ++held;
+    }
+    return held;
+  }
+
+  const LearnConfig& c_;
+  MachineLink& link_;
+  std::filesystem::path out_;
+  ThreadPool* pool_;
+  std::function<void(const std::string&)> say_;
+  std::function<bool()> stop_;
+  Twin twin_;
+  std::vector<MachineLog> logs_;
+  LearnResult result_;
+};
+
+}  // namespace
+
+void LearnConfig::Describe(Options& o) {
+  o.Section("learning");
+  o.Add(&encoder_counts, "encoder_counts", {16, 1e9}, "1/turn", "steps of the encoders; required")
+      .usual = "none";
+  o.Add(&hold, "hold", {1, 3600}, "s", "time of balance that ends the learning");
+  o.Add(&motion, "motion", {10, 3600}, "s", "longest time with torques, all runs together");
+  o.Add(&computing, "computing", {1, 1e6}, "s", "longest processor time of models and controllers");
+  o.Add(&hz, "hz", {100, 1000}, "1/s", "cycles per second").step = 50;
+  o.Add(&passive_torque, "passive_torque", {0, 1000}, "N·m",
+        "largest torque of the joint without the controller's motor; it only compensates friction");
+  limits.Describe(o);
+}
+
+void LearnConfig::Check() const {
+  if (encoder_counts == 0) throw BadInput("machine learn: expected --encoder-counts, got none");
+  const auto expect = [](const char* flag, double least, double got) {
+    if (got >= least) return;
+    throw BadInput(Concat(flag, ": expected ", least, " or more for a swing-up, got ", got));
+  };
+  expect("--max-angle", 3.5, limits.angle);
+  expect("--max-energy", 1.1, limits.energy);
+}
+
+LearnResult Learn(const LearnConfig& config, MachineLink& link, const std::filesystem::path& out,
+                  ThreadPool* pool, const std::function<void(const std::string&)>& say,
+                  const std::function<bool()>& stop) {
+  config.Check();
+  return LearningSession(config, link, out, pool, say, stop).Work();
+}
+
+}  // namespace upswing::machine

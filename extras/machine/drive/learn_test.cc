@@ -1,0 +1,238 @@
+#include "extras/machine/drive/learn.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/error.h"
+#include "extras/machine/drive/excitation.h"
+#include "extras/machine/drive/loop_testing.h"
+#include "extras/machine/twin/first_twin.h"
+#include "extras/machine/twin/testing.h"
+#include "os/testing.h"
+
+namespace upswing::machine {
+namespace {
+
+/// A machine unlike RealAIGym's, with coarse encoders.
+Twin StrangeTwin() {
+  Twin twin;
+  twin.plant.mass1 = 0.8;
+  twin.plant.mass2 = 0.4;
+  twin.plant.length1 = 0.27;
+  twin.plant.length2 = 0.2;
+  twin.plant.damping1 = twin.plant.damping2 = 0.004;
+  twin.plant.coulomb1 = 0.1;
+  twin.plant.coulomb2 = 0.05;
+  twin.actuator.delay = 0.004;
+  twin.actuator.lag = 0.002;
+  twin.sensors.quantum = 6.283185307179586 / 2000;
+  twin.sensors.zero1 = -0.04;
+  twin.sensors.zero2 = 0.03;
+  return twin;
+}
+
+LearnConfig ConfigFor(double hold) {
+  LearnConfig config;
+  config.encoder_counts = 2000;
+  config.hold = hold;
+  config.computing = 1e6;  // sanitizers take longer
+  return config;
+}
+
+/// A machine in simulated time that remembers what it showed and got.
+class WatchedLink : public TwinLink {
+ public:
+  double sign = 1;  // of the motors
+
+  explicit WatchedLink(const Twin& twin)
+      : TwinLink(twin, {}, 1), zero_{twin.sensors.zero1, twin.sensors.zero2} {}
+
+  std::optional<LinkReading> Exchange(const Joints& torque, bool enabled, double until) override {
+    const auto reading = TwinLink::Exchange({sign * torque[0], sign * torque[1]}, enabled, until);
+    enabled_ = enabled;
+    for (int j = 0; j < 2; ++j) {
+      const double angle = reading->angle[j] - zero_[j];
+      if (last_ > 0) {
+        const double velocity = (angle - angle_[j]) / (reading->time - last_);
+        fastest = std::max(fastest, std::abs(velocity));
+      }
+      largest = std::max(largest, std::abs(angle));
+      angle_[j] = angle;
+      strongest[j] = std::max(strongest[j], std::abs(torque[j]));
+    }
+    last_ = reading->time;
+    const bool inverted = Inverted({angle_[0], angle_[1], 0, 0});
+    if (!inverted) upright_since_ = last_;
+    longest_upright = std::max(longest_upright, last_ - upright_since_);
+    return reading;
+  }
+  bool enabled() const { return enabled_; }
+
+  double largest = 0, fastest = 0;  // of both joints, rad and rad/s
+  Joints strongest{};               // torques, N·m
+  double longest_upright = 0;       // s
+
+ private:
+  Joints zero_, angle_{};
+  double last_ = 0, upright_since_ = 0;
+  bool enabled_ = false;
+};
+
+LearnResult LearnOn(
+    MachineLink& link, const LearnConfig& config, const std::filesystem::path& out,
+    const std::function<bool()>& stop = [] { return false; }) {
+  return Learn(
+      config, link, out, nullptr, [](const std::string&) {}, stop);
+}
+
+TEST(Learn, BalancesAMachineThatItDoesNotKnow) {
+  const TempFolder folder;
+  WatchedLink link(StrangeTwin());
+  const LearnConfig config = ConfigFor(2);
+  const LearnResult result = LearnOn(link, config, folder.path());
+  EXPECT_EQ(result.reason, "");
+  EXPECT_GE(link.longest_upright, 2);
+  EXPECT_FALSE(link.enabled());
+  EXPECT_LE(link.strongest[0], 5.0);
+  EXPECT_LE(link.strongest[1], 0.5);
+  EXPECT_LT(result.motion, config.motion);
+  // The file has the machine's equations of motion.
+  const Manipulator found = BodyOf(ReadTwin((folder.path() / "twin.toml").string(), "twin"));
+  const Manipulator truth = BodyOf(StrangeTwin());
+  EXPECT_NEAR(found.G1, truth.G1, 0.03 * truth.G1);
+  EXPECT_NEAR(found.G2, truth.G2, 0.03 * truth.G2);
+  EXPECT_NEAR(found.b, truth.b, 0.03 * truth.b);
+}
+
+TEST(Learn, ExcitationsStayWithinTheLimits) {
+  const TempFolder folder;
+  WatchedLink link(StrangeTwin());
+  LearnConfig config = ConfigFor(2);
+  config.limits.velocity = 6;
+  config.limits.angle = 3.5;
+  config.limits.torque = 3;
+  config.motion = 10;  // for both excitations, and no try
+  const LearnResult result = LearnOn(link, config, folder.path());
+  EXPECT_EQ(result.reason, "the time of motion is used up");
+  EXPECT_EQ(result.tries, 0);
+  EXPECT_LT(link.largest, 3.5);
+  // Beyond the limit the loop brakes, while torques on the way still act. A step of the encoder in
+  // one cycle is a velocity, too.
+  EXPECT_LT(link.fastest, 1.2 * 6 + 2 * 6.3 / 2000 / 0.002);
+  EXPECT_LE(link.strongest[0], 3);
+  EXPECT_GT(link.largest, 0.5);
+}
+
+TEST(Learn, AMachineThatDoesNotAnswerGetsNoMoreTorque) {
+  constexpr double kNever = MachineFaults::kNever;
+  const auto learn = [](const MachineFaults& faults) {
+    const TempFolder folder;
+    FakeConfig fault;
+    fault.machine = faults;
+    FakeLink link(StrangeTwin(), fault);
+    LearnConfig config = ConfigFor(2);
+    config.limits.velocity = 15;
+    double fastest = 0;
+    const LearnResult result = LearnOn(link, config, folder.path(), [&] {
+      const PendulumState& s = link.machine().state();
+      fastest = std::max({fastest, std::abs(s.w1), std::abs(s.w2)});
+      return false;
+    });
+    EXPECT_LT(fastest, config.limits.velocity) << result.reason;
+    EXPECT_EQ(result.reason.find("raise"), std::string::npos) << result.reason;
+    EXPECT_FALSE(link.enabled());
+    return result.reason;
+  };
+  for (const Joints& dead : {Joints{0, 0}, {0, kNever}, {kNever, 0}}) {
+    EXPECT_NE(learn({.stuck_after = dead}).find("does not answer"), std::string::npos);
+  }
+  for (const MachineFaults& wrong :
+       {MachineFaults{.encoder_scale = {-1, 1}}, {.motor_scale = {-1, 1}}, {.crossed = true}}) {
+    EXPECT_NE(learn(wrong).find("the sign"), std::string::npos);
+  }
+}
+
+TEST(Learn, EndsWithoutMotion) {
+  const TempFolder folder;
+  Twin stuck = StrangeTwin();
+  stuck.plant.coulomb1 = stuck.plant.coulomb2 = 7;
+  WatchedLink link(stuck);
+  const LearnResult result = LearnOn(link, ConfigFor(2), folder.path());
+  EXPECT_NE(result.reason.find("no motion"), std::string::npos) << result.reason;
+  EXPECT_EQ(result.tries, 0);
+}
+
+TEST(Learn, NoticesAWrongSignOfTheMotors) {
+  const TempFolder folder;
+  WatchedLink link(StrangeTwin());
+  link.sign = -1;
+  const LearnResult result = LearnOn(link, ConfigFor(2), folder.path());
+  EXPECT_NE(result.reason.find("sign"), std::string::npos) << result.reason;
+  EXPECT_EQ(result.tries, 0);
+}
+
+TEST(Learn, StopsWhenAsked) {
+  const TempFolder folder;
+  WatchedLink link(StrangeTwin());
+  const LearnResult result =
+      LearnOn(link, ConfigFor(2), folder.path(), [&] { return link.Now() > 2; });
+  EXPECT_EQ(result.reason, "stopped");
+  EXPECT_FALSE(link.enabled());
+  EXPECT_TRUE(std::filesystem::exists(folder.path() / "log-01.csv"));
+}
+
+TEST(Learn, RefusesLimitsThatForbidASwingUp) {
+  const auto error = [](LearnConfig config) {
+    try {
+      config.Check();
+    } catch (const Error& e) {
+      return std::string(e.what());
+    }
+    return std::string("accepted");
+  };
+  LearnConfig config = ConfigFor(2);
+  EXPECT_EQ(error(config), "accepted");
+  config.limits.angle = 3;
+  EXPECT_EQ(error(config), "--max-angle: expected 3.5 or more for a swing-up, got 3");
+  config = ConfigFor(2);
+  config.limits.energy = 1;
+  EXPECT_EQ(error(config), "--max-energy: expected 1.1 or more for a swing-up, got 1");
+  config = ConfigFor(2);
+  config.encoder_counts = 0;
+  EXPECT_EQ(error(config), "machine learn: expected --encoder-counts, got none");
+}
+
+TEST(FirstTwin, FindsTheEquationsOfMotion) {
+  const Twin truth = StrangeTwin();
+  Excitation excitation(
+      5, 1, [](const PendulumState& s) { return std::abs(s.q1) / 1.5; }, 1);
+  int64_t step = 0;
+  double torque = 0;
+  const MachineLog log =
+      RunLoop(truth, {.seconds = 6, .actuated_joint = 1}, [&](const CycleInput& in) -> Joints {
+        if (step++ % 10 == 0) {
+          torque = excitation(step, {in.angle[0], in.angle[1], in.velocity[0], in.velocity[1]});
+        }
+        return {torque, 0};
+      });
+  Twin known;
+  known.loop.period = 0.002;
+  const Manipulator found = BodyOf(FirstTwin({&log, 1}, known)), m = BodyOf(truth);
+  // The velocities are differences over 60 ms, so the values are some percent off.
+  for (const auto& [got, wanted] : {std::pair(found.G1, m.G1),
+                                    {found.G2, m.G2},
+                                    {found.b, m.b},
+                                    {found.J2, m.J2},
+                                    {found.J1, m.J1}}) {
+    EXPECT_NEAR(got, wanted, 0.2 * wanted);
+  }
+}
+
+}  // namespace
+}  // namespace upswing::machine

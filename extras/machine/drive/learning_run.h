@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cmath>
+#include <functional>
+#include <string>
+
+#include "extras/machine/drive/control_loop.h"
+#include "extras/machine/drive/learn.h"
+
+namespace upswing::machine {
+
+/// The larger absolute value.
+inline double LargerMagnitude(double a, double b) { return std::max(std::abs(a), std::abs(b)); }
+
+/// Longest time of a try without balance, s.
+inline constexpr double kLongestFall = 6;
+
+/// Limits and length of a run, and its purpose.
+struct RunRules {
+  Limits limits;
+  double seconds = 0;       // longest time in which the controller drives
+  bool is_try = false;      // whether balance or a hopeless state ends it; else an excitation
+  double compensation = 0;  // share of the dry friction that motors compensate
+  std::string log = {};     // file; empty: none
+};
+
+struct RunOutcome {
+  LoopSummary summary;
+  double motion = 0;    // time in which the loop probed, drove or braked, s
+  std::string reason;   // of the supervisor; empty: none
+  bool faulty = false;  // whether the reason is a fault, not a limit
+};
+
+/// Runs the control loop until it ends. A run in real time has its own thread, because fits with
+/// real-time priority would starve the computer. `sensors`: range and step of the encoders.
+RunOutcome RunCycles(const LearnConfig& c, const RunRules& rules, const MachineSensors& sensors,
+                     Estimator estimator, MachineController own, MachineLink& link,
+                     const std::function<bool()>& stop);
+
+}  // namespace upswing::machine

@@ -1,0 +1,81 @@
+#include "extras/machine/drive/policy_controller.h"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "base/error.h"
+#include "base/text.h"
+#include "pendulum/observation.h"
+
+namespace upswing::machine {
+namespace {
+
+/// Controller made by ControllerOf.
+class PolicyController {
+ public:
+  explicit PolicyController(MachinePolicy policy)
+      : policy_(std::move(policy)),
+        obs_(static_cast<size_t>(policy_->policy->obs_size())),
+        before_(obs_.size()),
+        memory_(policy_->policy->Start(1)),
+        builder_(1, policy_->memory(),
+                 policy_->identifies() ? std::optional(policy_->plant) : std::nullopt,
+                 policy_->seeks_any_pose()) {}
+
+  double Torque(int64_t step, const PendulumState& state) {
+    const Plant& plant = policy_->plant;
+    if (step == 0) {
+      builder_.Begin(0, plant, state, obs_);
+    } else {
+      obs_.swap(before_);
+      builder_.Next(0, plant, {state, torque_}, before_, torque_, obs_);
+    }
+    policy_->policy->Act({obs_.data(), 1, policy_->policy->obs_size()}, {&torque_, 1, 1}, *memory_);
+    torque_ = std::clamp(torque_, -plant.torque_limit, +plant.torque_limit);
+    return torque_;
+  }
+
+ private:
+  MachinePolicy policy_;
+  std::vector<float> obs_, before_;
+  double torque_ = 0;  // N·m
+  std::unique_ptr<Policy::Memory> memory_;
+  ObservationBuilder builder_;
+};
+
+}  // namespace
+
+const char* NameOf(Robot robot) { return robot == Robot::kPendubot ? "pendubot" : "acrobot"; }
+
+std::optional<Robot> ParseRobot(const std::string& name) {
+  for (const Robot robot : {Robot::kPendubot, Robot::kAcrobot}) {
+    if (name == NameOf(robot)) return robot;
+  }
+  if (name.empty()) return std::nullopt;
+  throw BadInput(Concat("--robot: expected pendubot or acrobot, got \"", Printable(name), "\""));
+}
+
+MachinePolicy GetMachinePolicy(PolicyArguments a, const std::string& robot,
+                               const std::optional<Twin>& twin) {
+  const std::optional<Robot> asked = ParseRobot(robot);
+  if (twin) {
+    a.plant = twin->plant;
+    if (asked) a.plant->actuated_joint = static_cast<int>(*asked);
+    a.plant->coulomb1 = a.plant->coulomb2 = 0;
+  }
+  auto policy = std::make_shared<const LoadedPolicy>(GetPolicy(a));
+  ExpectPendulum(*policy);
+  const Robot own = RobotOf(*policy);
+  if (own == asked.value_or(own)) return policy;
+  throw BadInput(Concat("--robot: expected ", NameOf(own), ", the robot of ",
+                        Printable(policy->name), " (motor at joint ", static_cast<int>(own),
+                        "), got ", NameOf(*asked)));
+}
+
+MachineController ControllerOf(MachinePolicy policy) {
+  return [controller = std::make_shared<PolicyController>(std::move(policy))](
+             int64_t step, const PendulumState& state) { return controller->Torque(step, state); };
+}
+
+}  // namespace upswing::machine

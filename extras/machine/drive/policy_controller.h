@@ -1,0 +1,39 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "agents/loaded_policy.h"
+#include "extras/machine/drive/control_loop.h"
+#include "extras/machine/twin/twin.h"
+#include "runs/find_policy.h"
+
+/// Policies of the double pendulum as controllers of a machine.
+namespace upswing::machine {
+
+/// The robot: the joint with the motor.
+enum class Robot { kPendubot = 1, kAcrobot = 2 };
+const char* NameOf(Robot robot);
+/// The robot with this name; nothing for "". Throws BadInput.
+std::optional<Robot> ParseRobot(const std::string& name);
+/// Index of the motor's joint.
+inline size_t MotorOf(Robot robot) { return static_cast<size_t>(robot) - 1; }
+
+/// A policy of the double pendulum, for the plant of its design.
+using MachinePolicy = std::shared_ptr<const LoadedPolicy>;
+inline Robot RobotOf(const LoadedPolicy& policy) {
+  return static_cast<Robot>(static_cast<int>(policy.plant.actuated_joint));
+}
+
+/// The policy that the arguments name, for this robot ("": the policy's own, a controller's that of
+/// the twin). With `twin`, a controller is designed for its plant without dry friction: the motors
+/// compensate most of it, and a linear model has none. Throws BadInput.
+MachinePolicy GetMachinePolicy(PolicyArguments a, const std::string& robot,
+                               const std::optional<Twin>& twin = {});
+
+/// A policy as the controller of one machine. It acts every 20 ms, on PendulumEnv's observations of
+/// the policy's design plant.
+MachineController ControllerOf(MachinePolicy policy);
+
+}  // namespace upswing::machine

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/progress.h"
+#include "base/thread_pool.h"
+#include "extras/machine/logs/windows.h"
+#include "extras/machine/twin/motion.h"
+
+/// Identification of a twin by multiple shooting (Bock, 1983): many windows of the logs, each with
+/// a free start state, and values that all windows share. Levenberg and Marquardt's method with a
+/// robust cost; the start states are eliminated window by window.
+namespace upswing::machine {
+
+/// The values to identify, by name. Other values stay at the first guess.
+struct Structure {
+  std::string name;
+  std::vector<std::string> values;
+  std::vector<std::string> of_session = {};  // values that differ between sessions
+};
+
+/// Settings of an identification.
+struct FitConfig {
+  WindowRules windows = {1, 0.5};  // seconds, hop
+  int iterations = 40;
+  double tolerance = 1e-5;  // least relative decrease of the cost in an iteration
+  // Adapts the first guess to a new session, that of all logs. Its covariance gives the prior.
+  // Values without a covariance have a wide one. The result's covariance is of this session.
+  bool adapts = false;
+};
+
+/// The result of an identification.
+struct FitResult {
+  Twin twin;  // with its sessions; the covariance includes the variance between them
+  int windows = 0;
+  double error = 0;  // median over the windows of the rms of both angles' error, rad
+};
+
+/// Identifies the values of a structure. `first` is the initial guess, and has all other values.
+/// Throws BadInput if no window of the logs keeps the rules, if a name is unknown, or if the
+/// predictions stay hopelessly wrong.
+FitResult Fit(std::span<const MachineLog> logs, const Twin& first, const Structure& structure,
+              const FitConfig& config, ThreadPool* pool, const Progress& progress = nullptr);
+
+}  // namespace upswing::machine

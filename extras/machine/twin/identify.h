@@ -1,0 +1,51 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "extras/machine/twin/fit.h"
+#include "extras/machine/twin/validate.h"
+
+/// Identification with a choice of the model's structure on runs that were left out.
+namespace upswing::machine {
+
+/// The structures to choose from. Each adds values to the structure before it. `has_motors`:
+/// whether the logs have torques. A motion without torques determines only ratios of masses; then
+/// the centre of link 2 stays at the first guess. `one_body`: all sessions have the same body.
+std::vector<Structure> Structures(bool has_motors, bool one_body);
+
+/// A structure's errors on runs that were left out.
+struct StructureError {
+  Structure structure;
+  double error;  // geometric mean over sessions of the median error at 1 s, rad
+};
+
+/// Settings of an identification with cross-validation.
+struct IdentifyConfig {
+  FitConfig fit;
+  // Number of folds. Each run is predicted by the twin of the other folds. 0 or 1: no
+  // cross-validation; the last structure is chosen.
+  int folds = 5;
+  bool one_body = false;  // all sessions share centres, inertias and armature
+};
+
+/// The result of an identification with cross-validation.
+struct Identification {
+  FitResult fit;                           // from all logs, with the chosen structure
+  std::vector<StructureError> structures;  // empty without cross-validation
+  int chosen = 0;                          // index of the structure
+  // The twin of the other folds for each log; empty without cross-validation.
+  std::vector<Twin> left_out;
+};
+
+/// Identifies a twin from logs. Throws BadInput if they have no usable motion, or if there are too
+/// few for a cross-validation.
+Identification Identify(std::span<const MachineLog> logs, const Twin& first,
+                        const IdentifyConfig& config, ThreadPool* pool,
+                        const Progress& progress = nullptr);
+
+/// Sets the twin's loop timing, and the steps of its angles and reported torques, to those of the
+/// logs.
+void MeasureLoop(std::span<const MachineLog> logs, Twin& twin);
+
+}  // namespace upswing::machine

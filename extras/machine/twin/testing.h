@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+
+#include "extras/machine/twin/twin.h"
+
+/// Helpers for tests of machines.
+namespace upswing::machine {
+
+/// The folder of the measured data: UPSWING_REAL, or `../shared/real` next to the project's root.
+/// Empty if there is none; a test then skips.
+inline std::filesystem::path RealData() {
+  const char* given = std::getenv("UPSWING_REAL");
+  const std::filesystem::path root = std::filesystem::path(__FILE__).parent_path() / "../../..";
+  const std::filesystem::path folder = given != nullptr ? given : root / "../shared/real";
+  return std::filesystem::is_directory(folder) ? folder : std::filesystem::path();
+}
+
+/// A machine like RealAIGym's, with a delay and a lag of its motors and no jitter.
+inline Twin TestTwin() {
+  Twin twin;
+  twin.plant.mass1 = 0.5;
+  twin.plant.mass2 = 0.6;
+  twin.plant.length1 = 0.2;
+  twin.plant.length2 = 0.3;
+  twin.plant.damping1 = twin.plant.damping2 = 0.005;
+  twin.plant.coulomb1 = twin.plant.coulomb2 = 0.05;
+  twin.actuator.delay = 0.003;
+  twin.actuator.lag = 0.004;
+  twin.actuator.passive_limit = 0.5;
+  twin.sensors.quantum = 25.0 / 65535;
+  twin.sensors.angle_range = 12.5;
+  twin.sensors.zero1 = 0.02;
+  twin.sensors.zero2 = -0.01;
+  return twin;
+}
+
+}  // namespace upswing::machine
