@@ -193,7 +193,7 @@ std::string ExplainFlag(const CLI::App& app, const std::string& word) {
       return Concat("; ", FullName(*sibling), " has it");
     }
   }
-  return app.get_option_no_throw("--set") != nullptr ? "; --set NAME=VALUE changes the plant" : "";
+  return "";
 }
 
 /// Whether `app` is the program or a command with commands of its own.

@@ -9,6 +9,24 @@
 #include "runs/plant_file.h"
 
 namespace upswing {
+namespace {
+
+/// The settings of a plant whose defaults are those of another one.
+Options PlantFlags(Plant& plant) {
+  const Options settings = OptionsOf(plant);
+  Options flags;
+  flags.Section("plant");
+  for (const Option& option : settings.all()) {
+    Option& flag = flags.Add(std::get<double*>(option.target), option.name, option.range,
+                             option.unit, option.help);
+    flag.step = option.step;
+    flag.usual = "that of the plant";
+  }
+  for (const auto& alias : settings.aliases()) flags.Alias(alias.name, alias.members, alias.help);
+  return flags;
+}
+
+}  // namespace
 
 void AddPolicy(CommandLine& line, PolicyArguments& a) {
   line.Text(
@@ -84,10 +102,16 @@ void AddTrialOptions(CommandLine& line, TrialArguments& a, const std::string& se
   Options own;
   DescribeGoal(own, &a.goal);
   line.Arguments(own);
+  Plant plant;
+  line.Settings(PlantFlags(plant), a.plant_flags);
   const TrialConditions defaults;
   line.Settings(OptionsOf(defaults), a.flags);
   // Mistakes on the command line are reported before any file is read.
-  line.Check([&a] { (void)ConditionsOf(a.flags); });
+  line.Check([&a] {
+    Plant scratch;
+    SetFlags(OptionsOf(scratch), a.plant_flags);
+    (void)ConditionsOf(a.flags);
+  });
 }
 
 void AddEpisodeOptions(CommandLine& line, TrialArguments& a) {

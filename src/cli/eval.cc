@@ -99,7 +99,7 @@ void AddEval(CommandLine& line) {
       "  ./upswing eval runs/d3qn-seed1\n"
       "  ./upswing eval d3qn sac mpc runs/d3qn-seed1 --episodes 200\n"
       "  ./upswing eval policy.safetensors --episodes 1000 --seed 7 --json\n"
-      "  ./upswing eval runs/d3qn-seed1 --set mass2=1.05 --set gravity=9.7\n"
+      "  ./upswing eval runs/d3qn-seed1 --mass2 1.05 --gravity 9.7\n"
       "  ./upswing eval runs/d3qn-seed1 --plant realaigym\n"
       "  ./upswing eval runs/d3qn-seed1 --sensor-noise 0.02 --delay 0.02\n"
       "  ./upswing eval runs/d3qn-seed1 --randomize 0.25 --episodes 1000\n"
@@ -113,11 +113,10 @@ void AddEval(CommandLine& line) {
       "  pfl     pumps energy by partial feedback linearisation until lqr catches\n"
       "  energy  pumps energy by energy shaping until lqr catches\n"
       "  hybrid  lets lqr catch what --swing-up POLICY swings up\n\n"
-      "--set takes mass1, mass2, length1, length2, damping1, damping2, gravity, torque_limit,\n"
-      "actuated_joint, rotor_inertia, gear_ratio, coulomb1, coulomb2, center1, center2, inertia1,\n"
-      "inertia2 and armature, the names in a plant file. With --randomize each episode draws its\n"
-      "plant from a box around the nominal one. Observed energy and height are scaled by the\n"
-      "episode's plant, which tells the policy of it; with --unknown-plant by the training's.\n",
+      "The plant's flags, such as --mass2 1.3, change it; --set mass2=1.3 does the same.\n"
+      "With --randomize each episode draws its plant from a box around the nominal one. Observed\n"
+      "energy and height are scaled by the episode's plant, which tells the policy of it; with\n"
+      "--unknown-plant by the training's.\n",
       kEvaluationSeconds, kHoldSeconds, kReturnSeconds));
 }
 

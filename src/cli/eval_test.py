@@ -133,6 +133,16 @@ class EvalTest(ProgramTest):
         self.refuse(["eval", self.policy, "--known-plant"], "--known-plant", "controller")
         self.refuse(["eval", "lqr", "--known-plant", "--unknown-plant"], "--unknown-plant")
 
+    def test_flags_change_the_plant_as_set_does(self):
+        def figures(*changes):
+            return json.loads(self.succeed("eval", "lqr", "--episodes", 2, "--json", *changes))
+        by_flags = figures("--mass", 1.2, "--mass2", 1.3, "--gravity", 5)
+        by_set = figures("--set", "mass=1.2", "--set", "mass2=1.3", "--set", "gravity=5")
+        self.assertEqual(by_flags, by_set)
+        self.assertEqual(figures("--mass2", 1.1, "--set", "mass2=1.3"), figures("--mass2", 1.3))
+        self.refuse(["eval", "lqr", "--mass2", "-1"], "--mass2", "expected a number")
+        self.refuse(["eval", "lqr", "--mas2", "1"], "--mas2", "did you mean --mass2?")
+
     def test_numbers_are_plausible(self):
         result = self.evaluate()
         self.assertEqual(result["success_rate"], result["successes"] / 10)

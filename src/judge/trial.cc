@@ -81,6 +81,7 @@ PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy*
                           loaded != nullptr ? Printable(loaded->name) : "none"));
   }
   if (draws_goals && is_learned && a.goal.empty()) env.goal.reset();
+  SetFlags(OptionsOf(plant), a.plant_flags);
   ApplyChanges(OptionsOf(plant), a.set);
   env.plants = {plant};
   env.seed = static_cast<uint64_t>(a.seed);

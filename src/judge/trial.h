@@ -19,7 +19,8 @@ struct TrialArguments {
   std::string physics = "mujoco";
   std::string plant;  // name of a plant file or a shipped plant; empty: the policy's
   std::vector<std::string> set;
-  std::vector<FlagValue> flags;  // settings of Disturbance and Randomization
+  std::vector<FlagValue> plant_flags;  // settings of Plant, which `set` changes further
+  std::vector<FlagValue> flags;        // settings of Disturbance and Randomization
   int64_t seed = 0;
   bool unknown_plant = false;
   bool known_plant = false;  // design a controller for each episode's plant; only in eval

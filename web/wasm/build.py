@@ -199,8 +199,9 @@ def jobs():
            "-DTOML_FLOAT_CHARCONV=1", f'-DUPSWING_VERSION="{project_version()}"',
            "-U_LIBCPP_HAS_FILESYSTEM", "-D_LIBCPP_HAS_FILESYSTEM=1", *include(SOURCE, ROOT),
            *(f"-isystem{folder}" for folder in (headers, HIGHWAY, MUPARSER / "include"))]
+    fast = {SOURCE / f"{name}.cc" for name in FAST}
     for source in [*own_sources(), agents]:
-        yield source, [*own, "-O3" if f"{source.parent.name}/{source.stem}" in FAST else "-Oz"]
+        yield source, [*own, "-O3" if source in fast else "-Oz"]
     for name in PARSER:
         yield (MUPARSER / f"src/muParser{name}.cpp",
                ["-std=c++20", "-Oz", "-w", "-ffp-contract=off", f"-I{MUPARSER / 'include'}",

@@ -271,8 +271,8 @@ class LearningSession {
       PendulumState s{std::numbers::pi + lean, 0, 0, 0};
       for (int i = 0; i < kSeconds / kStep; ++i) {
         s = RungeKuttaStep(s, falling(s, 0), kStep, falling);
-        angle = std::max(angle, Larger(s.q1, s.q2));
-        velocity = std::max(velocity, Larger(s.w1, s.w2));
+        angle = std::max(angle, LargerMagnitude(s.q1, s.q2));
+        velocity = std::max(velocity, LargerMagnitude(s.w1, s.w2));
       }
     }
     const auto warn = [&](const char* flag, double limit, double reached, const char* unit) {

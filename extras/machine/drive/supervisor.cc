@@ -19,12 +19,12 @@ constexpr double kLargestReading = 1e6;
 constexpr double kLargestStart = 100;  // rad, rad/s
 
 // Limits of plausible readings.
-constexpr double kHardest = 1000;      // acceleration that no joint exceeds, rad/s²
-constexpr double kOldest = 0.001;      // age of an angle when its command comes, s
-constexpr double kShortest = 1e-4;     // time between two measurements, s
-constexpr double kLeastError = 0.002;  // of the change between two angles, rad
-constexpr int kErrorSteps = 4;         // of the encoder, in this change
-constexpr double kLargestError = 0.2;  // of the estimate at a slow joint, rad
+constexpr double kHardest = 1000;              // acceleration that no joint exceeds, rad/s²
+constexpr double kOldest = 0.001;              // age of an angle when its command comes, s
+constexpr double kShortest = 1e-4;             // time between two measurements, s
+constexpr double kLeastError = 0.002;          // of the change between two angles, rad
+constexpr int kErrorSteps = 4;                 // of the encoder, in this change
+constexpr double kLargestEstimateError = 0.2;  // of the estimate at a slow joint, rad
 
 // Angle after lost readings, less its prediction: most, and most for each second and each step of
 // the encoder. With readings of real machines left out for 20 ms it is at most 0.025 rad.
@@ -201,7 +201,8 @@ Complaint Supervisor::CheckEstimate(const CycleFacts& facts) const {
   const Joints q{q1, q2}, w{w1, w2};
   for (size_t j = 0; j < 2; ++j) {
     const double error = facts.angle[j] - facts.zero[j] - q[j];
-    if (Within(error, kLargestError + std::abs(w[j]) * (facts.age + config_.period))) continue;
+    if (Within(error, kLargestEstimateError + std::abs(w[j]) * (facts.age + config_.period)))
+      continue;
     return {"joint %.0f: the estimate is %.4g rad from the reading",
             {static_cast<double>(j + 1), error}};
   }
