@@ -14,7 +14,8 @@ function(upswing_install_layers FOLDER DESTINATION)
   foreach(LAYER IN LISTS ARGN)
     install(TARGETS upswing_${LAYER} EXPORT upswing)
     # Without headers for tests, and without parts of kernels.
-    install(DIRECTORY ${FOLDER}/${LAYER} DESTINATION ${DESTINATION} FILES_MATCHING PATTERN "*.h"
+    install(DIRECTORY ${FOLDER}/${LAYER} DESTINATION ${DESTINATION}
+            FILES_MATCHING PATTERN "*.h" PATTERN "*.inc"
             PATTERN "*testing.h" EXCLUDE PATTERN "*-inl.h" EXCLUDE PATTERN "testdata" EXCLUDE)
   endforeach()
 endfunction()

@@ -67,7 +67,7 @@ MAY_ASK_SYSTEM = re.compile(r"_test\.cc$|/testing\.h$")
 SYSTEM = re.compile(r"(unistd|fcntl|poll|sched|signal|csignal|filesystem|fstream|cstdio|stdio)(\.h)?$|"
                     r"sys/")
 
-SOURCE_ENDINGS = (".h", ".cc", ".cc.in")
+SOURCE_ENDINGS = (".h", ".inc", ".cc", ".cc.in")
 INCLUDE = re.compile(r'\s*#\s*include\s*(["<])([^">]+)[">]')
 
 

@@ -33,14 +33,14 @@ HWY_INLINE hn::Mask<D> DrivesJoint1(const ClosedFormBatch& batch, size_t i) {
   return hn::Lt(LoadFrom(batch.joint, i), Constant(1.5));
 }
 
-// The operations of dynamics-inl.h that Highway lacks.
+// The operations of dynamics.inc that Highway lacks.
 template <typename T>
 HWY_INLINE V Number(double x) {
   return Constant(x);
 }
 HWY_INLINE V Atan(V x) { return hn::Atan(kDoubles, x); }
 
-#include "pendulum/dynamics-inl.h"
+#include "pendulum/dynamics.inc"
 
 using JointVectors = JointPair<V>;
 

@@ -30,7 +30,7 @@ T Atan(const T& x) {
 }
 inline double Atan(double x) { return std::atan(x); }
 
-#include "pendulum/dynamics-inl.h"
+#include "pendulum/dynamics.inc"
 
 template <typename T>
 JointAngles<T> AnglesOf(const JointPair<T>& q) {

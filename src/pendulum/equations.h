@@ -6,7 +6,7 @@
 
 /// The equations of motion of every plant (Murray, Li and Sastry, "A Mathematical Introduction to
 /// Robotic Manipulation", 1994, Section 4.2). MuJoCo or closed_form.cc solves them in a training.
-/// dynamics-inl.h has them as code.
+/// dynamics.inc has them as code.
 ///   M(q) q̈ + c(q, q̇) + g(q) + d q̇ + f atan(100 q̇) = τ
 ///   M = [[J1 + J2 + 2 b cos q2, J2 + b cos q2], [·, J2 + a]]
 /// Symbols: q = (q1, q2) joint angles (rad; 0 hanging, q2 relative to link 1), q̇ = (w1, w2)

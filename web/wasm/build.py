@@ -185,7 +185,7 @@ def jobs():
     """Each source with its flags."""
     headers = WORK / "include"
     headers.mkdir(parents=True, exist_ok=True)
-    for name in ("nlohmann", "toml++", "eigen3/Eigen"):
+    for name in ("nlohmann", "toml++", "eigen3/Eigen", "eigen3/unsupported"):
         link = headers / Path(name).name
         if not link.is_symlink():
             link.symlink_to(Path("/usr/include") / name)

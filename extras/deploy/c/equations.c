@@ -1,4 +1,4 @@
-/* The equations of motion about upright (pendulum/dynamics-inl.h): M(q) q'' = torques - h. */
+/* The equations of motion about upright (pendulum/dynamics.inc): M(q) q'' = torques - h. */
 #include "regulator.c"
 
 typedef struct {

@@ -40,11 +40,16 @@ void DqnConfig::Check(int64_t /*num_envs*/) const { OffPolicyConfig::Check(); }
 AgentSize DqnConfig::Size(const EnvSpec& spec) const {
   const int D = spec.obs_size;
   const Network network(Shape(D, static_cast<int>(levels)));
-  return {static_cast<double>(network.num_parameters()),
-          // Arrays: online, target and kept parameters, gradient, Adam's two moments, and
-          // transposed online and target weights.
-          8, 5, 2.0 * D + 3, static_cast<double>(replay), static_cast<double>(batch),
-          static_cast<double>(std::ranges::max(hidden)), 3 * static_cast<double>(hidden.size())};
+  return {.parameters = static_cast<double>(network.num_parameters()),
+          // Online, target and kept parameters, gradient, Adam's two moments, and transposed online
+          // and target weights.
+          .arrays = 8,
+          .saved_arrays = 5,
+          .transition = 2.0 * D + 3,  // s, s', a, r, discount
+          .capacity = static_cast<double>(replay),
+          .batch = static_cast<double>(batch),
+          .widest = static_cast<double>(std::ranges::max(hidden)),
+          .layers = 3 * static_cast<double>(hidden.size())};
 }
 
 std::string DqnConfig::Text() const {

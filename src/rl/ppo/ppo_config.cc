@@ -100,14 +100,18 @@ AgentSize PpoConfig::Size(const EnvSpec& spec) const {
   const int D = spec.obs_size, A = spec.action_size();
   const Network actor(Shape(D, discrete() ? static_cast<int>(levels) : A));
   const Network critic(Shape(D, 1));
-  return {static_cast<double>(actor.num_parameters() + critic.num_parameters()),
-          // Arrays: parameters, gradient, Adam's two moments, and transposed weights.
-          5, 3,
-          // A step: observation and successor, action, ln π, reward, V, V', advantage, target,
-          // order, ends.
-          2.0 * D + A + 9, static_cast<double>(horizon * spec.num_envs), static_cast<double>(batch),
-          static_cast<double>(std::ranges::max(hidden)), 2 * 3 * static_cast<double>(hidden.size()),
-          "rollout", "--horizon"};
+  return {.parameters = static_cast<double>(actor.num_parameters() + critic.num_parameters()),
+          // Parameters, gradient, Adam's two moments, and transposed weights.
+          .arrays = 5,
+          .saved_arrays = 3,
+          // Observation and successor, action, ln π, reward, V, V', advantage, target, order, ends.
+          .transition = 2.0 * D + A + 9,
+          .capacity = static_cast<double>(horizon * spec.num_envs),
+          .batch = static_cast<double>(batch),
+          .widest = static_cast<double>(std::ranges::max(hidden)),
+          .layers = 2 * 3 * static_cast<double>(hidden.size()),
+          .store = "rollout",
+          .store_flag = "--horizon"};
 }
 
 std::string PpoConfig::Text() const {

@@ -48,13 +48,17 @@ AgentSize SacConfig::Size(const EnvSpec& spec) const {
   const double critics = twin ? 2 : 1;
   const Network actor(Shape(D, 2 * A));
   const Network critic(Shape(D + A, 1));
-  return {static_cast<double>(actor.num_parameters()) +
-              critics * static_cast<double>(critic.num_parameters()),
-          // Arrays: online, target or kept parameters, gradient, Adam's two moments, and transposed
-          // weights.
-          6, 4, 2.0 * D + A + 2, static_cast<double>(replay), static_cast<double>(batch),
-          static_cast<double>(std::ranges::max(hidden)),
-          (1 + critics) * 3 * static_cast<double>(hidden.size())};
+  return {
+      .parameters = static_cast<double>(actor.num_parameters()) +
+                    critics * static_cast<double>(critic.num_parameters()),
+      // Online, target or kept parameters, gradient, Adam's two moments, and transposed weights.
+      .arrays = 6,
+      .saved_arrays = 4,
+      .transition = 2.0 * D + A + 2,  // s, s', a, r, discount
+      .capacity = static_cast<double>(replay),
+      .batch = static_cast<double>(batch),
+      .widest = static_cast<double>(std::ranges::max(hidden)),
+      .layers = (1 + critics) * 3 * static_cast<double>(hidden.size())};
 }
 
 std::string SacConfig::Text() const {
