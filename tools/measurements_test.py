@@ -2,6 +2,7 @@
 """Tests that the tools whose numbers the documentation quotes still run (tools/results, tools/peers): each
 for a second, and without the other libraries."""
 
+import importlib.util
 import os
 import re
 import subprocess
@@ -48,6 +49,12 @@ class Results(unittest.TestCase):
     @unittest.skipUnless(BENCHMARKS.exists(), "needs Google Benchmark")
     def test_benchmarks_have_the_names_of_the_table(self):
         self.assertIn("`mpc`", self.succeed("tools/results/results.py", "measure", "perf-parts", "--try"))
+
+    @unittest.skipUnless(importlib.util.find_spec("casadi"), "needs CasADi")
+    def test_the_best_known_return_is_above_its_guess(self):
+        text = self.succeed("tools/results/swing_up_bound.py", "--episodes", 1, "--guesses", "sac")
+        best, guess = map(float, re.search(r"episode 0: (\S+) from sac, best guess (\S+);", text).groups())
+        self.assertGreater(best, guess)
 
     def test_upright_modes(self):
         self.assertIn("|delta|", self.succeed("tools/results/upright_modes.py", "fast", "--episodes", 4,

@@ -465,10 +465,11 @@ def lqr_catch():
 
 @figure("pareto")
 def pareto():
-    """Return against torque change, for all agents and controllers with at least 90% of mpc's return."""
+    """Return against torque change, for all agents and controllers with at least 90% of the best known
+    return."""
     columns, rows = table("overview")
     share, variation = (next(k for k, column in enumerate(columns) if column.startswith(name))
-                        for name in ("return / mpc", "torque variation"))
+                        for name in ("return / best known", "torque variation"))
     points = [(row[0], number(row[variation]), number(row[share])) for row in rows if number(row[share]) >= 90]
     fig = canvas(800, 500)
     axes = panel(fig, 80, 40, 700, 390)
@@ -481,7 +482,7 @@ def pareto():
     axes.set_xticks(decades, [f"{tick:g}" for tick in decades])
     axes.minorticks_off()
     axes.set_xlabel("torque change [N·m/s] (less is smoother)")
-    axes.set_ylabel("return / mpc [%]")
+    axes.set_ylabel("return / best known [%]")
 
     best, front = -math.inf, []
     for _, x, y in sorted(points, key=lambda point: (point[1], -point[2])):
