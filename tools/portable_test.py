@@ -25,7 +25,7 @@ ALLOWED = {
     "the C++ library: containers, text in memory, exceptions, threads, the steady clock":
         r"std::.*",
     "memory and text in memory":
-        r"mem(chr|cmp|cpy|move|set)|str(cmp|len)|snprintf|strto(d|ll|ull)|localeconv|[cm]alloc|realloc|"
+        r"mem(chr|cmp|cpy|move|set)|str(cmp|len)|snprintf|strto(d|ll|ull)|__isoc23_strto(ll|ull)|localeconv|[cm]alloc|realloc|"
         r"free",
     "numbers":
         r"(a?(sin|cos|tan)h?|sincos|atan2|exp(2|m1)?|log(2|10|1p)?|pow|sqrt|cbrt|hypot|erfc?|fmod|"
