@@ -98,8 +98,8 @@ class CommandLine {
 
 /// A row of the table of all commands.
 struct CommandEntry {
-  std::string_view name, help;  // help: one line
-  std::string_view program;     // that has the command; empty: only the launcher has it
+  std::string_view name, help;    // help: one line
+  std::string_view program = {};  // that has the command; empty: only the launcher has it
 };
 
 /// All commands, in the order of --help: the rows of commands.tsv, which the launcher reads, too.

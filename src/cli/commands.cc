@@ -92,6 +92,15 @@ void AddUnknownPlant(CommandLine& line, bool& unknown_plant) {
             "scale observed energy and height by the training's plant, not the episode's");
 }
 
+void AddPlantFlags(CommandLine& line, std::vector<FlagValue>& flags) {
+  Plant plant;
+  line.Settings(PlantFlags(plant), flags);
+  line.Check([&flags] {
+    Plant scratch;
+    SetFlags(OptionsOf(scratch), flags);
+  });
+}
+
 void AddTrialOptions(CommandLine& line, TrialArguments& a, const std::string& seed_of) {
   AddSeed(line, a.seed, seed_of);
   AddPlant(line, a.plant);
@@ -102,16 +111,11 @@ void AddTrialOptions(CommandLine& line, TrialArguments& a, const std::string& se
   Options own;
   DescribeGoal(own, &a.goal);
   line.Arguments(own);
-  Plant plant;
-  line.Settings(PlantFlags(plant), a.plant_flags);
+  AddPlantFlags(line, a.plant_flags);
   const TrialConditions defaults;
   line.Settings(OptionsOf(defaults), a.flags);
   // Mistakes on the command line are reported before any file is read.
-  line.Check([&a] {
-    Plant scratch;
-    SetFlags(OptionsOf(scratch), a.plant_flags);
-    (void)ConditionsOf(a.flags);
-  });
+  line.Check([&a] { (void)ConditionsOf(a.flags); });
 }
 
 void AddEpisodeOptions(CommandLine& line, TrialArguments& a) {

@@ -51,6 +51,9 @@ void AddSet(CommandLine& line, std::vector<std::string>& set,
                 "change of the plant, such as mass2=1.2; mass, length and "
                 "damping change both links");
 
+/// Adds a flag for each setting of a plant. Their values are appended to `flags`.
+void AddPlantFlags(CommandLine& line, std::vector<FlagValue>& flags);
+
 /// Adds --plant, the argument of ReadPlantFile.
 void AddPlant(CommandLine& line, std::string& plant);
 

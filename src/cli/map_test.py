@@ -74,6 +74,16 @@ class MapTest(ProgramTest):
                 self.assertAlmostEqual(rate, judged["success_rate"],
                                        delta=5 * math.sqrt(p * (1 - p) / 50) + 1e-9)
 
+    def test_flags_change_the_plant_as_set_does(self):
+        def cells(out, *changes):
+            self.succeed("map", "lqr", "--x", "mass2=-10%:+10%:2", "--y", "q1=175:180:2", "--episodes", 1,
+                         "--out", out, *changes)
+            return (self.folder / out / "map.csv").read_text(encoding="utf-8")
+        by_flags = cells("a", "--mass1", 1.2, "--gravity", 2)
+        self.assertEqual(by_flags, cells("b", "--set", "mass1=1.2", "--set", "gravity=2"))
+        self.assertNotEqual(by_flags, cells("c"))
+        self.refuse(["map", "lqr", "--mas1", 1], "--mas1", "did you mean --mass1?")
+
     def test_threads_engine_and_neighbours_change_nothing(self):
         grid = ("--x", "gravity=0.05:3:3", "--y", "sensor_noise=0:0.05:2", "--episodes", 12)
         one = self.map(*grid, "--threads", 1, out="one")
