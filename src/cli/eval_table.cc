@@ -75,7 +75,7 @@ void PrintTorques(const Evaluation& e, const char* reached) {
 /// A mean difference with its interval, such as `+45.2 (+42.1 to +48.0)`.
 std::string DifferenceText(const PairedFigure& figure, double scale, int decimals) {
   const Estimate& e = figure.difference;
-  if (figure.episodes == 0) return "none in both";
+  if (figure.episodes == 0) return "none";
   if (!e.interval) return fmt::format("{:+.{}f}", scale * e.value, decimals);
   return fmt::format("{:+.{}f} ({:+.{}f} to {:+.{}f})", scale * e.value, decimals,
                      scale * e.interval->low, decimals, scale * e.interval->high, decimals);

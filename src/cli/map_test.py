@@ -76,11 +76,11 @@ class MapTest(ProgramTest):
 
     def test_flags_change_the_plant_as_set_does(self):
         def cells(out, *changes):
-            self.succeed("map", "lqr", "--x", "mass2=-10%:+10%:2", "--y", "q1=175:180:2", "--episodes", 1,
+            self.succeed("map", "lqr", "--x", "mass2=-10%:+10%:2", "--y", "q1=178:179:2", "--episodes", 1,
                          "--out", out, *changes)
             return (self.folder / out / "map.csv").read_text(encoding="utf-8")
-        by_flags = cells("a", "--mass1", 1.2, "--gravity", 2)
-        self.assertEqual(by_flags, cells("b", "--set", "mass1=1.2", "--set", "gravity=2"))
+        by_flags = cells("a", "--mass1", 1.2, "--torque-limit", 0.05)
+        self.assertEqual(by_flags, cells("b", "--set", "mass1=1.2", "--set", "torque_limit=0.05"))
         self.assertNotEqual(by_flags, cells("c"))
         self.refuse(["map", "lqr", "--mas1", 1], "--mas1", "did you mean --mass1?")
 

@@ -22,8 +22,11 @@ import subprocess
 import time
 from pathlib import Path
 
-import casadi as ca
-import numpy as np
+try:
+    import casadi as ca
+    import numpy as np
+except ModuleNotFoundError:
+    ca = None  # --help works without
 
 ROOT = Path(__file__).resolve().parents[2]
 UPSWING = os.environ.get("UPSWING", str(ROOT / "build/release/bin/upswing"))
@@ -218,10 +221,16 @@ def main():
                         help="policies whose motions are the initial guesses")
     parser.add_argument("--json", metavar="FILE", help="file for the returns of each episode")
     a = parser.parse_args()
+    if ca is None:
+        parser.error("expected the package casadi, found none: pip install casadi")
+    if a.episodes < 1:
+        parser.error(f"--episodes: expected 1 or more, got {a.episodes}")
     problem, begin, rows = Problem(), time.process_time(), []
     for episode in range(a.first, a.first + a.episodes):
         known, found = best_of_episode(problem, episode, a.guesses)
         rows.append({"episode": episode, "known": known, "found": found})
+        if not found:
+            parser.error(f"episode {episode}: expected a guess that is upright after 5 s, got none")
         best = max(found, key=found.get)
         print(f"episode {episode}: {found[best]:.1f} from {best}, "
               f"best guess {max(known.values()):.1f}; all: "

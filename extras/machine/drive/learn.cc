@@ -261,7 +261,7 @@ class LearningSession {
 
   /// Says which limits a fall from upright exceeds. A motor cannot hold links that fall.
   void WarnOfFalls() {
-    constexpr double kLean = 0.1, kStep = 1e-3, kSeconds = 3;  // rad, s
+    constexpr double kLean = 0.1, kStep = kMotionStep, kSeconds = 3;  // rad, s, s
     const Manipulator body = BodyOf(twin_);
     const auto falling = [&](const PendulumState& s, double /*share*/) {
       return body.Acceleration(s, {});
