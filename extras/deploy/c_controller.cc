@@ -8,7 +8,7 @@
 #include "control/tvlqr.h"
 #include "extras/deploy/c_header.h"
 #include "extras/deploy/c_text.h"
-#include "pendulum/closed_form.h"
+#include "pendulum/equations.h"
 
 namespace upswing::deploy {
 namespace {
@@ -119,12 +119,9 @@ void AddCatch(const LoadedPolicy& loaded, const LqrCatch& upright, CParts& parts
                           ": expected a plant without dry friction (coulomb1 and coulomb2 ",
                           "0), which the C code does not model"));
   }
-  ClosedFormBatch batch(1);
-  batch.SetPlant(0, plant);
-  parts.constants.push_back(
-      {"plant", "of the equations of motion",
-       Floats(std::array{batch.J1[0], batch.J2[0], batch.b[0], batch.G1[0], batch.G2[0],
-                         batch.d1[0], batch.d2[0], batch.a[0]})});
+  const Manipulator m = ManipulatorOf(plant);
+  parts.constants.push_back({"plant", "of the equations of motion",
+                             Floats(std::array{m.J1, m.J2, m.b, m.G1, m.G2, m.d1, m.d2, m.a})});
   parts.constants.push_back(
       {"upright_cost", "of a deviation from upright", Floats(Triangle(upright.lqr().P))});
   parts.constants.push_back({"region", "of attraction", Floats(std::array{upright.region()})});

@@ -105,15 +105,6 @@ void AddMap(CommandLine& line) {
   AddPlant(line, a.trial.plant);
   AddSet(line, a.trial.set, "value of a quantity on neither axis, such as q1=178");
   AddPlantFlags(line, a.trial.plant_flags);
-  // A map changes the plant of its cells only by --set. Axes are relative to the policy's plant.
-  line.Check([&a] {
-    std::vector<std::string> changes;
-    for (const FlagValue& flag : a.trial.plant_flags) {
-      changes.push_back(Concat(flag.name, "=", flag.text));
-    }
-    a.trial.set.insert(a.trial.set.begin(), changes.begin(), changes.end());
-    a.trial.plant_flags.clear();
-  });
   AddPhysics(line, a.trial.physics);
   AddUnknownPlant(line, a.trial.unknown_plant);
   line.Text("--out", a.out, "FOLDER",

@@ -83,6 +83,7 @@ class MapTest(ProgramTest):
         self.assertEqual(by_flags, cells("b", "--set", "mass1=1.2", "--set", "torque_limit=0.05"))
         self.assertNotEqual(by_flags, cells("c"))
         self.refuse(["map", "lqr", "--mas1", 1], "--mas1", "did you mean --mass1?")
+        self.refuse(["map", "lqr", "--mass2", 1.2], "--mass2: expected a quantity that is on no axis")
 
     def test_threads_engine_and_neighbours_change_nothing(self):
         grid = ("--x", "gravity=0.05:3:3", "--y", "sensor_noise=0:0.05:2", "--episodes", 12)

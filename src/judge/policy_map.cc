@@ -82,7 +82,9 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
                    const DesignConditions& design) {
   MapConfig config;
   TrialArguments trial = a.trial;
-  trial.set.clear();  // `set` changes config.point, not the environments
+  // These change config.point, not the environments.
+  trial.plant_flags.clear();
+  trial.set.clear();
   config.env = TrialEnvironments(trial, &loaded);
   config.point.plant = config.env.plants.front();
   config.point.disturbance = config.env.disturbance(0);
@@ -94,14 +96,21 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
     const bool in_plant = options.Get(axis->settings.front())->section != "disturbance";
     if (!in_plant && !design.known) axis->at_training.reset();
   }
+  const auto expect_no_axis = [&](const Option& option, const std::string& where) {
+    for (const MapAxis* axis : {&config.x, &config.y}) {
+      if (!axis->Sets(option.name)) continue;
+      throw BadInput(Concat(where, ": expected a quantity that is on no axis; the axis ",
+                            axis->name, " sets it"));
+    }
+  };
+  SetFlags(options, a.trial.plant_flags);
+  for (const FlagValue& flag : a.trial.plant_flags) {
+    const std::string where = FlagOf(flag.name);
+    for (const Option* option : options.Find(flag.name, where)) expect_no_axis(*option, where);
+  }
   for (const Option* option : ApplyChanges(options, a.trial.set)) {
     config.start_given |= option->section == "start";
-    for (const MapAxis* axis : {&config.x, &config.y}) {
-      if (!axis->Sets(option->name)) continue;
-      throw BadInput(Concat("--set ", option->name,
-                            ": expected a quantity that is on no axis; the axis ", axis->name,
-                            " sets it"));
-    }
+    expect_no_axis(*option, Concat("--set ", option->name));
   }
   config.start_given |= config.x.start || config.y.start;
   // Without noise, all episodes from one start are the same.

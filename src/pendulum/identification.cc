@@ -62,11 +62,12 @@ struct MiddleEquations {
     c2 = angles.c2;
     const Factors factors = Regressor(
         angles, w, {(to.w1 - from.w1) / kControlPeriod, (to.w2 - from.w2) / kControlPeriod});
-    for (size_t k = 0; k < kIdentified.size(); ++k) {
-      const auto all = std::ranges::find(kManipulatorConstants, kIdentified[k]);
-      const auto column = static_cast<size_t>(all - kManipulatorConstants.begin());
-      one[k] = factors[0][column];
-      two[k] = factors[1][column];
+    constexpr std::array<size_t, kConstants> kColumns{column::kJ1, column::kJ2, column::kB,
+                                                      column::kG1, column::kG2, column::kD1,
+                                                      column::kD2};  // of kIdentified
+    for (size_t k = 0; k < kColumns.size(); ++k) {
+      one[k] = factors[0][kColumns[k]];
+      two[k] = factors[1][kColumns[k]];
     }
   }
 };

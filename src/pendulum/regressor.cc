@@ -35,9 +35,8 @@ Factors Regressor(const JointAngles<double>& angles, const Pair& velocity,
     const Pair net = dynamics::NetTorque<false>(unit, angles, velocity, {0, 0});
     return {inertial.one - net.one, inertial.two - net.two};
   });
-  static_assert(kManipulatorConstants[8] == &Manipulator::f1);
-  factors[0][8] = DryFriction(1, velocity.one);
-  factors[1][9] = DryFriction(1, velocity.two);
+  factors[0][column::kF1] = DryFriction(1, velocity.one);
+  factors[1][column::kF2] = DryFriction(1, velocity.two);
   return factors;
 }
 

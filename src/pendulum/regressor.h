@@ -9,11 +9,15 @@
 /// is the torque at a joint for a constant of 1, while all other constants are 0.
 namespace upswing {
 
-/// The constants of Manipulator, in its order.
+/// Columns of the constants of Manipulator, in its order.
+namespace column {
+enum Constant { kJ1, kJ2, kB, kA, kG1, kG2, kD1, kD2, kF1, kF2 };
+}
 inline constexpr std::array kManipulatorConstants{
     &Manipulator::J1, &Manipulator::J2, &Manipulator::b,  &Manipulator::a,  &Manipulator::G1,
     &Manipulator::G2, &Manipulator::d1, &Manipulator::d2, &Manipulator::f1, &Manipulator::f2};
 inline constexpr int kNumManipulatorConstants = static_cast<int>(kManipulatorConstants.size());
+static_assert(kNumManipulatorConstants == column::kF2 + 1);
 
 /// Factors of the constants for each joint.
 using Factors = std::array<std::array<double, kNumManipulatorConstants>, 2>;

@@ -261,7 +261,8 @@ class LearningSession {
 
   /// Says which limits a fall from upright exceeds. A motor cannot hold links that fall.
   void WarnOfFalls() {
-    constexpr double kLean = 0.1, kStep = kMotionStep, kSeconds = 3;  // rad, s, s
+    constexpr double kLean = 0.1;   // rad
+    constexpr double kSeconds = 3;  // of each fall
     const Manipulator body = BodyOf(twin_);
     const auto falling = [&](const PendulumState& s, double /*share*/) {
       return body.Acceleration(s, {});
@@ -269,8 +270,8 @@ class LearningSession {
     double angle = 0, velocity = 0;
     for (const double lean : {-kLean, kLean}) {
       PendulumState s{std::numbers::pi + lean, 0, 0, 0};
-      for (int i = 0; i < kSeconds / kStep; ++i) {
-        s = RungeKuttaStep(s, falling(s, 0), kStep, falling);
+      for (int i = 0; i < kSeconds / kMotionStep; ++i) {
+        s = RungeKuttaStep(s, falling(s, 0), kMotionStep, falling);
         angle = std::max(angle, LargerMagnitude(s.q1, s.q2));
         velocity = std::max(velocity, LargerMagnitude(s.w1, s.w2));
       }

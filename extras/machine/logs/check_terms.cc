@@ -51,7 +51,7 @@ Window SmoothWindowAt(const MachineLog& log, int first, int last, int span, doub
 }
 
 std::array<Terms, 2> TermsOf(const Window& window, const Reading& reading) {
-  enum Constant { kJ1, kJ2, kB, kA, kG1, kG2 };  // columns of a regressor
+  using namespace column;
   std::array<Terms, 2> both{Terms::Zero(), Terms::Zero()};
   for (const Sample& sample : window) {
     const Joints q = reading.Of(sample.q), w = reading.Of(sample.w);

@@ -25,7 +25,6 @@ struct Terms {
 
 Terms TermsAt(const Joints& q, const Joints& w) {
   constexpr int kConstants = kNumManipulatorConstants;
-  enum { kDamping1 = 6, kDamping2, kFriction1, kFriction2 };
   using Columns = Eigen::Map<const Eigen::Matrix<double, 1, kConstants>>;
   const auto angles = dynamics::AnglesOf<double>({q[0], q[1]});
   const auto [momentum, force] = MomentumRegressorOf(angles, {w[0], w[1]});
@@ -35,11 +34,11 @@ Terms TermsAt(const Joints& q, const Joints& w) {
   t.rate1.head<kConstants>() = Columns(force[0].data());
   t.rate2.head<kConstants>() = Columns(force[1].data());
   // The integral of a velocity is exact: the change of an angle.
-  t.change1[kDamping1] = q[0];
-  t.change2[kDamping2] = q[1];
-  t.rate1[kDamping1] = t.rate2[kDamping2] = 0;
-  t.rate1[kFriction1] = DryFriction(1, w[0]);
-  t.rate2[kFriction2] = DryFriction(1, w[1]);
+  t.change1[column::kD1] = q[0];
+  t.change2[column::kD2] = q[1];
+  t.rate1[column::kD1] = t.rate2[column::kD2] = 0;
+  t.rate1[column::kF1] = DryFriction(1, w[0]);
+  t.rate2[column::kF2] = DryFriction(1, w[1]);
   // Zeros turn gravity: k1 = G1 z1, k2 = G2 (z1 + z2).
   t.rate1.tail<2>() << -angles.c1, -angles.c12();
   t.rate2.tail<2>() << 0, -angles.c12();
