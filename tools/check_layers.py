@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Checks that folders are layers: includes point only to lower layers, and there is no cycle. The
-product, src/, includes nothing of extras/.
+"""Checks that folders are layers: includes point only to lower layers, and there is no cycle. Rooms
+of a folder are floors: a file includes its own room and lower floors. The product, src/, includes
+nothing of extras/.
 
     tools/check_layers.py [ROOT]
 

@@ -121,6 +121,22 @@ void PrintConditions(const EvalReport& report) {
   if (!changes.empty()) fmt::print("  {:<15}{}\n", "with", changes);
 }
 
+/// Prints what a reader of the figures has to know of the policy, whose `name` begins each line.
+void PrintNotes(const EvalReport& report, const std::string& name) {
+  const int64_t episodes = report.figures.episodes;
+  if (report.known_plant) {
+    fmt::print(
+        "  designed for   {}the plant of each episode; {} of {} plants have no such controller\n",
+        name, episodes - NumDesigned(report), episodes);
+  }
+  if (report.only_balances) {
+    fmt::print(
+        "  note           {}the controller balances and does not swing up; episodes start "
+        "hanging\n",
+        name);
+  }
+}
+
 }  // namespace
 
 bool ValueIsOff(double expected, double attained) {
@@ -131,15 +147,7 @@ void PrintEvalTable(const EvalReport& report) {
   const Evaluation& e = report.figures;
   fmt::print("{}\n", Printable(report.policy));
   PrintConditions(report);
-  if (report.known_plant) {
-    fmt::print(
-        "  designed for   the plant of each episode; {} of {} plants have no such controller\n",
-        e.episodes - NumDesigned(report), e.episodes);
-  }
-  if (report.only_balances) {
-    fmt::print(
-        "  note           the controller balances and does not swing up; episodes start hanging\n");
-  }
+  PrintNotes(report, "");
   fmt::print("  success        {} of {} = {:.1f}%   (95% interval {:.1f}% to {:.1f}%)\n",
              e.successes, e.episodes, 100 * e.success_rate(), 100 * e.success_interval.low,
              100 * e.success_interval.high);
@@ -172,10 +180,11 @@ void PrintEvalComparison(std::span<const EvalReport> reports) {
   }
   fmt::print("The same {} for all\n", Counted(first.figures.episodes, "episode"));
   PrintConditions(first);
+  for (const EvalReport& report : reports) PrintNotes(report, Printable(report.title) + ": ");
   fmt::print("\n");
   PrintRow(width, {"", "success [%]", "return", "swing-up [s]", "torque change [N·m/s]"});
   for (const EvalReport& report : reports) PrintRow(width, FiguresRow(report));
-  fmt::print("\n  less {}, in the same episodes\n", Printable(first.title));
+  fmt::print("\n  minus {}, in the same episodes\n", Printable(first.title));
   for (const EvalReport& report : reports.subspan(1)) {
     PrintRow(width, DifferencesRow(report, first));
   }

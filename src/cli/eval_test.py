@@ -76,7 +76,7 @@ class EvalTest(ProgramTest):
         self.assertEqual([d["policy"] for d in both["differences"]], names[1:])
         first, *others = [[row for row in rows if row["policy"] == name] for name in names]
         for difference, other in zip(both["differences"], others):
-            self.assertEqual(difference["less"], "sac")
+            self.assertEqual(difference["minus"], "sac")
             for figure, column in (("return", "return"), ("success_rate", "success"),
                                    ("swing_up_seconds", "swing_up_seconds")):
                 pairs = [float(x[column]) - float(y[column]) for x, y in zip(other, first)
@@ -96,8 +96,10 @@ class EvalTest(ProgramTest):
         self.assertEqual(table[0], "The same 3 episodes for all")
         rows = [line.split()[0] for line in table if line.startswith("  ")]
         self.assertEqual(rows.count("lqr"), 2)
+        self.assertIn("  note           lqr: the controller balances and does not swing up; episodes start hanging",
+                      table)
         self.assertEqual(rows.count("sac"), 1)
-        self.assertIn("less sac, in the same episodes", "\n".join(table))
+        self.assertIn("minus sac, in the same episodes", "\n".join(table))
         # No episode in which both swing up has a difference.
         difference = next(line for line in reversed(table) if "lqr" in line)
         self.assertRegex(difference, r"  none  ")

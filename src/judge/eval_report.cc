@@ -307,7 +307,7 @@ std::string EvalJson(std::span<const EvalReport> reports) {
   ordered_json j;
   for (const EvalReport& report : reports) j["policies"].push_back(ReportJson(report));
   for (const EvalReport& report : reports.subspan(1)) {
-    ordered_json difference{{"policy", report.policy}, {"less", reports.front().policy}};
+    ordered_json difference{{"policy", report.policy}, {"minus", reports.front().policy}};
     for (const PairedFigure& figure : PairedFigures(report, reports.front())) {
       difference[figure.name] = PairedJson(figure);
     }

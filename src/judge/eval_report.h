@@ -65,14 +65,14 @@ std::map<std::string, TransitionCount> TransitionsOf(const EvalReport& report);
 /// Number of episodes with a controller designed for their plant.
 int64_t NumDesigned(const EvalReport& report);
 
-/// A figure of one policy less that of another, over the episodes in which both have it.
+/// A figure of one policy minus that of another, over the episodes in which both have it.
 struct PairedFigure {
   std::string name;  // as in EvalJson
   int64_t episodes = 0;
   Estimate difference = {};  // mean of the differences, with the interval of pairs
 };
 
-/// The figures of a report less those of another with the same episodes: the success rate, then
+/// The figures of a report minus those of another with the same episodes: the success rate, then
 /// every figure but the values, whose unit may differ.
 std::vector<PairedFigure> PairedFigures(const EvalReport& report, const EvalReport& other);
 
