@@ -214,10 +214,10 @@ void AddDemo(CommandLine& line) {
   line.Excludes("--port", {"--dist", "--file"});
   line.Excludes("--dist", {"--file"});
   line.Check([&a] { CheckPlace(a); });
-  line.Footer(
+  line.Notes(
       "At the printed address the first of the policies plays. The server listens on this machine\n"
-      "only. It runs in Python: `python3`, or the one that UPSWING_PYTHON names.\n\n"
-      "Examples:\n"
+      "only. It runs in Python: `python3`, or the one that UPSWING_PYTHON names.\n");
+  line.Examples(
       "  ./upswing demo\n"
       "  ./upswing demo runs/d3qn-seed1\n"
       "  ./upswing demo --dist site && python3 -m http.server -d site\n"

@@ -100,7 +100,6 @@ void AddExport(CommandLine& line) {
              "policies: policy.safetensors, run folders or shipped policies; for --c also lqr, "
              "energy, pfl or tvlqr");
   AddControllers(line, a.controller);
-  line.Removed("--test-vectors", "the tensors sample.* of a policy file are test vectors");
   line.Text(
       "--onnx", a.onnx, "FILE",
       "ONNX file to write, which maps observations to torques and values; -: standard output");
@@ -123,16 +122,15 @@ void AddExport(CommandLine& line) {
           "again; Q-networks only")
       .usual = "none";
   line.Arguments(own);
-  line.Footer(
-      "Examples:\n"
+  line.Notes("`./upswing demo runs/d3qn-seed1` adds a policy to the page and serves the page.\n");
+  line.Examples(
       "  ./upswing export runs/d3qn-seed1 --onnx policy.onnx\n"
       "  ./upswing export fast --c policy.h                     a shipped policy as C\n"
       "  ./upswing export tvlqr --c tvlqr.h                     a controller as C\n"
       "  ./upswing export runs/d3qn-seed1 --page web/public/agents    for every visitor\n"
       "  ./upswing export runs/* --page build/web/agents        in the page built here\n"
       "  ./upswing export policy.safetensors --id mine --page build/web/agents\n"
-      "  ./upswing export runs/d3qn-seed1 --page web/public/agents --checkpoints 10\n\n"
-      "`./upswing demo runs/d3qn-seed1` adds a policy to the page and serves the page.\n");
+      "  ./upswing export runs/d3qn-seed1 --page web/public/agents --checkpoints 10\n");
 }
 
 }  // namespace upswing::deploy

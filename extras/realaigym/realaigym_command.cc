@@ -262,20 +262,17 @@ void AddScore(CommandLine& line) {
             "score on machines drawn from this twin, by the hardware rules");
   AddSeed(line, a.seed, "resets, noise, pushes and machines");
   AddThreads(line, a.threads);
-  line.Removed("--case-seed", "use --seed");
-  line.Removed("--draws", "use --runs");
   line.Flag("--no-pushes", a.no_pushes, "no pushes on the twin's machines, version 2");
   line.Text("--csv", a.csv, "FILE",
             "CSV file to write, the first motion in the format of RealAIGym; -: standard output, "
             "without a table");
-  line.Removed("--figure", "--json has the curves of the rows of robustness");
   line.Excludes("--twin", {"--csv"});
   line.Check([&line, &a] {
     if (line.Has("--no-pushes") && (a.twin.empty() || !a.version2())) {
       throw BadInput("--no-pushes: expected --twin FILE and --score-version 2 with it");
     }
   });
-  line.Footer(
+  line.Notes(
       "Version 3: runs of 60 s on RealAIGym's plant C.1 without friction, at 500 Hz, from\n"
       "hanging. At 15 random times both motors drive the links to random angles for 0.2 s. The\n"
       "score is the share of the time with the tip above 90% of the length. With --twin, runs\n"
@@ -287,8 +284,8 @@ void AddScore(CommandLine& line) {
       "plant. The motors compensate " +
       fmt::format("{:.0f}%", 100 * kCompensated) +
       " of the estimated dry friction.\n\n"
-      "docs/results/realaigym.md has the published entries.\n\n"
-      "Examples:\n"
+      "docs/results/realaigym.md has the published entries.\n");
+  line.Examples(
       "  ./upswing train --agent pendubot && ./upswing realaigym score runs/pendubot-seed1\n"
       "  ./upswing realaigym score tvlqr --made-for realaigym --score-version 2\n"
       "  ./upswing realaigym score runs/pendubot-seed1 --csv sim_swingup.csv\n"
@@ -302,10 +299,10 @@ void AddHardware(CommandLine& line) {
   Options rules;
   AddCommon(line, a.robot, a.as_json, rules, a.score_version);
   line.Arguments(rules);
-  line.Footer(
+  line.Notes(
       "Version 2: all logs must be of one robot. A log with tau_pert belongs to the board with\n"
-      "pushes. Version 3 also scores simulated runs in the format of RealAIGym.\n\n"
-      "Examples:\n"
+      "pushes. Version 3 also scores simulated runs in the format of RealAIGym.\n");
+  line.Examples(
       "  ./upswing realaigym hardware run01.csv run02.csv.gz --json\n"
       "  ./upswing realaigym hardware sim_swingup.csv --score-version 3\n");
 }
@@ -315,10 +312,7 @@ void AddHardware(CommandLine& line) {
 void AddRealAiGym(CommandLine& line) {
   AddScore(line.Subcommand("score", "Score a policy in simulation or on a twin"));
   AddHardware(line.Subcommand("hardware", "Score logs of the real robot"));
-  line.Removed("--search", "train an agent (docs/howto/realaigym.md)");
-  line.Removed("--hardware", "use `realaigym hardware LOG…`");
-  line.Footer(
-      "Examples:\n"
+  line.Examples(
       "  ./upswing realaigym score runs/pendubot-seed1\n"
       "  ./upswing realaigym hardware logs/*.csv.gz\n"
       "  ./upswing realaigym score --help     show all options of score\n");

@@ -171,11 +171,6 @@ class RealAIGym(ProgramTest):
     def test_bad_input(self):
         refuse = self.refuse
         refuse(["realaigym", "score"], "expected a policy, got none")
-        refuse(["realaigym", "--search", "q.safetensors"], "--search", "train an agent")
-        refuse(["realaigym", "--hardware", "q.csv"], "--hardware", "realaigym hardware")
-        refuse(["realaigym", "score", "lqr", "--figure", "rows.svg"], "--figure", "--json")
-        refuse(["realaigym", "score", "lqr", "--case-seed", 2], "--case-seed", "--seed")
-        refuse(["realaigym", "score", "lqr", "--draws", 2], "--draws", "--runs")
         refuse(["realaigym", "score", "nothing.safetensors"], "nothing.safetensors: no such file")
         refuse(["realaigym", "score", "lqr", "--robot", "cartpole"], "--robot", "pendubot or acrobot")
         refuse(["realaigym", "score", "lqr", "--csv", "-", "--json"], "--json")

@@ -61,8 +61,7 @@ Config ConfigOf(const std::string& num_envs, const PlantSettings& plant,
                 const SettingTexts& settings) {
   std::vector<FlagValue> flags = FlagsOf(settings);
   flags.push_back({"envs", num_envs, "num_envs"});
-  Config scratch;
-  const Options every = EverySetting(scratch);
+  const Options every = EverySetting();
   for (const FlagValue& flag : flags) {
     for (const Option* option : every.Find(flag.name, flag.where)) {
       if (IsEnvironmentSetting(*option)) continue;

@@ -104,8 +104,7 @@ nb::dict PlantDict(const Plant& plant) {
 }
 
 std::vector<FlagValue> FlagsOf(const SettingTexts& settings) {
-  Config scratch;
-  const Options every = EverySetting(scratch);
+  const Options every = EverySetting();
   const auto is_alias = [&](const auto& setting) {
     return std::ranges::any_of(every.aliases(),
                                [&](const auto& alias) { return alias.name == setting.first; });

@@ -377,10 +377,10 @@ class BadInput(BadInputTest):
                 "actions: expected one of continuous, levels": {"actions": "discrete"},
                 "delay: expected a multiple of 0.02": {"delay": 0.03},
                 'mass1: expected a number in [0.01, 100], got "nan"': {"mass1": np.nan},
-                'got "acrobot-v1"; train on Gymnasium': {"agent": "acrobot-v1"},
+                'expected an agent, one of': {"agent": "acrobot-v1"},
                 'got "fsat"': {"agent": "fsat"},
                 "render_mode: expected": {"render_mode": "ansi"},
-                "model: expected no setting model, which was removed": {"model": "own.xml"}}.items():
+                'model: expected a setting, got "model"': {"model": "own.xml"}}.items():
             if settings is not None:
                 self.refuse(text, lambda settings=settings: upswing.DoublePendulumEnv(**settings))
         for number in (0, 4097, "x", -1):

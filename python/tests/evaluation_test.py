@@ -161,7 +161,7 @@ class Evaluations(BadInputTest):
                 'mas: expected a setting, got "mas" (did you mean mass?)': {"mas": 1},
                 "mass2: expected a number in [0.01, 100]": {"mass2": "heavy"},
                 "delay: expected a multiple of 0.02": {"delay": 0.01},
-                "model: expected no setting model, which was removed": {"model": "own.xml"}}.items():
+                'model: expected a setting, got "model"': {"model": "own.xml"}}.items():
             self.refuse(what, upswing.evaluate, policy, **settings)
         for what, function in {"for each of 1 observations, got 2": lambda obs: [1, 2],
                                "finite torques": lambda obs: [np.nan] * len(obs)}.items():

@@ -1,5 +1,6 @@
 #include "agents/config.h"
 
+#include "agents/algorithms.h"
 #include "base/error.h"
 #include "base/text.h"
 #include "pendulum/physics.h"
@@ -7,33 +8,36 @@
 namespace upswing {
 
 const std::vector<std::string>& AlgorithmNames() {
-  static const std::vector<std::string> kNames{"dqn", "sac", "ppo"};
+  static const std::vector<std::string> kNames = [] {
+    std::vector<std::string> names;
+    for (const Algorithm& algorithm : Algorithms()) names.push_back(algorithm.name);
+    return names;
+  }();
   return kNames;
 }
 
-AgentConfig& Config::learner() {
-  if (algorithm == "sac") return sac;
-  if (algorithm == "ppo") return ppo;
-  return dqn;
+AgentConfig& Config::learner() { return AlgorithmOf(*this).settings(*this); }
+
+const AgentConfig& Config::learner() const { return AlgorithmOf(*this).settings_of_const(*this); }
+
+std::unique_ptr<Agent> Config::MakeAgent(const EnvSpec& spec, ThreadPool& pool) const {
+  return AlgorithmOf(*this).make(*this, spec, static_cast<uint64_t>(train.seed), pool);
 }
 
 void Config::Describe(Options& o) {
   o.Section("train");
   o.Add(&agent, "agent", "named agent that sets the defaults of the other settings");
   o.AddChoice(&algorithm, "algorithm", AlgorithmNames(),
-              "learning algorithm; each has its own settings")
-      .implied = true;
+              "learning algorithm; each has its own settings");
   o.Add(&start_policy, "start_policy",
         "policy whose weights the training starts with: a file, a run folder or a shipped policy, "
-        "with the network of the agent (dqn and sac)")
-      .implied = true;
+        "with the network of the agent (dqn and sac)");
   o.Alias("from", {"start_policy"});
   train.Describe(o);
   o.Section("task");
   o.Add(&environment, "environment",
         "environment of Gymnasium, as upswing.train(env=...) in Python describes it; empty: double "
-        "pendulum")
-      .implied = true;
+        "pendulum");
   DescribeEnvironment(o);
   learner().Describe(o);
 }
@@ -51,16 +55,13 @@ void Config::DescribeEnvironment(Options& o) {
       "time for which motors at both joints drive the links towards a random pose before a random "
       "start, in place of random angles and velocities; 0: none");
   drive.step = kControlPeriod;
-  drive.implied = true;
   o.Add(&memory, "memory", {0, kMostMemory}, "steps",
         "number of past steps whose torque and velocity changes the agent observes");
   o.Add(&identify, "identify",
-        "let the agent observe an estimate of the plant's constants, identified from its motion")
-      .implied = true;
+        "let the agent observe an estimate of the plant's constants, identified from its motion");
   o.Add(&any_pose, "any_pose",
         "ask each episode for one of the four poses at rest, each link up or down; the agent "
-        "observes which")
-      .implied = true;
+        "observes which");
   o.AddChoice(
       &physics, "physics", EngineNames(),
       "physics engine of the training; closed-form is faster than mujoco, with the same physics");
@@ -76,11 +77,11 @@ void Config::DescribeEnvironment(Options& o) {
   reward.Describe(o);
 }
 
-Options EverySetting(Config& scratch) {
+Options EverySetting() {
   Options options;
   for (const std::string& name : AlgorithmNames()) {
-    scratch.algorithm = name;
-    options.AddMissing(OptionsOf(scratch));
+    const Config defaults(name);
+    options.AddMissing(OptionsOf(defaults));
   }
   return options;
 }

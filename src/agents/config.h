@@ -54,7 +54,7 @@ struct Config {
       : algorithm(algorithm_name) {}
   /// The settings of the algorithm.
   AgentConfig& learner();
-  const AgentConfig& learner() const { return const_cast<Config*>(this)->learner(); }
+  const AgentConfig& learner() const;
 
   /// Describes all settings. Of the learners, only the settings of `algorithm`.
   void Describe(Options& options);
@@ -69,13 +69,11 @@ struct Config {
   bool is_foreign() const { return !environment.empty(); }
 
   /// Makes an agent for environments of this kind. The threads of the pool share its work.
-  std::unique_ptr<Agent> MakeAgent(const EnvSpec& spec, ThreadPool& pool) const {
-    return learner().Make(spec, static_cast<uint64_t>(train.seed), pool);
-  }
+  std::unique_ptr<Agent> MakeAgent(const EnvSpec& spec, ThreadPool& pool) const;
 };
 
-/// The settings of all algorithms, each name once, as pointers into `scratch`.
-Options EverySetting(Config& scratch);
+/// The default settings of all algorithms, each name once.
+Options EverySetting();
 
 /// The settings of a configuration. For a name that only other algorithms have, WhyMissing names
 /// those algorithms.
@@ -97,14 +95,23 @@ void SetFlags(const Options& options, const std::vector<FlagValue>& flags);
 Config ParseConfig(std::string_view text, const std::string& where,
                    const std::vector<FlagValue>& flags);
 
-/// Settings, such as agent.gamma, that the TOML text of a run lacks because another version of the
-/// program wrote it.
-std::vector<std::string> MissingSettings(const std::string& text, const std::string& where,
-                                         bool identity_only);
-
 /// The settings of a TOML document over the defaults of its algorithm. `where` names the document
 /// in messages, which also give the line. Throws BadInput.
 Config ConfigIn(std::string_view toml, const std::string& where);
+
+/// The settings that a version of the program recorded for a training, in a run or a policy file.
+struct RecordedConfig {
+  Config config;                     // missing settings have their defaults
+  std::vector<std::string> missing;  // settings, such as agent.gamma, that the record lacks
+  std::vector<std::string> unknown;  // settings of the record that this version lacks
+
+  bool is_of_this_version() const { return missing.empty() && unknown.empty(); }
+};
+
+/// Reads recorded settings from TOML. Policy files record only settings that change the training
+/// (`identity_only`). `where` names the document in messages. Throws BadInput for values out of
+/// range.
+RecordedConfig ReadRecord(const std::string& toml, const std::string& where, bool identity_only);
 
 /// Applies the settings of a TOML document. `where` names it in messages. Throws BadInput with the
 /// line.

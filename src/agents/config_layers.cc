@@ -17,9 +17,8 @@ const NamedAgent& FindAgent(const std::string& name, const std::string& where) {
   const auto found = std::ranges::find_if(agents, [&](const auto& a) { return a.name == name; });
   if (found != agents.end()) return *found;
   const std::vector<std::string> names = NamesOf(agents);
-  const std::string instead = ReplacementOf(name);
   throw BadInput(Concat(where, ": expected an agent, one of ", Join(names, ", "), ", got \"", name,
-                        "\"", instead.empty() ? DidYouMean(name, names) : instead));
+                        "\"", DidYouMean(name, names)));
 }
 
 /// A text setting that other settings depend on: its value in the last layer that sets it, and the
@@ -169,6 +168,20 @@ Config ConfigIn(std::string_view text, const std::string& where) {
   return config;
 }
 
+RecordedConfig ReadRecord(const std::string& text, const std::string& where, bool identity_only) {
+  toml::table table = ParseToml(text, where);
+  RecordedConfig record{Config(AlgorithmIn(table, where)), {}, {}};
+  const Options options = OptionsOf(record.config);
+  for (const Option& option : options.all()) {
+    const bool is_recorded = option.identity() || !identity_only;
+    if (!is_recorded || table[option.section][option.name]) continue;
+    record.missing.push_back(Concat(option.section, ".", option.name));
+  }
+  record.unknown = TakeUnknown(options, table);
+  ApplyTable(options, table, where, false);
+  return record;
+}
+
 void ApplyToml(const Options& options, std::string_view text, const std::string& where) {
   ApplyTable(options, ParseToml(text, where), where, false);
 }
@@ -198,20 +211,6 @@ Config ParseConfig(std::string_view text, const std::string& where,
   CheckSettings(config, where);
   FitToReward(options, PlaceOfMirror(table, where, flags), config);
   return config;
-}
-
-std::vector<std::string> MissingSettings(const std::string& text, const std::string& where,
-                                         bool identity_only) {
-  const toml::table table = ParseToml(text, where);
-  const Config config(AlgorithmIn(table, where));
-  const Options options = OptionsOf(config);
-  std::vector<std::string> missing;
-  for (const Option& option : options.all()) {
-    const bool needed = !option.implied && (option.identity() || !identity_only);
-    if (!needed || table[option.section][option.name]) continue;
-    missing.push_back(Concat(option.section, ".", option.name));
-  }
-  return missing;
 }
 
 std::vector<std::pair<std::string, std::string>> NamedAgents() {

@@ -77,19 +77,6 @@ EnvSpec ForeignTask::Spec(int num_envs) const {
 
 bool IsForeign(std::string_view task) { return task.starts_with(kBeginning); }
 
-std::string ReplacementOf(std::string_view name) {
-  if (name == "ppo-discrete") return "; use the agent ppo with --actions levels";
-  std::string_view env;
-  if (name.ends_with("pendulum-v1")) {
-    env = "Pendulum-v1";
-  } else if (name.starts_with("acrobot")) {
-    env = "Acrobot-v1";
-  } else {
-    return "";
-  }
-  return Concat("; train on Gymnasium's ", env, " in Python: upswing.train(env=\"", env, "\")");
-}
-
 std::unique_ptr<VectorEnv> MakeEnv(const EnvConfig& config) {
   if (config.environment.empty()) return std::make_unique<PendulumEnv>(config);
   if (config.make_foreign) return config.make_foreign(config);

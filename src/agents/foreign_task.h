@@ -34,10 +34,6 @@ struct ForeignTask {
 /// Whether this is the name of a foreign task.
 bool IsForeign(std::string_view task);
 
-/// The replacement of a task or agent of version 0.5.0, for messages: `; train on …`. Empty for
-/// another name.
-std::string ReplacementOf(std::string_view name);
-
 struct EnvConfig;
 /// Makes environments of a foreign task.
 using ForeignMaker = std::function<std::unique_ptr<VectorEnv>(const EnvConfig&)>;

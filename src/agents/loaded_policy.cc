@@ -61,7 +61,7 @@ void CheckTask(const LoadedPolicy& loaded, const std::string& where) {
   }
   if (loaded.task != kDoublePendulum) {
     throw BadInput(Concat(where, ": metadata \"task\": expected ", kDoublePendulum, ", got \"",
-                          loaded.task, "\"", ReplacementOf(loaded.task)));
+                          loaded.task, "\""));
   }
   if (period != kControlPeriod) {
     throw BadInput(Concat(where, ": metadata \"control_period\": expected ",
@@ -79,11 +79,15 @@ void CheckTask(const LoadedPolicy& loaded, const std::string& where) {
 Plant TrainingPlant(const PolicyInfo& info, const std::string& where) {
   Plant plant;
   const std::string place = Concat(where, ": metadata \"plant\"");
+  for (const PlantParameter& parameter : std::span(kPlantParameters).first(kMainParameters)) {
+    if (!info.plant.contains(parameter.name)) {
+      throw BadInput(Concat(place, ": no ", parameter.name));
+    }
+  }
   const Options options = OptionsOf(plant);
   for (const Option& option : options.all()) {
     const auto found = info.plant.find(option.name);
-    if (found == info.plant.end() && option.implied) continue;
-    if (found == info.plant.end()) throw BadInput(Concat(place, ": no ", option.name));
+    if (found == info.plant.end()) continue;  // it has its default; see PlantValues
     option.Set(FormatNumber(found->second), Concat(place, ": ", option.name));
   }
   return plant;
@@ -95,10 +99,10 @@ LoadedPolicy ReadPolicy(const Tensors& file) {
   const std::string& where = file.where();
   if (const auto model = file.metadata.find("model");
       model != file.metadata.end() && !model->second.empty()) {
-    throw BadInput(Concat(where,
-                          ": metadata \"model\": expected none, got an MJCF model of version "
-                          "0.5.0; ",
-                          kInsteadOfModel));
+    throw BadInput(
+        Concat(where,
+               ": metadata \"model\": expected none, got an MJCF model; this version has "
+               "plants of numbers only"));
   }
   const auto policy = std::make_shared<const NetworkPolicy>(NetworkPolicy::From(file));
   const PolicyInfo& info = policy->info();

@@ -8,32 +8,6 @@
 namespace upswing {
 namespace {
 
-/// A setting that an earlier version had. Files may still contain it with the value that is now
-/// fixed.
-struct RemovedSetting {
-  std::string_view section, name, value;
-};
-constexpr RemovedSetting kRemoved[] = {
-    {"network", "precision", "float32"}, {"network", "bins", "0"},
-    {"network", "value_low", "-10"},     {"network", "value_high", "60"},
-    {"task", "task", "double-pendulum"}, {"task", "task", "gymnasium"}};  // has an environment
-
-/// Whether this setting was removed. Throws BadInput if it has a value that is no longer possible.
-bool IsRemoved(std::string_view section, std::string_view name, const toml::node& node,
-               const std::string& where) {
-  const std::string text = TextOf(node).value_or("another type");
-  if (name == "model" && text.empty()) return true;  // Plant::Describe explains another text
-  std::vector<std::string> possible;
-  for (const RemovedSetting& removed : kRemoved) {
-    if (section != removed.section || name != removed.name) continue;
-    if (text == removed.value) return true;
-    possible.emplace_back(removed.value);
-  }
-  if (possible.empty()) return false;
-  throw BadInput(Concat(PlaceOf(node, where), ": ", name, ": expected ", Join(possible, " or "),
-                        ", got ", Printable(text), ReplacementOf(text)));
-}
-
 /// Sets one key of a section, or a key without a section if `section` is empty.
 FlagValue ApplyNode(const Options& options, const std::string& section, const std::string& key,
                     const toml::node& node, const std::string& where) {
@@ -136,6 +110,24 @@ std::optional<std::string> TextOf(const toml::node& node) {
   return Concat("[", Join(items, ", "), "]");
 }
 
+std::vector<std::string> TakeUnknown(const Options& options, toml::table& table) {
+  std::vector<std::string> unknown;
+  for (auto& [section, node] : table) {
+    auto* settings = node.as_table();
+    if (settings == nullptr) continue;
+    std::vector<std::string> keys;
+    for (const auto& [key, value] : *settings) {
+      const Option* option = options.Get(key.str());
+      if (option == nullptr || option->section != section.str()) keys.emplace_back(key.str());
+    }
+    for (const std::string& key : keys) {
+      settings->erase(key);
+      unknown.push_back(Concat(section.str(), ".", key));
+    }
+  }
+  return unknown;
+}
+
 std::vector<FlagValue> ApplyTable(const Options& options, const toml::table& table,
                                   const std::string& where, bool flat) {
   std::vector<std::string> sections;
@@ -145,7 +137,6 @@ std::vector<FlagValue> ApplyTable(const Options& options, const toml::table& tab
     const std::string key(name.str());
     const auto* section = node.as_table();
     if (flat && section == nullptr) {
-      if (IsRemoved("task", key, node, where)) continue;  // old studies may have task and model
       settings.push_back(ApplyNode(options, "", key, node, where));
       continue;
     }
@@ -164,7 +155,6 @@ std::vector<FlagValue> ApplyTable(const Options& options, const toml::table& tab
                             DidYouMean(key, sections)));
     }
     for (const auto& [inner, value] : *section) {
-      if (IsRemoved(key, inner.str(), value, where)) continue;
       settings.push_back(ApplyNode(options, key, std::string(inner.str()), value, where));
     }
   }

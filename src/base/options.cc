@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 #include "base/error.h"
 #include "base/text.h"
@@ -151,8 +150,6 @@ std::string Option::expected() const {
 }
 
 void Option::Set(std::string_view text, const std::string& where) const {
-  if (read_only)
-    throw std::logic_error(Concat(name, ": a setting of a const struct cannot change"));
   const bool valid =
       std::visit(Overloaded{
                      [&](bool* value) {

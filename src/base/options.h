@@ -5,10 +5,10 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <type_traits>
 #include <variant>
 #include <vector>
 
@@ -49,10 +49,8 @@ struct Option {
   Decides decides = Decides::kTraining;
   std::vector<std::string> choices = {};  // allowed values of a text; empty: any
   double step = 0;                        // a number must be a multiple of it; 0: any number
-  // Whether files of version 0.4.0 may lack the setting; those files have its default.
-  bool implied = false;
-  bool read_only = false;  // the setting belongs to a const struct
   std::string usual = {};  // default in words, shown in place of the value; may be empty
+  std::shared_ptr<const void> owner = {};  // of `target`, if these settings are of a copy
 
   /// Whether another value makes a different run, which cannot resume this one.
   bool identity() const { return decides == Decides::kTraining || decides == Decides::kSeed; }
@@ -112,9 +110,9 @@ class Options {
   /// `help` becomes "set … and …".
   void Alias(std::string_view name, std::vector<std::string> members, std::string_view help = "");
 
-  /// Makes every later Set of these settings throw std::logic_error.
-  void MakeReadOnly() {
-    for (Option& option : options_) option.read_only = true;
+  /// Keeps the struct alive that these settings point into, as long as a copy of them exists.
+  void Keep(const std::shared_ptr<const void>& owner) {
+    for (Option& option : options_) option.owner = owner;
   }
 
   /// Adds each setting and explanation of `others` whose name is missing here.
@@ -154,12 +152,20 @@ class Options {
   std::map<std::string, std::string, std::less<>> missing_;  // name → why there is none
 };
 
-/// The settings of a struct, as pointers into it. The settings of a const struct are read-only.
+/// The settings of a struct, as pointers into it.
 template <typename Config>
 Options OptionsOf(Config& config) {
   Options options;
-  const_cast<std::remove_const_t<Config>&>(config).Describe(options);
-  if (std::is_const_v<Config>) options.MakeReadOnly();
+  config.Describe(options);
+  return options;
+}
+
+/// The settings of a struct that cannot change, as pointers into a copy, which they keep alive.
+template <typename Config>
+Options OptionsOf(const Config& config) {
+  const auto copy = std::make_shared<Config>(config);
+  Options options = OptionsOf(*copy);
+  options.Keep(copy);
   return options;
 }
 

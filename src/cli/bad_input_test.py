@@ -100,15 +100,6 @@ class CommandLineTest(ProgramTest):
                 self.refuse([*TRAIN, "--physics", engine], *words)
                 self.refuse(["eval", "run", "--physics", engine], *words)
 
-    def test_flags_of_version_0_5(self):
-        for words, instead in ((["study", "x.toml", "--slurm", "4"], "examples/slurm.sh"),
-                               (["study", "x.toml", "--tasks=4"], "examples/slurm.sh"),
-                               (["train", "--task", "pendulum-v1"], "upswing.train(env=...)"),
-                               ([*TRAIN, "--model", "m.xml"], "docs/howto/gymnasium.md"),
-                               (["eval", "lqr", "--model=m.xml"], "docs/howto/gymnasium.md")):
-            with self.subTest(words=words):
-                self.refuse(words, "unknown flag --", instead)
-
     def test_settings_of_another_algorithm(self):
         for flags, words in (
                 (["--alpha", "0.1"], ["--alpha: expected a setting of dqn, the algorithm of agent d3qn, got alpha, a setting "

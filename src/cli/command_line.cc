@@ -77,33 +77,29 @@ std::string Reflowed(const std::string& text) {
   return result;
 }
 
-/// Formats --help within HelpColumns(), without the `{false}` that CLI11 adds to a flag's --no-
-/// form.
+/// Formats -h and --help of a command within HelpColumns(): description, usage, examples,
+/// arguments, commands and notes.
 class HelpFormatter : public CLI::Formatter {
  public:
-  /// `before` is called before help is printed, because help may depend on the other arguments.
-  explicit HelpFormatter(std::function<void()> before = {}) : before_(std::move(before)) {}
-
-  /// Hides the flags that are not shown.
-  void HideFlags() const {
-    if (before_) before_();
-  }
+  std::string examples, notes;
+  std::function<void()> hide_flags;  // chooses the settings to show, which depend on the arguments
+  bool is_short = false;             // -h: neither settings nor notes
 
   std::string make_help(const CLI::App* app, std::string name,
                         CLI::AppFormatMode mode) const override {
-    HideFlags();
-    return Arranged(CLI::Formatter::make_help(app, std::move(name), mode));
+    if (hide_flags) hide_flags();
+    std::string help = make_description(app) + make_usage(app, std::move(name));
+    if (!examples.empty()) help += "\nExamples:\n" + Shown(examples);
+    help += make_positionals(app);
+    for (const std::string& group : app->get_groups()) {
+      if (!is_short || group == kOwnFlags) help += Group(*app, group);
+    }
+    help += make_subcommands(app, mode);
+    if (is_short) return help + "\n--help also shows all settings.\n";
+    return notes.empty() ? help : help + '\n' + Shown(notes);
   }
 
-  /// Leaves out settings and notes, as -h does.
-  void Shorten() { is_short_ = true; }
-
-  /// The footer, with the command that starts an installed program in its examples.
-  std::string make_footer(const CLI::App* app) const override {
-    return Reflowed(
-        Replaced(CLI::Formatter::make_footer(app), "./upswing ", Concat(LaunchCommand(), " ")));
-  }
-
+  /// The names of an option, without the `{false}` that CLI11 adds to a flag's --no- form.
   std::string make_option_name(const CLI::Option* option, bool is_positional) const override {
     return Replaced(CLI::Formatter::make_option_name(option, is_positional), "{false}", "");
   }
@@ -115,39 +111,30 @@ class HelpFormatter : public CLI::Formatter {
   }
 
  private:
-  /// Moves the examples below the usage. A short help keeps only usage, examples, arguments and
-  /// commands.
-  std::string Arranged(const std::string& help) const {
-    std::vector<std::string> blocks;  // separated by empty lines
-    std::istringstream lines(help);
-    bool ended = true;
-    for (std::string line; std::getline(lines, line); ended = line.empty()) {
-      if (line.empty()) continue;
-      if (ended) blocks.emplace_back();
-      blocks.back() += line + '\n';
-    }
-    const auto examples = std::ranges::find_if(
-        blocks, [](const std::string& block) { return block.starts_with("Examples:"); });
-    if (examples != blocks.end()) std::rotate(blocks.begin() + 1, examples, examples + 1);
-    if (is_short_) {
-      constexpr const char* kKept[] = {"Examples:", "Positionals:", "Options:", "Subcommands:"};
-      std::erase_if(blocks, [&](const std::string& block) {
-        return &block != &blocks.front() && std::ranges::none_of(kKept, [&](const char* title) {
-          return block.starts_with(title);
-        });
-      });
-      blocks.emplace_back("--help also shows all settings.\n");
-    }
-    return Join(blocks, "\n");
+  static constexpr std::string_view kOwnFlags = "Options";  // CLI11's group of flags without one
+
+  /// A text with the command that starts an installed program.
+  static std::string Shown(const std::string& text) {
+    return Reflowed(Replaced(text, "./upswing ", Concat(LaunchCommand(), " ")));
   }
 
-  std::function<void()> before_;
-  bool is_short_ = false;
+  /// The flags of a group, with its name above them; empty if there are none to show.
+  std::string Group(const CLI::App& app, const std::string& group) const {
+    const std::vector<const CLI::Option*> flags = app.get_options([&](const CLI::Option* option) {
+      return option->get_group() == group && option->nonpositional();
+    });
+    return group.empty() || flags.empty() ? "" : make_group(group, false, flags);
+  }
 };
+
+/// The formatter of a command.
+HelpFormatter& FormatterOf(const CLI::App& app) {
+  return dynamic_cast<HelpFormatter&>(*app.get_formatter());
+}
 
 /// Lets -h print the short help of a command and of its commands.
 void ShortenHelp(CLI::App& app) {
-  if (auto* help = dynamic_cast<HelpFormatter*>(app.get_formatter().get())) help->Shorten();
+  FormatterOf(app).is_short = true;
   for (CLI::App* sub : app.get_subcommands({})) ShortenHelp(*sub);
 }
 
@@ -179,9 +166,7 @@ std::string FullName(const CLI::App& app) {
 /// Suggests a similar flag for an unknown one, explains why this command lacks it, or names a
 /// declared command that has it.
 std::string ExplainFlag(const CLI::App& app, const std::string& word) {
-  if (const auto* help = dynamic_cast<const HelpFormatter*>(app.get_formatter().get())) {
-    help->HideFlags();
-  }
+  if (const auto& hide_flags = FormatterOf(app).hide_flags) hide_flags();
   if (std::string meant = DidYouMean(word, KnownWords(app)); !meant.empty()) return meant;
   for (const CLI::Option* option : app.get_options()) {
     const bool near = IsHidden(*option) && !DidYouMean(word, FlagsOf(*option)).empty();
@@ -204,12 +189,6 @@ std::string ExplainCommands(const CLI::App& app, const std::string& got) {
   std::vector<std::string> names;
   for (const CLI::App* sub : app.get_subcommands({})) names.push_back(sub->get_name());
   const std::string where = app.get_parent() == nullptr ? "" : Concat(app.get_name(), ": ");
-  for (const auto& [removed, instead] : {std::pair("bench", "`upswing train` prints its speed"),
-                                         std::pair("bounds", "see `upswing eval mpc`")}) {
-    if (where.empty() && (got == removed || got.starts_with(Concat("\"", removed, "\"")))) {
-      return Concat(removed, ": was removed; ", instead);
-    }
-  }
   return Concat(where, "expected a command, one of ", Join(names, ", "), "; got ", got);
 }
 
@@ -224,15 +203,25 @@ std::string ExplainMissing(const CLI::App& app) {
   return Concat(FullName(app), ": expected another argument, got none");
 }
 
-/// The message for a wrong number of values of a flag. CLI11 names the flag only at the beginning
-/// of its message, such as `--gamma: 1 required NUMBER missing`.
-std::string ExplainValues(const std::string& message) {
-  if (message.find("flag override") != std::string::npos) {
-    return Concat("--", message.substr(0, message.find(' ')), ": expected no value, got one");
+/// The message for a wrong number of values: of a switch, which takes none, of a flag that is given
+/// twice, or of the last word, a flag without its value.
+std::string ExplainValues(const CLI::App& app, std::span<const char* const> words) {
+  for (const std::string_view word : words) {
+    const std::string name(word.substr(0, word.find('=')));
+    if (name.size() == word.size() || !name.starts_with("--")) continue;
+    const CLI::Option* option = app.get_option_no_throw(name);
+    if (option != nullptr && option->get_items_expected_max() == 0) {
+      return Concat(name, ": expected no value, got one");
+    }
   }
-  const std::string flag = message.substr(0, message.find_first_of(": "));
-  const bool several = message.find("received") != std::string::npos;
-  return Concat(flag, ": expected a value, got ", several ? "several" : "none");
+  for (const CLI::Option* option : app.get_options()) {
+    const bool takes_one = option->get_items_expected_max() == 1 &&
+                           option->get_multi_option_policy() == CLI::MultiOptionPolicy::Throw;
+    if (takes_one && option->count() > 1) {
+      return Concat(option->get_name(), ": expected a value, got several");
+    }
+  }
+  return Concat(words.back(), ": expected a value, got none");
 }
 
 /// Explains the first word that `app`, the program or a command, does not know; empty if it knows
@@ -252,8 +241,9 @@ std::string ExplainUnknown(const CLI::App& app) {
   return Concat(FullName(app), ": expected no argument ", word, meant);
 }
 
-/// The message for a wrong command line, in one line.
-std::string Explain(const CLI::App& program, const CLI::ParseError& error) {
+/// The message for a wrong command line of these words, in one line.
+std::string Explain(const CLI::App& program, const CLI::ParseError& error,
+                    std::span<const char* const> words) {
   const CLI::App* app = &program;  // the innermost command
   for (const CLI::App* each = app; each != nullptr;) {
     app = each;
@@ -263,7 +253,7 @@ std::string Explain(const CLI::App& program, const CLI::ParseError& error) {
   }
   if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) return ExplainMissing(*app);
   if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr) {
-    return ExplainValues(error.what());
+    return ExplainValues(*app, words);
   }
   return error.what();
 }
@@ -366,16 +356,6 @@ void CommandLine::Flag(std::string_view name, bool& target, std::string_view hel
   app_.add_flag(std::string(name), target, std::string(help))->disable_flag_override();
 }
 
-void CommandLine::Removed(std::string_view name, std::string_view instead) {
-  const std::string message = Concat("unknown flag ", name, "; ", instead);
-  app_.add_option_function<std::vector<std::string>>(
-          std::string(name),
-          [message](const std::vector<std::string>&) { throw BadInput(message); },
-          std::string(instead))
-      ->expected(0, 1)
-      ->group("");
-}
-
 void CommandLine::Arguments(const Options& options) {
   for (const Option& option : options.all()) {
     AddFlag(app_, option, "Options",
@@ -415,11 +395,12 @@ void CommandLine::ShowSettings(std::function<void(const ShowOptions&)> shown) {
                                          : found->about_with_default());
     }
   };
-  app_.formatter(
-      std::make_shared<HelpFormatter>([shown = std::move(shown), show] { shown(show); }));
+  FormatterOf(app_).hide_flags = [shown = std::move(shown), show] { shown(show); };
 }
 
-void CommandLine::Footer(const std::string& text) { app_.footer(text); }
+void CommandLine::Examples(const std::string& text) { FormatterOf(app_).examples = text; }
+
+void CommandLine::Notes(const std::string& text) { FormatterOf(app_).notes = text; }
 
 void CommandLine::Check(std::function<void()> check) { checks_.push_back(std::move(check)); }
 
@@ -448,7 +429,7 @@ std::string_view CalledCommand(int argc, const char* const* argv) {
 }
 
 int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> table,
-               std::span<const Command> own, const std::string& footer) {
+               std::span<const Command> own, const std::string& examples) {
   CLI::App program(
       "Upswing trains, compares, explains and deploys controllers that swing up and\n"
       "balance a double pendulum with one motor.",
@@ -460,7 +441,7 @@ int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> 
   constexpr size_t kCommandColumns = 14;
   formatter->column_width(kCommandColumns);
   program.formatter(formatter);
-  program.footer(footer);
+  formatter->examples = examples;
   const bool installed = IsInstalled();
   for (const CommandEntry& entry : table) {
     if (installed && !IsInPackages(entry)) continue;
@@ -485,7 +466,7 @@ int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> 
     }
     return program.exit(request);
   } catch (const CLI::ParseError& error) {
-    throw BadInput(Explain(program, error));
+    throw BadInput(Explain(program, error, std::span(argv, static_cast<size_t>(argc))));
   }
   if (!line) throw BadInput(ExplainCommands(program, Printable(std::string(called))));
   return line->Run();

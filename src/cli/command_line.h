@@ -46,9 +46,6 @@ class CommandLine {
   /// Adds a flag without a value.
   void Flag(std::string_view name, bool& target, std::string_view help);
 
-  /// Refuses a flag that an earlier version had. `instead` tells its replacement.
-  void Removed(std::string_view name, std::string_view instead);
-
   /// Adds a flag for each of the command's own numbers and choices. Parsing the flag sets the value
   /// immediately; see Option::Set.
   void Arguments(const Options& options);
@@ -62,8 +59,10 @@ class CommandLine {
   using ShowOptions = std::function<void(const Options& every, const Options& options)>;
   void ShowSettings(std::function<void(const ShowOptions&)> shown);
 
-  /// Adds the text below the arguments in --help.
-  void Footer(const std::string& text);
+  /// Sets the examples below the usage in --help: indented lines that begin with ./upswing.
+  void Examples(const std::string& text);
+  /// Sets the text below the arguments in --help, which -h leaves out.
+  void Notes(const std::string& text);
   /// Adds a check that runs once all arguments are known, before anything else.
   void Check(std::function<void()> check);
   /// Adds a check that none of `others` is given together with `name`. `why` ends the message.
@@ -85,7 +84,7 @@ class CommandLine {
  private:
   friend int RunProgram(int argc, const char* const* argv,
                         std::span<const struct CommandEntry> table,
-                        std::span<const struct Command> own, const std::string& footer);
+                        std::span<const struct Command> own, const std::string& examples);
 
   /// Runs the checks and the command, or those of the given subcommand. Returns the exit code.
   int Run() const;
@@ -115,10 +114,10 @@ struct Command {
 std::string_view CalledCommand(int argc, const char* const* argv);
 
 /// Parses the command line, runs one of the program's `own` commands and returns its exit code.
-/// --help lists `table` and ends with `footer`. Throws BadInput with a message of one line if the
+/// --help lists `table` and has `examples`. Throws BadInput with a message of one line if the
 /// command line is wrong.
 int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> table,
-               std::span<const Command> own, const std::string& footer);
+               std::span<const Command> own, const std::string& examples);
 
 /// Largest number of columns in a line of --help: the terminal's, limited to 80 to 100; without a
 /// terminal 100.

@@ -105,7 +105,6 @@ void AddTrialOptions(CommandLine& line, TrialArguments& a, const std::string& se
   AddSeed(line, a.seed, seed_of);
   AddPlant(line, a.plant);
   AddSet(line, a.set);
-  line.Removed("--model", kInsteadOfModel);
   AddPhysics(line, a.physics);
   AddUnknownPlant(line, a.unknown_plant);
   Options own;

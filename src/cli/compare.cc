@@ -37,9 +37,6 @@ void AddCompare(CommandLine& line) {
   CompareArguments& a = line.Runs(RunCompare);
   line.Texts("runs", a.runs.paths, "RUN|FOLDER", "runs or folders of runs");
   line.Require("runs");
-  for (const char* flag : {"--made-for", "--threads"}) {
-    line.Removed(flag, "compare takes runs only, and `upswing eval` judges a policy or controller");
-  }
   line.Text("--out", a.out, "FOLDER",
             "new folder for summary.csv, runs.csv, curves.svg and curves.png "
             "(curves-2, … for further tasks)");
@@ -49,13 +46,13 @@ void AddCompare(CommandLine& line) {
             "compare also groups whose evaluations differ in plant, disturbance or number of "
             "episodes");
   line.Flag("--json", a.as_json, "print JSON");
-  line.Footer(
+  line.Notes(
       "Runs that differ only in the seed are one group. Figures are over the runs of a\n"
       "group: the interquartile mean (IQM) with a 95% bootstrap interval. A run that did\n"
       "not solve the task counts as one that needs more than its budget. Groups are\n"
       "compared if they are evaluated on the same task. A note names each broken or\n"
-      "unfinished run and each folder without a run; they are left out.\n\n"
-      "Examples:\n"
+      "unfinished run and each folder without a run; they are left out.\n");
+  line.Examples(
       "  ./upswing compare runs/d3qn-seed*               one agent over its seeds\n"
       "  ./upswing compare runs --out runs/comparison    all agents, with figures\n"
       "  ./upswing compare runs/post --json              a study, for another program\n");

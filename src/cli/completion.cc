@@ -77,8 +77,7 @@ void AddCompletion(CommandLine& line) {
   std::string& shell = line.Runs<const std::string&>(RunCompletion);
   line.Text("shell", shell, "SHELL", "bash, zsh or fish", "a shell");
   line.Require("shell");
-  line.Footer(
-      "Examples:\n"
+  line.Examples(
       "  source <(./upswing completion bash)                 in this shell, or in ~/.bashrc\n"
       "  ./upswing completion fish > ~/.config/fish/completions/upswing.fish\n");
 }

@@ -84,18 +84,7 @@ void AddEval(CommandLine& line) {
             "design a controller again for the plant of each episode, as if it knew the plant");
   AddThreads(line, a.threads);
   line.Flag("--json", a.as_json, "print JSON instead of a table");
-  line.Footer(fmt::format(
-      "An episode of the double pendulum starts hanging, with normal noise of 0.1 (rad,\n"
-      "rad/s), and lasts {} s. It succeeds if both links are within 30° of upright\n"
-      "throughout the last {} s. The return is the undiscounted sum of the reward, with\n"
-      "the standard weights, over the first {} s. A link within 9° of upright is settled.\n"
-      "Steady tilt, chatter and torque once upright are means over successful episodes.\n"
-      "Torque changes below a thousandth of the limit are no chatter.\n\n"
-      "Several policies get the same episodes: start, plant and noise. The table and the JSON "
-      "have\n"
-      "the mean difference of each policy to the first, with a 95% bootstrap interval of pairs.\n"
-      "All need one plant and one goal; --plant, --goal set them.\n\n"
-      "Examples:\n"
+  line.Examples(
       "  ./upswing eval runs/d3qn-seed1\n"
       "  ./upswing eval d3qn sac mpc runs/d3qn-seed1 --episodes 200\n"
       "  ./upswing eval policy.safetensors --episodes 1000 --seed 7 --json\n"
@@ -105,7 +94,18 @@ void AddEval(CommandLine& line) {
       "  ./upswing eval runs/d3qn-seed1 --randomize 0.25 --episodes 1000\n"
       "  ./upswing eval runs/d3qn-seed1 --randomize 0.25 --episodes-csv episodes.csv\n"
       "  ./upswing plot runs/d3qn-seed1 --randomize 0.25 --episode 17\n"
-      "  ./upswing eval mpc --randomize 0.25 --known-plant\n\n"
+      "  ./upswing eval mpc --randomize 0.25 --known-plant\n");
+  line.Notes(fmt::format(
+      "An episode of the double pendulum starts hanging, with normal noise of 0.1 (rad,\n"
+      "rad/s), and lasts {} s. It succeeds if both links are within 30° of upright\n"
+      "throughout the last {} s. The return is the undiscounted sum of the reward, with\n"
+      "the standard weights, over the first {} s. A link within 9° of upright is settled.\n"
+      "Steady tilt, chatter and torque once upright are means over successful episodes.\n"
+      "Torque changes below a thousandth of the limit are no chatter.\n\n"
+      "Several policies get the same episodes: start, plant and noise. The table and the JSON\n"
+      "have the mean difference of each policy to the first, with a 95% bootstrap interval of\n"
+      "pairs.\n"
+      "All need one plant and one goal; --plant, --goal set them.\n\n"
       "Controllers:\n"
       "  lqr     holds the pendulum upright and does not swing it up\n"
       "  tvlqr   follows a planned swing-up\n"
@@ -113,7 +113,8 @@ void AddEval(CommandLine& line) {
       "  pfl     pumps energy by partial feedback linearisation until lqr catches\n"
       "  energy  pumps energy by energy shaping until lqr catches\n"
       "  hybrid  lets lqr catch what --swing-up POLICY swings up\n\n"
-      "The plant's flags, such as --mass2 1.3, change it; --set mass2=1.3 does the same.\n"
+      "The plant's flags, such as --mass2 1.3, change it; --set mass2=1.3 does the same, and\n"
+      "wins over the flag.\n"
       "With --randomize each episode draws its plant from a box around the nominal one. Observed\n"
       "energy and height are scaled by the episode's plant, which tells the policy of it; with\n"
       "--unknown-plant by the training's.\n",

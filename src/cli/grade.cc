@@ -76,7 +76,7 @@ void AddGrade(CommandLine& line) {
             "new folder for table.csv and index.html, a page with the leaderboard and the moving "
             "pendulums that needs no network");
   AddThreads(line, a.threads);
-  line.Footer(
+  line.Notes(
       "All policies have the same start states and the same random plants. They are sorted\n"
       "by success on the nominal plant, then by return. Δτ is smoothness, the change of the\n"
       "torque per second: less is smoother. Energy is what the motor puts in and takes out\n"
@@ -86,8 +86,8 @@ void AddGrade(CommandLine& line) {
       "in the last digits.\n\n"
       "A link, another file, a policy of another task, and a file above 8 MiB are\n"
       "refused, each with a line. Exit code: 0 if all are graded, 1 if some are refused,\n"
-      "2 for bad usage.\n\n"
-      "Examples:\n"
+      "2 for bad usage.\n");
+  line.Examples(
       "  ./upswing grade class\n"
       "  ./upswing grade class --out class-table\n"
       "  ./upswing grade class --episodes 1000 --plants 1000 --seed 7\n");

@@ -288,8 +288,7 @@ void AddInfo(CommandLine& line) {
   InfoArguments& a = line.Runs(RunInfo);
   AddPolicy(line, a);
   line.Flag("--json", a.as_json, "print JSON instead of text");
-  line.Footer(
-      "Examples:\n"
+  line.Examples(
       "  ./upswing info runs/d3qn-seed1\n"
       "  ./upswing info policy.safetensors\n"
       "  ./upswing info lqr --made-for mass2=1.2\n"

@@ -100,8 +100,6 @@ void AddMap(CommandLine& line) {
   Options own;
   a.Describe(own);
   line.Arguments(own);
-  line.Removed("--check", "--physics mujoco makes a map in MuJoCo");
-  line.Removed("--model", kInsteadOfModel);
   AddPlant(line, a.trial.plant);
   AddSet(line, a.trial.set, "value of a quantity on neither axis, such as q1=178");
   AddPlantFlags(line, a.trial.plant_flags);
@@ -112,7 +110,7 @@ void AddMap(CommandLine& line) {
   AddSeed(line, a.trial.seed, "starts and noise");
   AddThreads(line, a.threads);
   line.Flag("--json", a.as_json, "print JSON instead of a table");
-  line.Footer(
+  line.Notes(
       "Quantities for axes and --set:\n"
       "  plant    mass1, mass2, length1, length2, damping1, damping2 (mass, length,\n"
       "           damping for both links), gravity, torque_limit, actuated_joint (1 or 2),\n"
@@ -128,8 +126,8 @@ void AddMap(CommandLine& line) {
       "--unknown-plant they are scaled by the plant of the training.\n\n"
       "Without --out, a map goes into map-X-Y in the run folder, or into runs/map-X-Y-NAME\n"
       "for another policy file; a second map into map-X-Y-2. Several policies need --out:\n"
-      "it gets map-1.csv, map-2.csv, … and maps.svg and maps.png of their success.\n\n"
-      "Examples:\n"
+      "it gets map-1.csv, map-2.csv, … and maps.svg and maps.png of their success.\n");
+  line.Examples(
       "  ./upswing map runs/d3qn-seed1\n"
       "  ./upswing map runs/d3qn-seed1 --x mass=0.8:1.2 --y damping=0:0.4:21\n"
       "  ./upswing map runs/d3qn-seed1 --x sensor_noise=0:0.1 --y delay=0:0.1:6\n"

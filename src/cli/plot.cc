@@ -143,7 +143,7 @@ void AddPlot(CommandLine& line) {
   line.Flag("--phase", a.phase,
             "draw phase portraits, too: the angle of each joint against its velocity");
   line.Text("--out", a.out, "FOLDER", "new folder for the figures (default RUN/plot)");
-  line.Footer(
+  line.Notes(
       "episode.svg and .png show angles, velocities, energy, torque, reward terms and the\n"
       "policy's estimates over time: Q-values, or the actor's mean torque with its central\n"
       "68% interval, and V.\n"
@@ -151,8 +151,8 @@ void AddPlot(CommandLine& line) {
       "Of a run folder, terms.svg and .png show the sums of the reward's terms over training.\n"
       "`simulate` writes the same episode as a table.\n\n"
       "Without --out, the figures go into plot in the run folder, or into runs/plot-NAME for\n"
-      "another policy file; the next figures into plot-2.\n\n"
-      "Examples:\n"
+      "another policy file; the next figures into plot-2.\n");
+  line.Examples(
       "  ./upswing plot runs/d3qn-seed1\n"
       "  ./upswing plot runs/d3qn-seed1 --start 3.0,0,0,0 --seconds 5 --out caught\n"
       "  ./upswing plot runs/d3qn-seed1 --set mass2=1.3\n"

@@ -27,7 +27,6 @@ namespace upswing {
 namespace {
 
 constexpr const char* kExamples =
-    "Examples:\n"
     "  ./upswing train                   train the default agent until it solves the task\n"
     "  ./upswing eval runs/d3qn-seed1    evaluate its best policy\n"
     "  ./upswing compare runs            compare the agents in runs over their seeds\n"

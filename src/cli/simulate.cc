@@ -116,13 +116,13 @@ void AddSimulate(CommandLine& line) {
   line.Arguments(own);
   AddTrialOptions(line, a.trial, "noise, random plants and the start of --episode");
   line.Text("--csv", a.csv, "FILE", "CSV file to write; -: standard output (default -)");
-  line.Footer(
+  line.Notes(
       "Columns: t [s], qpos0, qpos1 [rad], qvel0, qvel1 [rad/s], torque [N·m], energy [J],\n"
       "height of the tip [m], inverted (0 or 1), the reward and its five terms. The torque\n"
       "is what the motor applies over the next 0.02 s, after its delay and within its\n"
       "limit. The reward is that of these 0.02 s: of this torque and the next row's state, 0\n"
-      "in the last row. The rewards of the first 10 s add up to the return of `eval`.\n\n"
-      "Examples:\n"
+      "in the last row. The rewards of the first 10 s add up to the return of `eval`.\n");
+  line.Examples(
       "  ./upswing simulate runs/d3qn-seed1 --csv rollout.csv\n"
       "  ./upswing simulate --torque torques.csv --start 0.1,-0.05,0,0 --seconds 10\n"
       "  ./upswing simulate --start 3.0,0,0,0 --set damping=0      no motor: it falls\n"

@@ -167,17 +167,13 @@ void AddStudy(CommandLine& line) {
             "print the number of runs in each state, and exit; also takes the study's folder");
   line.Flag("--json", arguments.as_json, "print the status as JSON");
   line.Flag("--prepare", arguments.prepare, "prepare the folder for workers, and exit");
-  for (const char* flag : {"--slurm", "--tasks", "--print"}) {
-    line.Removed(
-        flag, "queue workers with sbatch and examples/slurm.sh, after `study FILE.toml --prepare`");
-  }
   line.Text("--work", arguments.work, "FOLDER",
             "work on the study in this folder, on any host that shares it: claim and train runs "
             "until none is left");
   line.Text("--check-locks", arguments.check_locks, "FOLDER",
             "with the same command on another host: test whether locks in this folder exclude each "
             "other, as workers on several hosts need, and exit");
-  line.Footer(
+  line.Notes(
       "A study file:\n"
       "  title = \"What does layer normalisation do?\"\n"
       "  seeds = 10                   # 1 to 10, or \"3,5,8-12\"\n"
@@ -187,16 +183,17 @@ void AddStudy(CommandLine& line) {
       "  [variants.with]\n"
       "  [variants.without]\n"
       "  layer_norm = false\n"
-      "\nExamples:\n"
-      "  ./upswing study configs/studies/post.toml\n"
-      "  ./upswing study configs/studies/post.toml --seeds 3 --out runs/short\n"
-      "  ./upswing study configs/studies/post.toml --status\n"
-      "  ./upswing study --work runs/post          one more worker, on any host\n"
-      "  ./upswing study --check-locks runs        on two hosts at the same time, before a study\n"
       "\nThe folder of a run is FOLDER/VARIANT/seedN, its log is FOLDER/VARIANT/seedN.log. The\n"
       "same command resumes stopped and killed runs; finished runs stay unchanged.\n"
       "Exit code 0: done; 1: a run failed; 2: bad usage or input; 130 or 143: stopped. A\n"
       "worker that a signal stops has exit code 75; any worker can resume its run.\n");
+  line.Examples(
+      "  ./upswing study configs/studies/post.toml\n"
+      "  ./upswing study configs/studies/post.toml --seeds 3 --out runs/short\n"
+      "  ./upswing study configs/studies/post.toml --status\n"
+      "  ./upswing study --work runs/post          one more worker, on any host\n"
+      "  ./upswing study --check-locks runs        on two hosts at the same time, before a "
+      "study\n");
   line.Check([&arguments] { CheckArguments(arguments); });
   line.Excludes("--work", {"--out", "--seeds", "--jobs", "--keep", "--status", "--prepare"});
   line.Excludes("--check-locks",

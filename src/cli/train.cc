@@ -92,8 +92,7 @@ void ShowChosenDefaults(const CommandLine& line, const CommandLine::ShowOptions&
   const std::string run = line.Last("--resume"),
                     file = line.Last("--config");  // "-": standard input
   Config config = run.empty() ? BuildConfig(file == "-" ? "" : file, flags) : ReadRunConfig(run);
-  Config scratch;
-  show(EverySetting(scratch), KnownOptions(config));
+  show(EverySetting(), KnownOptions(config));
 }
 
 /// The named agents, one paragraph each.
@@ -116,9 +115,6 @@ void AddTrain(CommandLine& line) {
   line.Text("--out", arguments.out, "FOLDER",
             "new run folder (default runs/AGENT-seedSEED); with --seeds the folder of all runs "
             "(default runs/AGENT)");
-  line.Removed("--task",
-               "the task is the double pendulum, and upswing.train(env=...) in Python has others");
-  line.Removed("--model", kInsteadOfModel);
   line.Text("--config", arguments.config, "FILE",
             "TOML file of settings; -: standard input; flags override the file");
   AddPlant(line, arguments.plant);
@@ -128,25 +124,24 @@ void AddTrain(CommandLine& line) {
   line.Flag("--print-config", arguments.print_config,
             "print the settings of this training as TOML for --config, and exit");
   AddManyOptions(line, arguments.seeds, arguments.jobs);
-  Config defaults;
-  line.Settings(EverySetting(defaults), arguments.flags);
+  line.Settings(EverySetting(), arguments.flags);
   line.ShowSettings(
       [&line](const CommandLine::ShowOptions& show) { ShowChosenDefaults(line, show); });
-  line.Footer(AgentsText() +
-              "\nExamples:\n"
-              "  ./upswing train                         train the default agent until solved\n"
-              "  ./upswing train --agent dqn --seed 3 --out runs/a\n"
-              "  ./upswing train --gamma 0.98 --hidden 128,128             set any setting\n"
-              "  ./upswing train --mass2 1.2 --no-stop-when-solved --steps 500000\n"
-              "  ./upswing train --plant realaigym --gravity 9.7 --out runs/board\n"
-              "  ./upswing train --randomize 0.25 --delay 0.02  draw a plant for each episode\n"
-              "  ./upswing train --resume runs/a --no-stop-when-solved --steps 2000000\n"
-              "  ./upswing train --agent fast --print-config > my.toml     edit, then --config\n"
-              "  ./upswing train --seeds 10              train or resume runs/d3qn/seed1 to 10\n"
-              "  ./upswing train --seeds 3,5,8-12 --jobs 2 --out runs/many\n"
-              "\nSIGINT and SIGTERM write a checkpoint and end the program with exit code 130 or\n"
-              "143. SIGUSR1 writes a checkpoint, and the training continues. Other exit codes:\n"
-              "0: done; 1: failed; 2: bad usage or input.\n");
+  line.Examples(
+      "  ./upswing train                         train the default agent until solved\n"
+      "  ./upswing train --agent dqn --seed 3 --out runs/a\n"
+      "  ./upswing train --gamma 0.98 --hidden 128,128             set any setting\n"
+      "  ./upswing train --mass2 1.2 --no-stop-when-solved --steps 500000\n"
+      "  ./upswing train --plant realaigym --gravity 9.7 --out runs/board\n"
+      "  ./upswing train --randomize 0.25 --delay 0.02  draw a plant for each episode\n"
+      "  ./upswing train --resume runs/a --no-stop-when-solved --steps 2000000\n"
+      "  ./upswing train --agent fast --print-config > my.toml     edit, then --config\n"
+      "  ./upswing train --seeds 10              train or resume runs/d3qn/seed1 to 10\n"
+      "  ./upswing train --seeds 3,5,8-12 --jobs 2 --out runs/many\n");
+  line.Notes(AgentsText() +
+             "\nSIGINT and SIGTERM write a checkpoint and end the program with exit code 130 or\n"
+             "143. SIGUSR1 writes a checkpoint, and the training continues. Other exit codes:\n"
+             "0: done; 1: failed; 2: bad usage or input.\n");
   line.Excludes("--resume", {"--out", "--config", "--plant"},
                 ": the run has its own settings and folder");
   line.Excludes("--seeds", {"--seed", "--resume"});

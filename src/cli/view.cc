@@ -248,14 +248,14 @@ void AddView(CommandLine& line) {
   AddPicture(line, a);
   AddEpisodeOptions(line, a.trial);
   AddTrialOptions(line, a.trial, "noise, random plants and the start of --episode");
-  line.Footer(
+  line.Notes(
       "Keys in the window:\n"
       "  space        pause                backspace  start again\n"
       "  right        one control step     - =        slower, faster\n"
       "  F1           MuJoCo's own keys    tab        MuJoCo's settings\n"
       "A double click selects a link; ctrl and the right mouse button pull it.\n\n"
-      "Python draws, with MuJoCo's viewer: `python3`, or the one that UPSWING_PYTHON names.\n\n"
-      "Examples:\n"
+      "Python draws, with MuJoCo's viewer: `python3`, or the one that UPSWING_PYTHON names.\n");
+  line.Examples(
       "  ./upswing view runs/d3qn-seed1\n"
       "  ./upswing view runs/d3qn-seed1 lqr --start 3.1,0,0,0\n"
       "  ./upswing view runs/d3qn-seed1 --set mass2=1.3 --delay 0.02\n"

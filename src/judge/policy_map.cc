@@ -32,11 +32,11 @@ DesignConditions DesignOf(const LoadedPolicy& loaded) {
   const std::string& settings = loaded.policy->info().config;
   if (settings.empty()) return design;
   try {
-    const Config config = ConfigIn(settings, "config");
+    const Config config = ReadRecord(settings, "config", true).config;
     design.point.disturbance = config.disturbance;
     design.randomization = config.randomization;
     design.known = true;
-  } catch (const Error&) {  // NOLINT(bugprone-empty-catch): written by another version
+  } catch (const Error&) {  // NOLINT(bugprone-empty-catch): values that this version refuses
   }
   return design;
 }

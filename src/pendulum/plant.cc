@@ -44,13 +44,10 @@ const std::array<PlantParameter, 18> kPlantParameters{{
 
 void Plant::Describe(Options& o) {
   o.Section("plant");
-  for (size_t k = 0; k < kPlantParameters.size(); ++k) {
-    const auto& [name, value, range, unit, help] = kPlantParameters.at(k);
+  for (const auto& [name, value, range, unit, help] : kPlantParameters) {
     Option& option = o.Add(&(this->*value), name, range, unit, help);
-    option.implied = k >= kMainParameters;
     if (value == &Plant::actuated_joint) option.step = 1;
   }
-  o.Explain("model", Concat("expected no setting model, which was removed; ", kInsteadOfModel));
   o.Alias("mass", {"mass1", "mass2"});
   o.Alias("length", {"length1", "length2"});
   o.Alias("damping", {"damping1", "damping2"});
@@ -58,13 +55,12 @@ void Plant::Describe(Options& o) {
 
 std::vector<std::pair<std::string, double>> PlantValues(const Plant& plant) {
   std::vector<std::pair<std::string, double>> values;
-  const Options options = OptionsOf(plant);
   const Plant usual;
-  const Options defaults = OptionsOf(usual);
-  for (size_t i = 0; i < options.all().size(); ++i) {
-    const Option& option = options.all()[i];
-    if (option.implied && option.number() == defaults.all()[i].number()) continue;
-    values.emplace_back(option.name, option.number());
+  for (size_t k = 0; k < kPlantParameters.size(); ++k) {
+    const auto& parameter = kPlantParameters.at(k);
+    const double value = plant.*parameter.value;
+    if (k >= kMainParameters && value == usual.*parameter.value) continue;
+    values.emplace_back(parameter.name, value);
   }
   return values;
 }

@@ -23,11 +23,6 @@ inline constexpr double kArmature = 0.01;       // of both joints, kg·m²
 inline constexpr double kCapsuleRadius = 0.04;  // of both links, m
 inline constexpr double kFrictionSlope = 100;   // of the dry friction's arctangent, s/rad
 
-/// Replacement of the setting `model` of version 0.5.0 (an MJCF file), for messages.
-inline constexpr std::string_view kInsteadOfModel =
-    "set the plant's numbers, such as mass1 and length1 (--plant FILE), or train on a Gymnasium "
-    "environment of your MJCF file in Python (docs/howto/gymnasium.md)";
-
 /// The parameters that can be set at run time. By default the links are solid capsules of a fixed
 /// radius, whose inertia and centre of mass follow from mass and length.
 struct Plant {
@@ -65,8 +60,8 @@ struct PlantParameter {
 extern const std::array<PlantParameter, 18> kPlantParameters;
 inline constexpr size_t kMainParameters = 8;
 
-/// Name and value of each parameter of the plant. Parameters that a file may lack (Option::implied)
-/// are left out at their defaults.
+/// Name and value of each parameter of the plant, as files have them. Only the first
+/// kMainParameters also stand there at their defaults.
 std::vector<std::pair<std::string, double>> PlantValues(const Plant& plant);
 
 /// Principal moments of inertia (kg·m²) of a solid capsule, across and along its axis: mass m (kg),

@@ -19,15 +19,12 @@ void Randomization::Describe(Options& o) {
         "largest random increase of delay, drawn for each episode")
       .step = kControlPeriod;
   o.Add(&sensor_latency, "randomize_sensor_latency", {0, kLongestLatency}, "s",
-        "largest random increase of sensor_latency, drawn for each episode")
-      .implied = true;
+        "largest random increase of sensor_latency, drawn for each episode");
   o.Add(&from_posterior, "randomize_posterior",
-        "draw the plant and the latency for each episode from the covariance of a twin (--plant)")
-      .implied = true;
+        "draw the plant and the latency for each episode from the covariance of a twin (--plant)");
   o.Add(&posterior, "posterior",
         "covariance for randomize_posterior, rows NAME NUMBERS of its lower triangle with ; "
-        "between them; --plant sets it")
-      .implied = true;
+        "between them; --plant sets it");
   o.Alias(
       "randomize",
       {"randomize_mass1", "randomize_mass2", "randomize_length1", "randomize_length2",

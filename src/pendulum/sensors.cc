@@ -40,19 +40,14 @@ PendulumState Reading(std::span<const double> past, const SensorModel& model, do
 }  // namespace
 
 void SensorModel::Describe(Options& o) {
-  // Files of version 0.4.0 lack these settings.
   o.Add(&latency, "sensor_latency", {0, kLongestLatency}, "s",
-        "age of the measured angles and velocities")
-      .implied = true;
+        "age of the measured angles and velocities");
   o.Add(&encoder_counts, "encoder_counts", {0, 1e9}, "1/revolution",
-        "encoder counts per revolution, which round the measured angles; 0: exact angles")
-      .implied = true;
+        "encoder counts per revolution, which round the measured angles; 0: exact angles");
   o.Add(&velocity_window, "velocity_window", {0, kLongestWindow}, "s",
-        "time over which velocities are differences of measured angles; 0: true velocities")
-      .implied = true;
+        "time over which velocities are differences of measured angles; 0: true velocities");
   o.Add(&velocity_filter, "velocity_filter", {0, kSlowestFilter}, "s",
-        "time constant of a first-order low-pass filter on measured velocities; 0: no filter")
-      .implied = true;
+        "time constant of a first-order low-pass filter on measured velocities; 0: no filter");
 }
 
 double SensorModel::encoder_step() const {

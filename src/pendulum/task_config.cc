@@ -24,7 +24,6 @@ void RewardConfig::Describe(Options& o) {
   Option& own = o.Add(&expression, "reward",
                       "reward of the training as an expression, such as \"E + h + 5*inverted\", in "
                       "place of the built-in reward and its weights");
-  own.implied = true;
   own.usual = "the built-in reward";
 }
 

@@ -30,16 +30,12 @@ inline bool IsStable(const Plant& plant) {
 /// cube root where a range begins at 0.
 inline Plant RandomPlant(Rng& rng) {
   Plant plant;
-  const Options options = OptionsOf(plant);
-  for (const Option& option : options.all()) {
-    if (option.implied && option.name != "actuated_joint") continue;
-    const auto& [low, high] = option.range;
-    *std::get<double*>(option.target) = low > 0
-                                            ? std::exp(rng.Uniform(std::log(low), std::log(high)))
-                                            : high * std::pow(rng.Uniform(), 3);
-    if (option.step > 0)
-      *std::get<double*>(option.target) = std::round(*std::get<double*>(option.target));
+  for (const PlantParameter& parameter : std::span(kPlantParameters).first(kMainParameters)) {
+    const auto& [low, high] = parameter.range;
+    plant.*parameter.value = low > 0 ? std::exp(rng.Uniform(std::log(low), std::log(high)))
+                                     : high * std::pow(rng.Uniform(), 3);
   }
+  plant.actuated_joint = std::round(std::exp(rng.Uniform(std::log(1), std::log(2))));
   return IsStable(plant) ? plant : RandomPlant(rng);
 }
 

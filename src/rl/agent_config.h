@@ -1,14 +1,11 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "base/env.h"
 #include "base/options.h"
-#include "base/thread_pool.h"
-#include "rl/agent.h"
 
 namespace upswing {
 
@@ -26,16 +23,13 @@ struct AgentSize {
   const char* store_flag = "--replay";  // flag that makes the store smaller
 };
 
-/// Settings of a learning algorithm, and everything that the program needs from the algorithm.
+/// Settings of a learning algorithm, and everything that the program needs to know about it before
+/// it makes the agent.
 struct AgentConfig {
   virtual ~AgentConfig() = default;
 
   /// One line per setting: name, range, unit, help.
   virtual void Describe(Options& options) = 0;
-
-  /// Makes an agent for environments of this kind. The threads of the pool share its work.
-  virtual std::unique_ptr<Agent> Make(const EnvSpec& spec, uint64_t seed,
-                                      ThreadPool& pool) const = 0;
 
   /// Throws BadInput if settings contradict each other although each is in its range. The message
   /// begins with a setting's name.

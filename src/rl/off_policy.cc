@@ -20,26 +20,25 @@ OffPolicyAgent::OffPolicyAgent(const OffPolicyConfig& config, const EnvSpec& spe
       act_action_(static_cast<size_t>(spec.num_envs) * actions.size),
       mirror_signs_(spec.mirror_signs),
       td_error_(config.batch),
-      settings_(config),
       action_space_(actions),
       sample_rng_(seed, "replay sampling"),
       replay_(config.replay, spec.obs_size, actions, config.prioritized),
-      n_step_(spec.num_envs, static_cast<int>(config.n_step), config.gamma, spec.obs_size, actions),
+      n_step_(spec.num_envs, static_cast<int>(config.n_step), spec.obs_size, actions),
       batch_(static_cast<int>(config.batch), spec.obs_size, actions.size) {
   CheckMirror(config.mirror, spec);
 }
 
 double OffPolicyAgent::learning_rate() const {
-  return Scheduled(settings_.learning_rate, settings_.learning_rate_end, steps_,
-                   settings_.learning_rate_steps);
+  return Scheduled(off_policy().learning_rate, off_policy().learning_rate_end, steps_,
+                   off_policy().learning_rate_steps);
 }
 
 double OffPolicyAgent::importance_exponent() const {
-  return Scheduled(settings_.importance_exponent, 1.0, steps_, settings_.learning_rate_steps);
+  return Scheduled(off_policy().importance_exponent, 1.0, steps_, off_policy().learning_rate_steps);
 }
 
 double OffPolicyAgent::AveragingTau(double tau) const {
-  const double initial = settings_.learning_rate;
+  const double initial = off_policy().learning_rate;
   return initial > 0 ? std::min(tau, tau * learning_rate() / initial) : tau;
 }
 
@@ -54,23 +53,24 @@ void OffPolicyAgent::Truncate(Matrix<const float> obs) {
 }
 
 int64_t OffPolicyAgent::updates_due() const {
-  const int64_t learning_steps = steps_ - settings_.learning_starts;
+  const int64_t learning_steps = steps_ - off_policy().learning_starts;
   if (learning_steps <= 0 || replay_.size() == 0) return 0;
-  return static_cast<int64_t>(static_cast<double>(learning_steps) * settings_.updates_per_step);
+  return static_cast<int64_t>(static_cast<double>(learning_steps) * off_policy().updates_per_step);
 }
 
 const Minibatch& OffPolicyAgent::Sample() {
-  if (settings_.prioritized) {
+  if (off_policy().prioritized) {
     replay_.SamplePrioritized(sample_rng_, importance_exponent(), pool_, batch_);
   } else {
     replay_.Sample(sample_rng_, batch_);
   }
-  if (settings_.mirror) MirrorHalf(sample_rng_, mirror_signs_, action_space_, batch_);
+  if (off_policy().mirror) MirrorHalf(sample_rng_, mirror_signs_, action_space_, batch_);
   return batch_;
 }
 
 void OffPolicyAgent::UpdatePriorities() {
-  if (settings_.prioritized) replay_.Prioritize(batch_, td_error_, settings_.priority_exponent);
+  if (off_policy().prioritized)
+    replay_.Prioritize(batch_, td_error_, off_policy().priority_exponent);
 }
 
 float OffPolicyAgent::CenteringShift(const Minibatch& batch, double errors) const {
@@ -79,7 +79,8 @@ float OffPolicyAgent::CenteringShift(const Minibatch& batch, double errors) cons
   for (size_t i = 0; i < batch.weight.size(); ++i) {
     per_shift += double{batch.weight[i]} * (1 - batch.discount[i]);
   }
-  return per_shift > 0 ? static_cast<float>(-settings_.reward_centering * errors / per_shift) : 0;
+  return per_shift > 0 ? static_cast<float>(-off_policy().reward_centering * errors / per_shift)
+                       : 0;
 }
 
 void OffPolicyAgent::CountErrors(double loss, double q, double td_error) {

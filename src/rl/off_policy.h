@@ -27,6 +27,9 @@ class OffPolicyAgent : public Agent {
   double importance_exponent() const;
 
  protected:
+  /// The settings, which the derived agent holds.
+  virtual const OffPolicyConfig& off_policy() const = 0;
+
   /// Throws BadInput if the config mirrors minibatches but the task has no mirror symmetry.
   OffPolicyAgent(const OffPolicyConfig& config, const EnvSpec& spec, const ActionSpace& actions,
                  uint64_t seed, ThreadPool& pool);
@@ -75,7 +78,6 @@ class OffPolicyAgent : public Agent {
  private:
   int64_t updates_due() const;
 
-  OffPolicyConfig settings_;
   ActionSpace action_space_;
   Rng sample_rng_;
   Replay replay_;

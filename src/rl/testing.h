@@ -9,7 +9,7 @@
 
 #include "base/safetensors.h"
 #include "base/testing.h"
-#include "rl/agent_config.h"
+#include "rl/agent.h"
 #include "rl/toy_env_testing.h"
 
 /// Helpers for tests of agents.
@@ -51,48 +51,51 @@ inline std::vector<std::byte> BytesOf(Agent& agent) {
 }
 
 /// Expects that 1 and 3 threads learn the same bits on toy environments.
-inline void ExpectThreadsChangeNoBit(const AgentConfig& config, int num_envs, int steps) {
+template <typename TestedAgent, typename Config>
+void ExpectThreadsChangeNoBit(const Config& config, int num_envs, int steps) {
   std::vector<std::byte> first;
   for (const int threads : {1, 3}) {
     ThreadPool pool(threads);
-    const auto agent = config.Make(ToyEnv::Spec(num_envs), 1, pool);
+    TestedAgent agent(config, ToyEnv::Spec(num_envs), 1, pool);
     ToyEnv env(num_envs);
-    Walk(*agent, env, steps);
-    EXPECT_GT(agent->updates(), 0);
-    if (threads == 1) first = BytesOf(*agent);
-    EXPECT_EQ(BytesOf(*agent), first);
+    Walk(agent, env, steps);
+    EXPECT_GT(agent.updates(), 0);
+    if (threads == 1) first = BytesOf(agent);
+    EXPECT_EQ(BytesOf(agent), first);
   }
 }
 
 /// Expects that an agent and its environments, saved after `steps` steps and loaded into others
 /// with another seed, go on with the same bits.
-inline void ExpectLoadedStateGoesOn(const AgentConfig& config, int steps) {
+template <typename TestedAgent, typename Config>
+void ExpectLoadedStateGoesOn(const Config& config, int steps) {
   ThreadPool pool(1);
-  const auto saved = config.Make(ToyEnv::Spec(2), 1, pool);
-  const auto loaded = config.Make(ToyEnv::Spec(2), 99, pool);
+  TestedAgent saved(config, ToyEnv::Spec(2), 1, pool);
+  TestedAgent loaded(config, ToyEnv::Spec(2), 99, pool);
   ToyEnv env(2), loaded_env(2, 99);
-  Walk(*saved, env, steps);
+  Walk(saved, env, steps);
   const auto state = [](Agent& agent, ToyEnv& toy) {
     return [&](const Archive& archive) {
       agent.State(archive.In("agent"));
       toy.State(archive.In("env"));
     };
   };
-  SaveAndLoad(state(*saved, env), state(*loaded, loaded_env));
-  EXPECT_EQ(saved->TakeMetrics(), loaded->TakeMetrics());
-  Walk(*saved, env, 100);
-  Walk(*loaded, loaded_env, 100);
-  EXPECT_EQ(BytesOf(*saved), BytesOf(*loaded));
-  EXPECT_EQ(saved->TakeMetrics(), loaded->TakeMetrics());
+  SaveAndLoad(state(saved, env), state(loaded, loaded_env));
+  EXPECT_EQ(saved.TakeMetrics(), loaded.TakeMetrics());
+  Walk(saved, env, 100);
+  Walk(loaded, loaded_env, 100);
+  EXPECT_EQ(BytesOf(saved), BytesOf(loaded));
+  EXPECT_EQ(saved.TakeMetrics(), loaded.TakeMetrics());
 }
 
 /// Expects that an observation that is not finite ends the learning.
-inline void ExpectPoisonFails(const AgentConfig& config) {
+template <typename TestedAgent, typename Config>
+void ExpectPoisonFails(const Config& config) {
   ThreadPool pool(1);
-  const auto agent = config.Make(ToyEnv::Spec(1), 1, pool);
+  TestedAgent agent(config, ToyEnv::Spec(1), 1, pool);
   ToyEnv env(1);
   env.poison = true;
-  EXPECT_THROW(Walk(*agent, env, 1), Error);
+  EXPECT_THROW(Walk(agent, env, 1), Error);
 }
 
 }  // namespace upswing

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "agents/named_agents.h"
 #include "base/checksum.h"
 #include "base/error.h"
 #include "base/text.h"
@@ -22,6 +23,14 @@ std::string PathOfStart(const std::string& setting) {
   const size_t mark = setting.rfind('#');
   constexpr size_t kDigits = 16;
   return setting.size() - mark == 1 + kDigits ? setting.substr(0, mark) : setting;
+}
+
+/// The first names, as many as fit into a readable line: `a, b and 3 more`.
+std::string FirstOf(std::vector<std::string> names) {
+  constexpr size_t kMostNames = 6;
+  const size_t more = names.size() - std::min(names.size(), kMostNames);
+  names.resize(names.size() - more);
+  return Concat(Join(names, ", "), more > 0 ? Concat(" and ", more, " more") : "");
 }
 
 }  // namespace
@@ -54,14 +63,16 @@ Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
 Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
   const fs::path file = run / RunFolder::kConfig;
   const std::string text = ReadOwnFile(file);
-  std::vector<std::string> missing = MissingSettings(text, file.string(), false);
-  if (missing.empty()) return ParseConfig(text, file.string(), flags);
-  constexpr size_t kMostNames = 6;  // more names make the line unreadable
-  const size_t more = missing.size() - std::min(missing.size(), kMostNames);
-  missing.resize(missing.size() - more);
-  throw BadInput(Concat(file.string(), ": expected every setting of this version, got none of ",
-                        Join(missing, ", "), more > 0 ? Concat(" and ", more, " more") : "",
-                        "; another version wrote the file"));
+  const RecordedConfig record = ReadRecord(text, file.string(), false);
+  if (!record.missing.empty()) {
+    throw BadInput(Concat(file.string(), ": expected every setting of this version, got none of ",
+                          FirstOf(record.missing), "; another version wrote the file"));
+  }
+  if (!record.unknown.empty()) {
+    throw BadInput(Concat(file.string(), ": expected only settings of this version, got ",
+                          FirstOf(record.unknown), "; another version wrote the file"));
+  }
+  return ParseConfig(text, file.string(), flags);
 }
 
 Config ReadSettings(const fs::path& file) {
@@ -84,13 +95,13 @@ std::string SettingsMark(const Config& config) {
 
 std::optional<std::string> TrainCommand(const PolicyInfo& info, const std::string& where) {
   constexpr const char* kWhere = "metadata \"config\"";
-  if (!ReplacementOf(info.agent).empty()) return std::nullopt;  // an agent of version 0.5.0
+  const auto agents = EmbeddedAgents();
+  if (std::ranges::find(agents, info.agent, &NamedAgent::name) == agents.end()) return std::nullopt;
   try {
-    const Config named = BuildConfig("", {{"agent", info.agent, "metadata \"agent\""}});
-    if (!MissingSettings(info.config, kWhere, true).empty()) return std::nullopt;
-    Config config = named;
-    ApplyToml(OptionsOf(config), info.config, kWhere);
-
+    const RecordedConfig record = ReadRecord(info.config, kWhere, true);
+    if (!record.is_of_this_version()) return std::nullopt;
+    const Config& config = record.config;
+    const Config named = BuildConfig("", {{"agent", info.agent}});
     std::string command =
         Concat("./upswing train --agent ", info.agent, " --seed ", config.train.seed);
     for (const auto& [option, usual] : Differences(OptionsOf(config), OptionsOf(named))) {

@@ -22,8 +22,8 @@ Config BuildConfig(const std::filesystem::path& file, const std::vector<FlagValu
 std::shared_ptr<const Policy> StartPolicy(Config& config);
 
 /// Reads the settings of a run folder and applies the flags. Also throws BadInput if the run's file
-/// lacks a setting. Such a run is from another version, and today's default may differ from the
-/// value it used.
+/// lacks a setting or has another one. Such a run is from another version: it may have used another
+/// value than today's default.
 Config ReadRunConfig(const std::filesystem::path& run, const std::vector<FlagValue>& flags = {});
 
 /// Reads the settings of a variant from a regular file in a study's folder. Throws BadInput.
@@ -39,9 +39,9 @@ std::string SettingsMark(const Config& config);
 /// The shell command that trains a policy like this: its agent, its seed, and a flag per setting
 /// that differs from the named agent's.
 ///
-/// Nothing if the policy's file lacks a setting, as files of other versions may, or if its agent
-/// was removed. Nothing if a setting's text does not fit on a command line. Throws BadInput that
-/// begins with `where`.
+/// Nothing if the policy's file has an agent or a setting that this version lacks, as files of
+/// other versions may. Nothing if a setting's text does not fit on a command line. Throws BadInput
+/// that begins with `where`.
 std::optional<std::string> TrainCommand(const PolicyInfo& info, const std::string& where);
 
 }  // namespace upswing

@@ -19,8 +19,8 @@ std::vector<FlagValue> ReadSettings(const toml::node& node, const std::string& n
   const auto* table = node.as_table();
   const std::string place = PlaceOf(node, where);
   if (table == nullptr) throw BadInput(Concat(place, ": ", name, ": expected a table of settings"));
-  Config scratch;  // checks the values by taking them
-  std::vector<FlagValue> settings = ApplyTable(EverySetting(scratch), *table, where, true);
+  // The copies of all settings take the values, which checks them.
+  std::vector<FlagValue> settings = ApplyTable(EverySetting(), *table, where, true);
   for (const FlagValue& setting : settings) {
     if (setting.name == "seed") {
       throw BadInput(Concat(setting.where,
@@ -97,9 +97,8 @@ void CheckKeys(const toml::table& study, const std::string& where) {
   for (const auto& [key, node] : study) {
     const std::string name(key.str());
     if (std::ranges::find(known, name) != known.end()) continue;
-    Config scratch;
     const bool is_setting = std::ranges::any_of(
-        EverySetting(scratch).all(), [&](const Option& option) { return option.name == name; });
+        EverySetting().all(), [&](const Option& option) { return option.name == name; });
     if (is_setting && name != "seed") {
       throw BadInput(Concat(PlaceOf(node, where), ": ", name,
                             ": expected in [settings] or [variants.NAME], ",

@@ -86,11 +86,11 @@ void AddFake(CommandLine& line) {
   line.Flag("--crossed", a.config.machine.crossed, "swap the encoders of the joints");
   line.Flag("--draw", a.draw, "play a machine drawn from the twin's covariance");
   line.Flag("--quiet", a.quiet, "print no line per second");
-  line.Footer(
+  line.Notes(
       "The machine answers each command with a reading (docs/reference/machine-link.md). It\n"
       "runs in real time until Ctrl-C. Times of faults count from the first command with\n"
-      "motors on. UDP has no password: listen only on networks that you trust.\n\n"
-      "Examples:\n"
+      "motors on. UDP has no password: listen only on networks that you trust.\n");
+  line.Examples(
       "  ./upswing fake twin.toml --link udp:4000\n"
       "  ./upswing fake twin.toml --link udp:4000 --loss 0.05 --delay 0.002 --jitter 0.001\n"
       "  ./upswing fake twin.toml --link pty --stuck 2@1.5\n");

@@ -108,14 +108,14 @@ void AddLearn(CommandLine& line) {
   line.Arguments(OptionsOf(a.config));
   AddSeed(line, a.seed, "the excitations and of simulated tries");
   AddThreads(line, a.threads);
-  line.Footer(
+  line.Notes(
       "The links must hang at rest. Torques grow until they move. The program identifies a twin\n"
       "from this motion, designs a controller on it and tries it. After a failed try it\n"
       "identifies the twin again. You need to know --max-torque, --encoder-counts and the signs\n"
       "of angles and torques (docs/howto/real-machine.md). Beyond a limit and at Ctrl-C the loop\n"
       "brakes. A second Ctrl-C switches the motors off at once.\n"
-      "Exit code: 0 if the machine balanced for --hold, 130 after Ctrl-C, else 1.\n\n"
-      "Examples:\n"
+      "Exit code: 0 if the machine balanced for --hold, 130 after Ctrl-C, else 1.\n");
+  line.Examples(
       "  ./upswing machine learn --link realaigym-twin --encoder-counts 16384 --out rehearsal\n"
       "  ./upswing machine learn --link serial:/dev/ttyACM0 --encoder-counts 4096 \\\n"
       "    --max-torque 3 --max-velocity 15 --out today\n");

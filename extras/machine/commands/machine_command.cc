@@ -383,7 +383,7 @@ void AddPredictions(CommandLine& line, MachineArguments& a) {
 void AddCheck(CommandLine& line) {
   MachineArguments& a = line.Runs(RunCheck);
   AddLogs(line, a, "figure of the log to draw, .svg or .png");
-  line.Footer(
+  line.Notes(
       "Prints a line for each finding. A note is a fact, such as the rate. A warning needs a\n"
       "look. A fault misleads an analysis of the log: degrees, swapped columns, a stuck\n"
       "encoder. Exit code: 0 without a fault, 1 with one, 2 if a log cannot be read.\n\n"
@@ -394,8 +394,8 @@ void AddCheck(CommandLine& line) {
       "  velocity1 = \"omega1\"                       # rad/s, deg/s, turn/s, rpm\n"
       "  commanded1 = {column = \"u\", unit = \"mNm\"}   # Nm, mNm; also measured1, push1\n"
       "  piece = \"run\"        # a change of this column begins a separate piece\n"
-      "  absolute = true      # joint 2 is measured against the vertical\n\n"
-      "Examples:\n"
+      "  absolute = true      # joint 2 is measured against the vertical\n");
+  line.Examples(
       "  ./upswing machine check trajectory.csv\n"
       "  ./upswing machine check logs/*.csv.gz --json\n"
       "  ./upswing machine check swing.csv --columns columns.toml --figure swing.svg\n");
@@ -414,13 +414,13 @@ void AddIdentify(CommandLine& line) {
           "number of folds of the cross-validation that chooses the model; 0: none");
   own.Add(&a.seconds, "seconds", {0.05, 10}, "s", "length of a window");
   line.Arguments(own);
-  line.Footer(
+  line.Notes(
       "Fits masses, centres, inertias, friction, delay and lag to windows of the logs. Each\n"
       "window has a free start state. The commanded torques drive the model; the reported\n"
       "ones are a second measurement. Cross-validation chooses the model. The twin's\n"
       "covariance includes the differences between sessions.\n"
-      "Exit code: 0, or 1 if the twin's logs have faults; see machine check.\n\n"
-      "Examples:\n"
+      "Exit code: 0, or 1 if the twin's logs have faults; see machine check.\n");
+  line.Examples(
       "  ./upswing machine identify logs/*.csv --plant realaigym-c1 --out twin.toml\n"
       "  ./upswing machine identify run1.csv run2.csv --plant arm.toml --out arm-twin.toml \\\n"
       "    --folds 0\n");
@@ -433,11 +433,11 @@ void AddAdapt(CommandLine& line) {
   AddLogs(line, a, "figure of the prediction errors to draw, .svg or .png");
   line.Text("--out", a.out, "FILE", "TOML file of today's twin to write");
   AddPredictions(line, a);
-  line.Footer(
+  line.Notes(
       "Fits the twin of today to 10 to 30 s of today's logs. The covariance of TWIN says how\n"
       "much each value may change. A plant file has none: all values may change widely.\n"
-      "Exit code: 0, or 1 if the twin's logs have faults; see machine check.\n\n"
-      "Examples:\n"
+      "Exit code: 0, or 1 if the twin's logs have faults; see machine check.\n");
+  line.Examples(
       "  ./upswing machine adapt twin.toml first.csv --out today.toml\n"
       "  ./upswing machine adapt realaigym-c1 run1.csv run2.csv --out today.toml\n"
       "  ./upswing machine validate today.toml later.csv --against twin.toml\n");
@@ -451,11 +451,10 @@ void AddValidate(CommandLine& line) {
   line.Text("--csv", a.csv, "FILE",
             "CSV file to write, measured and predicted angles of 1 s of each log");
   AddPredictions(line, a);
-  line.Footer(
+  line.Notes(
       "Prints the median error of predictions over 0.2, 0.5 and 1 s, by session.\n"
-      "Exit code: 0, or 1 if the logs have faults; see machine check.\n\n"
-      "Examples:\n"
-      "  ./upswing machine validate twin.toml new/*.csv --against realaigym-c1\n");
+      "Exit code: 0, or 1 if the logs have faults; see machine check.\n");
+  line.Examples("  ./upswing machine validate twin.toml new/*.csv --against realaigym-c1\n");
 }
 
 }  // namespace
@@ -466,8 +465,7 @@ void AddMachine(CommandLine& line) {
   AddLearn(line.Subcommand("learn", "Learn to balance a machine about which nothing is known"));
   AddAdapt(line.Subcommand("adapt", "Fit a twin to today's first logs"));
   AddValidate(line.Subcommand("validate", "Compare a twin's predictions with logs"));
-  line.Footer(
-      "Examples:\n"
+  line.Examples(
       "  ./upswing machine check logs/*.csv.gz\n"
       "  ./upswing machine identify logs/*.csv --plant realaigym-c1 --out twin.toml\n"
       "  ./upswing machine adapt twin.toml today.csv --out today.toml\n"

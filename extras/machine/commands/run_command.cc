@@ -202,7 +202,7 @@ void AddRun(CommandLine& line) {
   line.Flag("--draw", a.draw,
             "with a twin as --link: play a machine drawn from the twin's covariance");
   line.Excludes("--compensation", {"--differences"}, ", which estimates no friction");
-  line.Footer(
+  line.Notes(
       "The loop waits for readings (idle), then for the start state (armed). From hanging links,\n"
       "a pulse of the motor then has to move both joints (probing). Then the controller drives\n"
       "(running). Afterwards, at Ctrl-C and beyond a limit it brakes until\n"
@@ -213,8 +213,8 @@ void AddRun(CommandLine& line) {
       "with the reason in a line.\n\n"
       "A controller is designed for the twin without dry friction. --made-for changes this\n"
       "plant.\n"
-      "Read docs/howto/real-machine.md before you switch on motors.\n\n"
-      "Examples:\n"
+      "Read docs/howto/real-machine.md before you switch on motors.\n");
+  line.Examples(
       "  ./upswing run tvlqr --link twin.toml --compensation 0.95 --log rehearsal.csv\n"
       "  ./upswing fake twin.toml --link udp:4000        in another terminal\n"
       "  ./upswing run runs/d3qn-seed1 --link udp:127.0.0.1:4000 --twin twin.toml\n"

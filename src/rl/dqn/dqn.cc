@@ -48,9 +48,9 @@ void Dqn::Observe(const StepResult& result) {
   const Matrix<const float> s(act_obs_.data(), N, D_), s_next(result.next_obs.data(), N, D_);
   for (int env = 0; env < N; ++env) {
     ExpectFinite(result, env);
-    const double r = config_.reward_scale * result.reward[env];
+    const double r = config_.off_policy.reward_scale * result.reward[env];
     // Only a terminal s' has no value. An episode that runs out of time bootstraps from s'.
-    const double discount = result.terminated[env] != 0 ? 0 : config_.gamma;
+    const double discount = result.terminated[env] != 0 ? 0 : config_.off_policy.gamma;
     Store(env, {s.row(env), s_next.row(env), {&act_action_[env], 1}, r, discount},
           result.done(env));
   }
@@ -71,26 +71,28 @@ void Dqn::Update(const Minibatch& batch) {
 
   // Move θ with Adam, then θ⁻: θ⁻ ← θ⁻ + τ (θ - θ⁻), or θ⁻ ← θ every target_period updates.
   const bool polyak = config_.target_period == 0;
-  norm_sum_ += online_.Step({batch.obs.data(), B_, D_}, learning_rate(), config_.max_gradient_norm,
-                            theta_target_, polyak ? config_.tau : 0.0, pool_);
+  norm_sum_ += online_.Step({batch.obs.data(), B_, D_}, learning_rate(),
+                            config_.off_policy.max_gradient_norm, theta_target_,
+                            polyak ? config_.tau : 0.0, pool_);
   ++updates_;
   if (!polyak && updates_ % config_.target_period == 0) {
     std::ranges::copy(online_.theta(), theta_target_.begin());
   }
 
   if (config_.policy_tau < 1) AveragePolicy();
-  if (config_.reward_centering > 0) CenterValues(batch);
+  if (config_.off_policy.reward_centering > 0) CenterValues(batch);
 }
 
 void Dqn::BackwardRows(const Minibatch& batch, RowRange rows) {
   const int A = static_cast<int>(torques_.size());
   const Matrix<const float> s(batch.obs.data(), B_, D_), s_next(batch.next_obs.data(), B_, D_);
   const Matrix<float> q(q_, B_, A), q_target(q_target_, B_, A), dq(dq_, B_, A);
-  const Matrix<float> q_select(config_.double_q || config_.mirror ? q_select_ : q_target_, B_, A);
+  const Matrix<float> q_select(
+      config_.double_q || config_.off_policy.mirror ? q_select_ : q_target_, B_, A);
 
   // y = r + γⁿ Q(s', a*; θ⁻), with a* by θ in Double DQN, else by θ⁻. `mirror` evaluates at σs'.
   online_.Forward(config_.double_q ? online_.theta() : theta_target_, s_next, rows, q_select);
-  if (config_.mirror) {
+  if (config_.off_policy.mirror) {
     ForwardMirrored(s_next, rows, q_target);
   } else if (config_.double_q) {
     online_.Forward(theta_target_, s_next, rows, q_target);

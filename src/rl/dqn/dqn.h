@@ -64,6 +64,8 @@ class Dqn : public OffPolicyAgent {
   /// Moves theta_policy_ towards θ by Polyak averaging.
   void AveragePolicy();
 
+  const OffPolicyConfig& off_policy() const override { return config_.off_policy; }
+
   DqnConfig config_;
   int D_, B_;
   std::vector<double> torques_;  // (A) N·m

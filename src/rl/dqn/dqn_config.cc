@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "base/text.h"
-#include "rl/dqn/dqn.h"
 
 namespace upswing {
 
@@ -17,8 +16,8 @@ void DqnConfig::Describe(Options& o) {
   o.Add(&double_q, "double",
         "Double DQN: choose the next action online, value it with the target network");
   o.Add(&dueling, "dueling", "dueling network: Q = V + A - mean(A)");
-  o.Add(&levels, "levels", {2, 1001}, "", "number of evenly spaced torque levels").implied = true;
-  OffPolicyConfig::Describe(o);
+  o.Add(&levels, "levels", {2, 1001}, "", "number of evenly spaced torque levels");
+  off_policy.Describe(o);
   o.Add(&tau, "tau", kUnit, "", "Polyak factor of the target network, per update");
   o.Add(&target_period, "target_period", {0, 1e9}, "updates",
         "copy the target network every N updates; 0: Polyak averaging");
@@ -31,11 +30,7 @@ void DqnConfig::Describe(Options& o) {
         "factor on the probability of a random action after each episode");
 }
 
-std::unique_ptr<Agent> DqnConfig::Make(const EnvSpec& spec, uint64_t seed, ThreadPool& pool) const {
-  return std::make_unique<Dqn>(*this, spec, seed, pool);
-}
-
-void DqnConfig::Check(int64_t /*num_envs*/) const { OffPolicyConfig::Check(); }
+void DqnConfig::Check(int64_t /*num_envs*/) const { off_policy.Check(); }
 
 AgentSize DqnConfig::Size(const EnvSpec& spec) const {
   const int D = spec.obs_size;
@@ -46,8 +41,8 @@ AgentSize DqnConfig::Size(const EnvSpec& spec) const {
           .arrays = 8,
           .saved_arrays = 5,
           .transition = 2.0 * D + 3,  // s, s', a, r, discount
-          .capacity = static_cast<double>(replay),
-          .batch = static_cast<double>(batch),
+          .capacity = static_cast<double>(off_policy.replay),
+          .batch = static_cast<double>(off_policy.batch),
           .widest = static_cast<double>(std::ranges::max(hidden)),
           .layers = 3 * static_cast<double>(hidden.size())};
 }
@@ -58,7 +53,7 @@ std::string DqnConfig::Text() const {
 }
 
 std::vector<std::string> DqnConfig::Warnings(int64_t steps, int64_t /*num_envs*/) const {
-  std::vector<std::string> warnings = OffPolicyConfig::Warnings(steps);
+  std::vector<std::string> warnings = off_policy.Warnings(steps);
   if (tau == 0 && target_period == 0) {
     warnings.emplace_back("tau is 0: the target network never changes");
   }

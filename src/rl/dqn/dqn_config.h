@@ -10,14 +10,12 @@
 namespace upswing {
 
 /// Settings of the DQN agent.
-struct DqnConfig : AgentConfig, OffPolicyConfig {
-  DqnConfig() {
-    n_step = 5;
-    priority_exponent = 0.7;
-    importance_exponent = 0.2;
-    updates_per_step = 0.04;
-    learning_rate_steps = 350000;
-  }
+struct DqnConfig : AgentConfig {
+  OffPolicyConfig off_policy = {.n_step = 5,
+                                .priority_exponent = 0.7,
+                                .importance_exponent = 0.2,
+                                .updates_per_step = 0.04,
+                                .learning_rate_steps = 350000};
   std::vector<int64_t> hidden = {256, 256};
   int64_t head = 128;
   bool layer_norm = true, double_q = true, dueling = true;
@@ -28,7 +26,6 @@ struct DqnConfig : AgentConfig, OffPolicyConfig {
   double epsilon_start = 1.0, epsilon_end = 0.05, epsilon_decay = 0.977;
 
   void Describe(Options& options) override;
-  std::unique_ptr<Agent> Make(const EnvSpec& spec, uint64_t seed, ThreadPool& pool) const override;
   void Check(int64_t num_envs) const override;
   AgentSize Size(const EnvSpec& spec) const override;
   std::string Text() const override;

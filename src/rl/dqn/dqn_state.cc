@@ -9,12 +9,12 @@
 
 namespace upswing {
 Dqn::Dqn(const DqnConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool)
-    : OffPolicyAgent(config, spec,
+    : OffPolicyAgent(config.off_policy, spec,
                      ActionSpace::Discrete(ActionTable(spec, config.levels, "dqn").size()), seed,
                      pool),
       config_(config),
       D_(spec.obs_size),
-      B_(static_cast<int>(config.batch)),
+      B_(static_cast<int>(config.off_policy.batch)),
       torques_(ActionTable(spec, config.levels, "dqn")),
       online_(config.Shape(D_, static_cast<int>(torques_.size())), B_,
               Rng(seed, "initial parameters")),
@@ -50,8 +50,8 @@ Metrics Dqn::TakeMetrics() {
 }
 
 std::unique_ptr<NetworkPolicy> Dqn::ExportPolicy(PolicyInfo info) const {
-  info.gamma = config_.gamma;
-  info.reward_scale = config_.reward_scale;
+  info.gamma = config_.off_policy.gamma;
+  info.reward_scale = config_.off_policy.reward_scale;
   NetworkPolicyParts parts{ActionRule::kLevels, online_.network().shape()};
   const std::span<const float> theta = config_.policy_tau < 1 ? theta_policy_ : online_.theta();
   parts.parameters.assign(theta.begin(), theta.end());

@@ -22,13 +22,13 @@ DqnConfig SmallDqn() {
   DqnConfig config;
   config.hidden = {16, 16};
   config.head = 8;
-  config.batch = 16;
-  config.replay = 1000;
-  config.learning_starts = 32;
-  config.updates_per_step = 0.5;
-  config.n_step = 1;
-  config.reward_scale = 1;
-  config.reward_centering = 0;
+  config.off_policy.batch = 16;
+  config.off_policy.replay = 1000;
+  config.off_policy.learning_starts = 32;
+  config.off_policy.updates_per_step = 0.5;
+  config.off_policy.n_step = 1;
+  config.off_policy.reward_scale = 1;
+  config.off_policy.reward_centering = 0;
   config.levels = 3;
   return config;
 }
@@ -83,7 +83,7 @@ TEST(Torques, AreTheChoicesOfATaskThatHasThem) {
   EXPECT_EQ(ActionTable(spec, 3, "dqn"), spec.choices);
   // The agent's networks have an output for each choice.
   DqnConfig config;
-  config.mirror = false;
+  config.off_policy.mirror = false;
   ThreadPool pool(1);
   const auto policy = Dqn(config, spec, 1, pool).ExportPolicy({});
   EXPECT_EQ(policy->num_values(), 2);
@@ -110,7 +110,7 @@ double LossByHand(const DqnConfig& config, std::span<const float> online,
   for (size_t i = 0; i < batch.action.size(); ++i) {
     const auto chosen = ArgMax(q(config.double_q ? online : target, batch.next_obs[i]));
     // The mirror image has the opposite observation, and its torques are in reverse order.
-    const double next = config.mirror
+    const double next = config.off_policy.mirror
                             ? q(target, -batch.next_obs[i])[static_cast<size_t>(2 - chosen)]
                             : q(target, batch.next_obs[i])[static_cast<size_t>(chosen)];
     const double y = batch.reward[i] + batch.discount[i] * next;
@@ -124,8 +124,8 @@ class DqnVariants : public ::testing::TestWithParam<std::tuple<bool, bool, bool>
 
 TEST_P(DqnVariants, LossIsThatOfThePapersAndFalls) {
   DqnConfig config = SmallDqn();
-  std::tie(config.double_q, config.dueling, config.mirror) = GetParam();
-  config.learning_rate = config.learning_rate_end = 1e-2;
+  std::tie(config.double_q, config.dueling, config.off_policy.mirror) = GetParam();
+  config.off_policy.learning_rate = config.off_policy.learning_rate_end = 1e-2;
   ThreadPool pool(1);
   Dqn agent(config, ToyEnv::Spec(1), 1, pool);
   const Minibatch batch = RandomBatch(16);
@@ -146,10 +146,11 @@ INSTANTIATE_TEST_SUITE_P(Flags, DqnVariants,
 
 TEST(Dqn, CenteringShiftsAllValuesByAShareOfTheMeanError) {
   DqnConfig config = SmallDqn();
-  config.learning_rate = config.learning_rate_end = 0;  // only the shift changes values
+  config.off_policy.learning_rate = config.off_policy.learning_rate_end =
+      0;  // only the shift changes values
   config.tau = 0;
-  config.reward_centering = 0.5;
-  config.mirror = false;
+  config.off_policy.reward_centering = 0.5;
+  config.off_policy.mirror = false;
   for (const bool dueling : {false, true}) {
     config.dueling = dueling;
     ThreadPool pool(1);
@@ -187,8 +188,8 @@ TEST(Dqn, WeightsMultiplyTheGradientOfTheirTransition) {
   // A transition of weight 1/2, twice, equals one of weight 1. A transition of weight 0 changes
   // nothing.
   DqnConfig config = SmallDqn();
-  config.batch = 4;
-  config.max_gradient_norm = 1e9;
+  config.off_policy.batch = 4;
+  config.off_policy.max_gradient_norm = 1e9;
   ThreadPool pool(1);
   Minibatch whole = RandomBatch(4), parts = RandomBatch(4);
   whole.weight = {1, 0, 1, 0};
@@ -226,12 +227,12 @@ TEST(Dqn, MirroringNegatesTorquesAndSomeObservations) {
   EXPECT_LT(mirrored, 48);
 
   DqnConfig config = SmallDqn();
-  config.mirror = true;
+  config.off_policy.mirror = true;
   ThreadPool pool(1);
   EnvSpec spec = ToyEnv::Spec(1);
   spec.mirror_signs.clear();
   EXPECT_THROW(Dqn(config, spec, 1, pool), Error);
-  config.mirror = false;
+  config.off_policy.mirror = false;
   EXPECT_NO_THROW(Dqn(config, spec, 1, pool));
   spec.action_limit = {1, 1};
   EXPECT_THROW(Dqn(config, spec, 1, pool), Error);
@@ -263,11 +264,11 @@ TEST(Dqn, TheExportedPolicyIsAnAverageOfTheLearnedOnes) {
 TEST(Dqn, TheAverageGrowsLongerAsTheLearningRateFalls) {
   DqnConfig config = SmallDqn();
   config.policy_tau = 0.5;
-  config.learning_rate = 1e-2;
-  config.learning_rate_end = 1e-3;
-  config.learning_rate_steps = 100;
-  config.updates_per_step = 0;
-  config.importance_exponent = 0.4;
+  config.off_policy.learning_rate = 1e-2;
+  config.off_policy.learning_rate_end = 1e-3;
+  config.off_policy.learning_rate_steps = 100;
+  config.off_policy.updates_per_step = 0;
+  config.off_policy.importance_exponent = 0.4;
   ThreadPool pool(1);
   Dqn agent(config, ToyEnv::Spec(1), 1, pool);
   ToyEnv env(1);
@@ -320,7 +321,7 @@ TEST(Dqn, ATruncationBootstrapsFromItsOwnLastObservationAndATerminationFromNothi
   // Tests the whole path: environment → agent → memory. Outward steps leave ±5; ten steps truncate
   // an episode. Starts are near 0, so an observation after a reset would be visible.
   DqnConfig config = SmallDqn();
-  config.updates_per_step = 0;
+  config.off_policy.updates_per_step = 0;
   ThreadPool pool(1);
   Dqn agent(config, ToyEnv::Spec(2), 1, pool);
   ToyEnv env(2);
@@ -331,7 +332,7 @@ TEST(Dqn, ATruncationBootstrapsFromItsOwnLastObservationAndATerminationFromNothi
     const float moved = t.next_obs[0] - t.obs[0];
     ASSERT_NEAR(moved, kTorques[static_cast<size_t>(t.action[0])], 1e-5);
     const bool left = std::abs(t.next_obs[0]) > 5;
-    ASSERT_EQ(t.discount, left ? 0.0F : static_cast<float>(config.gamma));
+    ASSERT_EQ(t.discount, left ? 0.0F : static_cast<float>(config.off_policy.gamma));
     terminated += left ? 1 : 0;
   }
   EXPECT_EQ(agent.replay().size(), 800);
@@ -379,7 +380,7 @@ TEST(Dqn, LearnsToStayNearZero) {
 
 TEST(Dqn, TheExampleOfTheFirstUpdateMovesTheGuessToTheTarget) {
   DqnConfig config = SmallDqn();
-  config.batch = 1;  // so that no other transition moves the guess
+  config.off_policy.batch = 1;  // so that no other transition moves the guess
   ThreadPool pool(1);
   for (const uint64_t seed : {1, 2, 3, 4, 5}) {
     Dqn agent(config, ToyEnv::Spec(1), seed, pool);
@@ -399,23 +400,23 @@ TEST(Dqn, TheExampleOfTheFirstUpdateMovesTheGuessToTheTarget) {
 
 TEST(Dqn, TheNumberOfThreadsChangesNoBit) {
   DqnConfig config = SmallDqn();
-  config.batch = 128;  // four slices
+  config.off_policy.batch = 128;  // four slices
   // Layers of 130 and 70 inputs have five tasks. Their 19,000 parameters make three chunks of Adam.
   config.hidden = {130};
   config.head = 70;
-  ExpectThreadsChangeNoBit(config, 4, 100);
+  ExpectThreadsChangeNoBit<Dqn>(config, 4, 100);
 }
 
 TEST(Dqn, LoadedStateContinuesWithTheSameBits) {
   DqnConfig config = SmallDqn();
-  config.n_step = 3;
-  config.prioritized = config.mirror = true;
+  config.off_policy.n_step = 3;
+  config.off_policy.prioritized = config.off_policy.mirror = true;
   config.policy_tau = 0.1;
-  ExpectLoadedStateGoesOn(config, 101);
+  ExpectLoadedStateGoesOn<Dqn>(config, 101);
 }
 
 TEST(Dqn, NumbersThatAreNotFiniteAreFailures) {
-  ExpectPoisonFails(SmallDqn());
+  ExpectPoisonFails<Dqn>(SmallDqn());
 
   ThreadPool pool(1);
   Dqn other(SmallDqn(), ToyEnv::Spec(1), 1, pool);

@@ -5,7 +5,6 @@
 #include "base/error.h"
 #include "base/format.h"
 #include "base/text.h"
-#include "rl/ppo/ppo.h"
 
 namespace upswing {
 namespace {
@@ -74,10 +73,6 @@ void PpoConfig::Describe(Options& o) {
         "target KL divergence of an update, to which the actor's learning rate adapts; 0: off");
   o.Add(&max_gradient_norm, "max_gradient_norm", kPositive, "",
         "largest global norm of the gradient, of actor and critic each, which is clipped to it");
-}
-
-std::unique_ptr<Agent> PpoConfig::Make(const EnvSpec& spec, uint64_t seed, ThreadPool& pool) const {
-  return std::make_unique<Ppo>(*this, spec, seed, pool);
 }
 
 void PpoConfig::Check(int64_t num_envs) const {

@@ -29,7 +29,6 @@ struct PpoConfig : AgentConfig {
   double max_gradient_norm = 0.5;
 
   void Describe(Options& options) override;
-  std::unique_ptr<Agent> Make(const EnvSpec& spec, uint64_t seed, ThreadPool& pool) const override;
   void Check(int64_t num_envs) const override;
   AgentSize Size(const EnvSpec& spec) const override;
   std::string Text() const override;

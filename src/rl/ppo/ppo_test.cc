@@ -265,7 +265,7 @@ TEST_P(PpoActions, TheNumberOfThreadsChangesNoBit) {
   config.hidden = {130, 70};  // several tasks per layer, three chunks of Adam
   config.batch = 128;
   config.mirror = true;
-  ExpectThreadsChangeNoBit(config, 80, 40);  // three blocks of environments
+  ExpectThreadsChangeNoBit<Ppo>(config, 80, 40);  // three blocks of environments
 }
 
 TEST_P(PpoActions, LoadedStateContinuesWithTheSameBits) {
@@ -273,7 +273,7 @@ TEST_P(PpoActions, LoadedStateContinuesWithTheSameBits) {
   config.mirror = true;
   config.value_clip = 0.2;
   // between two rollouts, and within one
-  for (const int steps : {32, 41}) ExpectLoadedStateGoesOn(config, steps);
+  for (const int steps : {32, 41}) ExpectLoadedStateGoesOn<Ppo>(config, steps);
 }
 
 TEST(Ppo, AStateThatIsNoneIsRefused) {
@@ -334,7 +334,7 @@ TEST(Ppo, SettingsThatDoNotFitAreRefused) {
   EXPECT_NO_THROW(Ppo(SmallPpo(), spec, 1, pool));
 }
 
-TEST(Ppo, NumbersThatAreNotFiniteAreFailures) { ExpectPoisonFails(SmallPpo()); }
+TEST(Ppo, NumbersThatAreNotFiniteAreFailures) { ExpectPoisonFails<Ppo>(SmallPpo()); }
 
 }  // namespace
 }  // namespace upswing

@@ -9,11 +9,12 @@
 namespace upswing {
 
 /// Joins the steps of each environment into transitions over n steps (Sutton, 1988; Mnih et al.,
-/// 2016, Section 4). At the end of an episode, the last steps become shorter transitions. Each
-/// transition has the discount γᵏ of its true length k.
+/// 2016, Section 4). At the end of an episode, the last steps become shorter transitions. The
+/// discount of a transition is the product of its steps' discounts: γᵏ for k steps, or 0 if the
+/// last one terminates.
 class NStep {
  public:
-  NStep(int num_envs, int n, double gamma, int obs_size, ActionSpace actions);
+  NStep(int num_envs, int n, int obs_size, ActionSpace actions);
 
   /// Adds one step of environment `env`, whose discount is γ, or 0 after a termination. Adds every
   /// transition that is now complete to `replay`. `done` ends the episode.
@@ -21,7 +22,7 @@ class NStep {
 
   /// Ends the episode of environment `env` by a truncation at `next_obs` (D).
   void Truncate(int env, std::span<const float> next_obs, Replay& replay) {
-    Complete(env, next_obs, false, true, replay);
+    Complete(env, next_obs, true, replay);
   }
 
   /// Number of steps, over all environments, that are not yet part of a transition.
@@ -32,7 +33,7 @@ class NStep {
 
  private:
   /// Adds every complete transition of the waiting steps to `replay`; with `done` all of them.
-  void Complete(int env, std::span<const float> next_obs, bool terminal, bool done, Replay& replay);
+  void Complete(int env, std::span<const float> next_obs, bool done, Replay& replay);
 
   /// The rows (n × anything) of environment `env` in an array of waiting steps.
   template <typename T>
@@ -42,13 +43,13 @@ class NStep {
   }
 
   int n_;
-  double gamma_;
   ActionSpace actions_;
   // The waiting steps of each environment, oldest first.
-  std::vector<int64_t> count_;  // (N)
-  std::vector<float> obs_;      // (N × n × D)
-  std::vector<float> action_;   // (N × n × A)
-  std::vector<double> reward_;  // (N × n)
+  std::vector<int64_t> count_;    // (N)
+  std::vector<float> obs_;        // (N × n × D)
+  std::vector<float> action_;     // (N × n × A)
+  std::vector<double> reward_;    // (N × n)
+  std::vector<double> discount_;  // (N × n) γ, or 0 after a termination
 };
 
 }  // namespace upswing

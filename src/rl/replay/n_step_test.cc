@@ -35,7 +35,7 @@ void PushStep(NStep& n_step, int env, int i, bool terminated, bool truncated,
 }
 
 TEST(NStep, OneStepPassesThrough) {
-  NStep n_step(1, 1, 0.5, 1, kNine);
+  NStep n_step(1, 1, 1, kNine);
   std::vector<Emitted> out;
   PushStep(n_step, 0, 0, false, false, out);
   PushStep(n_step, 0, 1, false, true, out);
@@ -47,7 +47,7 @@ TEST(NStep, ThreeStepsAndTheShorterRestAtATruncation) {
   // γ = 0.5, rewards 1, 2, 4, 8. Full windows: 1 + 2/2 + 4/4 = 3 and 2 + 4/2 + 8/4 = 6, both with
   // γ³. Tails: 4 + 8/2 = 8 with γ², and 8 with γ. The tails and the last window bootstrap from the
   // last observation.
-  NStep n_step(1, 3, 0.5, 1, kNine);
+  NStep n_step(1, 3, 1, kNine);
   std::vector<Emitted> out;
   for (int i = 0; i < 3; ++i) PushStep(n_step, 0, i, false, false, out);
   EXPECT_EQ(out, (std::vector<Emitted>{{0, 3, 0, 3, 0.125}}));
@@ -58,7 +58,7 @@ TEST(NStep, ThreeStepsAndTheShorterRestAtATruncation) {
 }
 
 TEST(NStep, ATerminationBootstrapsFromNothing) {
-  NStep n_step(1, 3, 0.5, 1, kNine);
+  NStep n_step(1, 3, 1, kNine);
   std::vector<Emitted> out;
   PushStep(n_step, 0, 0, false, false, out);
   PushStep(n_step, 0, 1, true, false, out);
@@ -66,7 +66,7 @@ TEST(NStep, ATerminationBootstrapsFromNothing) {
 }
 
 TEST(NStep, ALateTruncationEqualsOneAtTheLastStep) {
-  NStep late(1, 3, 0.5, 1, kNine), at_once(1, 3, 0.5, 1, kNine);
+  NStep late(1, 3, 1, kNine), at_once(1, 3, 1, kNine);
   std::vector<Emitted> out;
   for (int i = 0; i < 2; ++i) PushStep(late, 0, i, false, false, out);
   const float next = 2;
@@ -83,7 +83,7 @@ TEST(NStep, ALateTruncationEqualsOneAtTheLastStep) {
 }
 
 TEST(NStep, EpisodesAndEnvironmentsDoNotMix) {
-  NStep n_step(2, 2, 0.5, 1, kNine);
+  NStep n_step(2, 2, 1, kNine);
   std::vector<Emitted> out;
   PushStep(n_step, 0, 0, false, false, out);
   PushStep(n_step, 1, 0, false, false, out);
@@ -97,7 +97,7 @@ TEST(NStep, EpisodesAndEnvironmentsDoNotMix) {
 }
 
 TEST(NStep, LoadedStateContinuesAsTheSavedOne) {
-  NStep saved(2, 3, 0.9, 1, kNine), loaded(2, 3, 0.9, 1, kNine);
+  NStep saved(2, 3, 1, kNine), loaded(2, 3, 1, kNine);
   std::vector<Emitted> a, b;
   for (int i = 0; i < 4; ++i) PushStep(saved, i % 2, i, false, false, a, 0.9);
   SaveAndLoad([&](const Archive& archive) { saved.State(archive); },

@@ -11,11 +11,11 @@
 namespace upswing {
 
 Sac::Sac(const SacConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool)
-    : OffPolicyAgent(config, spec, ActionSpace{spec.action_size()}, seed, pool),
+    : OffPolicyAgent(config.off_policy, spec, ActionSpace{spec.action_size()}, seed, pool),
       config_(config),
       D_(spec.obs_size),
       A_(spec.action_size()),
-      B_(static_cast<int>(config.batch)),
+      B_(static_cast<int>(config.off_policy.batch)),
       action_limit_(spec.action_limit),
       noise_rng_(seed, "policy noise"),
       actor_(config.Shape(D_, 2 * A_), B_, Rng(seed, "initial actor")),
@@ -53,7 +53,7 @@ void Sac::Act(Matrix<const float> obs, Matrix<double> action) {
     actor_.network().Forward(actor_.theta(), obs, rows, act_activations_, outputs);
   });
   std::ranges::copy(obs.values(), act_obs_.begin());
-  const bool random = steps_ < config_.learning_starts;
+  const bool random = steps_ < config_.off_policy.learning_starts;
   for (int env = 0; env < obs.rows(); ++env) {
     for (int k = 0; k < A_; ++k) {
       const auto i = Size(env, A_) + k;
@@ -85,9 +85,9 @@ void Sac::Observe(const StepResult& result) {
   const Matrix<const float> a(act_action_.data(), N, A_);
   for (int env = 0; env < N; ++env) {
     ExpectFinite(result, env);
-    double r = config_.reward_scale * result.reward[env];
+    double r = config_.off_policy.reward_scale * result.reward[env];
     if (config_.smoothness > 0) r -= RoughnessOf(result, env);
-    const double discount = result.terminated[env] != 0 ? 0 : config_.gamma;
+    const double discount = result.terminated[env] != 0 ? 0 : config_.off_policy.gamma;
     Store(env, {s.row(env), s_next.row(env), a.row(env), r, discount}, result.done(env));
   }
 }
@@ -113,8 +113,8 @@ Metrics Sac::TakeMetrics() {
 }
 
 std::unique_ptr<NetworkPolicy> Sac::ExportPolicy(PolicyInfo info) const {
-  info.gamma = config_.gamma;
-  info.reward_scale = config_.reward_scale;
+  info.gamma = config_.off_policy.gamma;
+  info.reward_scale = config_.off_policy.reward_scale;
   NetworkPolicyParts parts{ActionRule::kSquashedGaussian, actor_.network().shape(), theta_policy_};
   parts.action_limit = action_limit_;
   parts.critic = config_.Shape(D_ + A_, 1);

@@ -93,6 +93,8 @@ class Sac : public OffPolicyAgent {
   static size_t Size(int rows, int cols) { return static_cast<size_t>(rows) * cols; }
   size_t num_critics() const { return config_.twin ? 2 : 1; }
 
+  const OffPolicyConfig& off_policy() const override { return config_.off_policy; }
+
   SacConfig config_;
   int D_, A_, B_;
   std::vector<double> action_limit_;  // (A)

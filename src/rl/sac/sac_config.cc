@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "base/text.h"
-#include "rl/sac/sac.h"
 
 namespace upswing {
 
@@ -14,7 +13,7 @@ void SacConfig::Describe(Options& o) {
 
   o.Section("agent");
   o.Add(&twin, "twin", "train two critics and use the smaller value");
-  OffPolicyConfig::Describe(o);
+  off_policy.Describe(o);
   o.Add(&smoothness, "smoothness", {0, 1e6}, "",
         "weight of the penalty on squared changes of the mean action, which is in units of its "
         "limit");
@@ -37,11 +36,7 @@ void SacConfig::Describe(Options& o) {
         "target entropy per action component in units of its limit; uniform actions have 0.69");
 }
 
-std::unique_ptr<Agent> SacConfig::Make(const EnvSpec& spec, uint64_t seed, ThreadPool& pool) const {
-  return std::make_unique<Sac>(*this, spec, seed, pool);
-}
-
-void SacConfig::Check(int64_t /*num_envs*/) const { OffPolicyConfig::Check(); }
+void SacConfig::Check(int64_t /*num_envs*/) const { off_policy.Check(); }
 
 AgentSize SacConfig::Size(const EnvSpec& spec) const {
   const int D = spec.obs_size, A = spec.action_size();
@@ -55,8 +50,8 @@ AgentSize SacConfig::Size(const EnvSpec& spec) const {
       .arrays = 6,
       .saved_arrays = 4,
       .transition = 2.0 * D + A + 2,  // s, s', a, r, discount
-      .capacity = static_cast<double>(replay),
-      .batch = static_cast<double>(batch),
+      .capacity = static_cast<double>(off_policy.replay),
+      .batch = static_cast<double>(off_policy.batch),
       .widest = static_cast<double>(std::ranges::max(hidden)),
       .layers = (1 + critics) * 3 * static_cast<double>(hidden.size())};
 }
@@ -67,7 +62,7 @@ std::string SacConfig::Text() const {
 }
 
 std::vector<std::string> SacConfig::Warnings(int64_t steps, int64_t /*num_envs*/) const {
-  std::vector<std::string> warnings = OffPolicyConfig::Warnings(steps);
+  std::vector<std::string> warnings = off_policy.Warnings(steps);
   if (actor_rate == 0) warnings.emplace_back("actor_rate is 0: the policy never changes");
   if (tau == 0) warnings.emplace_back("tau is 0: the target critics never change");
   return warnings;

@@ -10,8 +10,8 @@
 namespace upswing {
 
 /// Settings of the SAC agent; see rl/sac/sac.h.
-struct SacConfig : AgentConfig, OffPolicyConfig {
-  SacConfig() { reward_centering = 0; }
+struct SacConfig : AgentConfig {
+  OffPolicyConfig off_policy = {.reward_centering = 0};
   std::vector<int64_t> hidden = {256, 256};
   bool layer_norm = true;
   bool twin = true;
@@ -25,7 +25,6 @@ struct SacConfig : AgentConfig, OffPolicyConfig {
   double alpha = 0.1, alpha_rate = 3e-3, target_entropy = -1;
 
   void Describe(Options& options) override;
-  std::unique_ptr<Agent> Make(const EnvSpec& spec, uint64_t seed, ThreadPool& pool) const override;
   void Check(int64_t num_envs) const override;
   AgentSize Size(const EnvSpec& spec) const override;
   std::string Text() const override;

@@ -18,14 +18,14 @@ namespace {
 SacConfig SmallSac() {
   SacConfig config;
   config.hidden = {16, 16};
-  config.batch = 16;
-  config.replay = 1000;
-  config.learning_starts = 32;
-  config.updates_per_step = 0.5;
-  config.n_step = 1;
-  config.reward_scale = 1;
-  config.reward_centering = 0;
-  config.learning_rate = config.learning_rate_end = 3e-3;
+  config.off_policy.batch = 16;
+  config.off_policy.replay = 1000;
+  config.off_policy.learning_starts = 32;
+  config.off_policy.updates_per_step = 0.5;
+  config.off_policy.n_step = 1;
+  config.off_policy.reward_scale = 1;
+  config.off_policy.reward_centering = 0;
+  config.off_policy.learning_rate = config.off_policy.learning_rate_end = 3e-3;
   return config;
 }
 
@@ -61,8 +61,8 @@ TEST(Sac, CenteringFindsTheLevelOfValues) {
   // adds to it. Only the shift moves the values.
   const auto level = [](bool entropy_reward) {
     SacConfig config = SmallSac();
-    config.learning_rate = config.learning_rate_end = config.tau = 0;
-    config.reward_centering = 0.05;
+    config.off_policy.learning_rate = config.off_policy.learning_rate_end = config.tau = 0;
+    config.off_policy.reward_centering = 0.05;
     config.entropy_reward = entropy_reward;
     config.twin = config.tune_alpha = false;
     config.alpha = 3;
@@ -93,7 +93,7 @@ TEST(Sac, TheLearnedTemperatureHoldsTheEntropyAtItsTarget) {
   config.alpha_rate = 0.02;
   config.target_entropy = -0.5;
   config.actor_period = 1;
-  config.gamma = 0.5;
+  config.off_policy.gamma = 0.5;
   ThreadPool pool(1);
   Sac agent(config, ToyEnv::Spec(4), 1, pool);
   ToyEnv env(4);
@@ -132,7 +132,7 @@ class PeakBandit : public ToyEnv {
 TEST(Sac, FindsTheBestActionOfABandit) {
   for (const uint64_t seed : {1, 2, 3}) {
     SacConfig config = SmallSac();
-    config.mirror = false;
+    config.off_policy.mirror = false;
     config.actor_period = 1;
     config.tune_alpha = false;
     config.alpha = 0.01;
@@ -159,7 +159,7 @@ TEST(Sac, AConstantRewardIsWorthItsSumForEver) {
   SacConfig config = SmallSac();
   config.tune_alpha = false;
   config.alpha = 0;
-  config.gamma = 0.8;
+  config.off_policy.gamma = 0.8;
   config.tau = 0.1;
   ThreadPool pool(1);
   Sac agent(config, ToyEnv::Spec(4), 1, pool);
@@ -173,7 +173,7 @@ TEST(Sac, AConstantRewardIsWorthItsSumForEver) {
 TEST(Sac, LearnsToStayNearZero) {
   for (const uint64_t seed : {1, 2, 3}) {
     SacConfig config = SmallSac();
-    config.gamma = 0.9;
+    config.off_policy.gamma = 0.9;
     ThreadPool pool(1);
     Sac agent(config, ToyEnv::Spec(4), seed, pool);
     ToyEnv env(4, seed);
@@ -226,8 +226,8 @@ TEST(Sac, TheExportedPolicyIsTheActorsMeanAndItsCriticsValue) {
 
 TEST(Sac, ATruncationBootstrapsFromItsOwnLastObservationAndATerminationFromNothing) {
   SacConfig config = SmallSac();
-  config.updates_per_step = 0;
-  config.learning_starts = 1000;  // uniform actions
+  config.off_policy.updates_per_step = 0;
+  config.off_policy.learning_starts = 1000;  // uniform actions
   ThreadPool pool(1);
   Sac agent(config, ToyEnv::Spec(2), 1, pool);
   ToyEnv env(2);
@@ -238,7 +238,7 @@ TEST(Sac, ATruncationBootstrapsFromItsOwnLastObservationAndATerminationFromNothi
     const Transition t = agent.replay().at(i);
     ASSERT_NEAR(t.next_obs[0] - t.obs[0], t.action[0], 1e-5);
     const bool left = std::abs(t.next_obs[0]) > 5;
-    ASSERT_EQ(t.discount, left ? 0.0F : static_cast<float>(config.gamma));
+    ASSERT_EQ(t.discount, left ? 0.0F : static_cast<float>(config.off_policy.gamma));
     terminated += left ? 1 : 0;
   }
   EXPECT_EQ(agent.replay().size(), 800);
@@ -247,8 +247,8 @@ TEST(Sac, ATruncationBootstrapsFromItsOwnLastObservationAndATerminationFromNothi
 
 TEST(Sac, SmoothnessChargesForChangesOfTheMeanWithinAnEpisode) {
   SacConfig config = SmallSac();
-  config.updates_per_step = 0;
-  config.learning_starts = 0;
+  config.off_policy.updates_per_step = 0;
+  config.off_policy.learning_starts = 0;
   config.policy_tau = 1;
   ThreadPool pool(1);
   std::vector<float> plain, charged;
@@ -278,32 +278,32 @@ TEST(Sac, MirrorsOnlyWhereTheTaskHasSymmetry) {
   spec.mirror_signs.clear();
   SacConfig config = SmallSac();
   EXPECT_THROW(Sac(config, spec, 1, pool), Error);
-  config.mirror = false;
+  config.off_policy.mirror = false;
   EXPECT_NO_THROW(Sac(config, spec, 1, pool));
 }
 
 TEST(Sac, TheNumberOfThreadsChangesNoBit) {
   SacConfig config = SmallSac();
-  config.batch = 128;     // four slices
-  config.hidden = {130};  // three tasks
-  ExpectThreadsChangeNoBit(config, 40, 10);
+  config.off_policy.batch = 128;  // four slices
+  config.hidden = {130};          // three tasks
+  ExpectThreadsChangeNoBit<Sac>(config, 40, 10);
 }
 
 class SacState : public ::testing::TestWithParam<bool> {};
 
 TEST_P(SacState, LoadedStateContinuesWithTheSameBits) {
   SacConfig config = SmallSac();
-  config.n_step = 3;
+  config.off_policy.n_step = 3;
   config.smoothness = 0.1;
   config.policy_tau = 0.1;
   config.twin = GetParam();
-  ExpectLoadedStateGoesOn(config, 101);
+  ExpectLoadedStateGoesOn<Sac>(config, 101);
 }
 
 INSTANTIATE_TEST_SUITE_P(TwinCritics, SacState, ::testing::Bool());
 
 TEST(Sac, NumbersThatAreNotFiniteAreFailures) {
-  ExpectPoisonFails(SmallSac());
+  ExpectPoisonFails<Sac>(SmallSac());
 
   ThreadPool pool(1);
   Sac other(SmallSac(), ToyEnv::Spec(1), 1, pool);

@@ -99,10 +99,11 @@ void Sac::UpdateCritics(const Minibatch& batch) {
   for (Critic& critic : critics_) critic.network.Prepare(pool_);
   ForSlices(pool_, B_, [&](RowRange rows) { CriticRows(batch, rows); });
   CountMinibatch();
-  if (config_.reward_centering > 0) CenterCritics(batch);
+  if (config_.off_policy.reward_centering > 0) CenterCritics(batch);
   for (Critic& critic : critics_) {
     norm_sum_ += critic.network.Step({inputs_.data(), B_, D_ + A_}, learning_rate(),
-                                     config_.max_gradient_norm, critic.target, config_.tau, pool_) /
+                                     config_.off_policy.max_gradient_norm, critic.target,
+                                     config_.tau, pool_) /
                  static_cast<double>(critics_.size());
   }
 }
@@ -162,7 +163,8 @@ void Sac::UpdateActor(const Minibatch& batch) {
   actor_.Prepare(pool_);
   ForSlices(pool_, B_, [&](RowRange rows) { ActorRows(batch, rows); });
   actor_.Step({batch.obs.data(), B_, D_}, config_.actor_rate * learning_rate(),
-              config_.max_gradient_norm, theta_policy_, AveragingTau(config_.policy_tau), pool_);
+              config_.off_policy.max_gradient_norm, theta_policy_, AveragingTau(config_.policy_tau),
+              pool_);
   UpdateTemperature();
 }
 

@@ -23,8 +23,8 @@ class TrainerTest : public ::testing::Test, protected TrainObserver, protected E
     config_.log_every = 50;
     dqn_.hidden = {8};
     dqn_.dueling = false;
-    dqn_.batch = 8;
-    dqn_.learning_starts = 20;
+    dqn_.off_policy.batch = 8;
+    dqn_.off_policy.learning_starts = 20;
     dqn_.levels = 3;
   }
 
@@ -215,7 +215,7 @@ class Forgetful : public ToyEnv {
 
 TEST_F(TrainerTest, EpisodesThatAnEnvironmentCannotContinueAreTruncated) {
   ThreadPool pool(1);
-  dqn_.n_step = 3;
+  dqn_.off_policy.n_step = 3;
   PpoConfig ppo;
   ppo.hidden = {8};
   ppo.horizon = 16;

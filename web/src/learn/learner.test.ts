@@ -63,7 +63,7 @@ test('settings are checked as the program checks them, in one line', async () =>
     [{ learning_rat: '1' }, 'learning_rate'],
     [{ batch: '1000', replay: '100' }, 'batch: expected at most 100 transitions'],
     [{ hidden: '4096,4096', replay: '10000000' }, 'memory'],
-    [{ model: 'x.xml' }, 'model: expected no setting model, which was removed'],
+    [{ model: 'x.xml' }, 'model: expected a setting, got "model"'],
     [{ seed: '1\nepsilon_end' }, 'NAME=VALUE'],
   ] as [Record<string, string>, string][]) {
     const open = () => new Learner(host, 'fast', 1, settings);
