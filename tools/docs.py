@@ -286,8 +286,10 @@ def for_doxygen(text):
     text = re.sub(r"^namespace upswing \{\n|^\}  // namespace upswing\n", "", text, flags=re.MULTILINE)
     # A comment after a member describes the member.
     text = re.sub(r"([;,]) +// +", r"\1  ///< ", text)
-    # Sphinx's C++ parser accepts neither a literal in several lines nor lambdas.
+    # Sphinx's C++ parser accepts neither a literal in several lines, nor designated initialisers, nor
+    # lambdas.
     text = re.sub(r'"\n +"', "", text)
+    text = re.sub(r"(?<=[{,])(\s*)\.\w+ = ", r"\1", text)
     return re.sub(r"=\s*\[\] *\{[^{}]*\}(\(\))?(?=[;,)])", "= {}", text)
 
 
