@@ -104,14 +104,11 @@ struct RecordedConfig {
   Config config;                     // missing settings have their defaults
   std::vector<std::string> missing;  // settings, such as agent.gamma, that the record lacks
   std::vector<std::string> unknown;  // settings of the record that this version lacks
-
-  bool is_of_this_version() const { return missing.empty() && unknown.empty(); }
 };
 
-/// Reads recorded settings from TOML. Policy files record only settings that change the training
-/// (`identity_only`). `where` names the document in messages. Throws BadInput for values out of
-/// range.
-RecordedConfig ReadRecord(const std::string& toml, const std::string& where, bool identity_only);
+/// Reads recorded settings from TOML. `where` names the document in messages. Throws BadInput for
+/// values out of range.
+RecordedConfig ReadRecord(const std::string& toml, const std::string& where);
 
 /// Applies the settings of a TOML document. `where` names it in messages. Throws BadInput with the
 /// line.

@@ -168,13 +168,12 @@ Config ConfigIn(std::string_view text, const std::string& where) {
   return config;
 }
 
-RecordedConfig ReadRecord(const std::string& text, const std::string& where, bool identity_only) {
+RecordedConfig ReadRecord(const std::string& text, const std::string& where) {
   toml::table table = ParseToml(text, where);
   RecordedConfig record{Config(AlgorithmIn(table, where)), {}, {}};
   const Options options = OptionsOf(record.config);
   for (const Option& option : options.all()) {
-    const bool is_recorded = option.identity() || !identity_only;
-    if (!is_recorded || table[option.section][option.name]) continue;
+    if (table[option.section][option.name]) continue;
     record.missing.push_back(Concat(option.section, ".", option.name));
   }
   record.unknown = TakeUnknown(options, table);

@@ -390,8 +390,6 @@ class CompareTest(ProgramTest):
             refuse(["r", name], f"{name}: expected a run or a folder of runs, got a policy or controller",
                    f"`upswing eval {name}` judges")
         refuse(["r", "none.safetensors"], "none.safetensors: no such file")
-        refuse(["r", "lqr", "--made-for", "mass2=1"], "unknown flag --made-for", "upswing eval")
-        refuse(["r", "--threads", "2"], "unknown flag --threads", "upswing eval")
 
 
 if __name__ == "__main__":

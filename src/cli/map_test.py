@@ -220,7 +220,6 @@ class MapTest(ProgramTest):
         self.refuse(["map", "nowhere"], "nowhere", "no such file")
         self.refuse(["map", self.policy, "--set", "mass2=1"], "--set mass2: expected a quantity that is on no axis; the axis mass2 sets it")
         self.refuse(["map", self.policy, "--set", "gravit=1"], "did you mean gravity?")
-        self.refuse(["map", self.policy, "--check", "2"], "--check", "--physics mujoco")
         self.refuse(["map", self.policy, "--episodes", "0"], "--episodes")
         self.refuse(["map", self.policy, "--episodes", "20000"], "10,000,000 episodes")
         self.refuse(["map", self.policy, "--physics", "own"], "closed-form")

@@ -32,7 +32,7 @@ DesignConditions DesignOf(const LoadedPolicy& loaded) {
   const std::string& settings = loaded.policy->info().config;
   if (settings.empty()) return design;
   try {
-    const Config config = ReadRecord(settings, "config", true).config;
+    const Config config = ReadRecord(settings, "config").config;
     design.point.disturbance = config.disturbance;
     design.randomization = config.randomization;
     design.known = true;

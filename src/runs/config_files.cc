@@ -63,7 +63,7 @@ Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
 Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
   const fs::path file = run / RunFolder::kConfig;
   const std::string text = ReadOwnFile(file);
-  const RecordedConfig record = ReadRecord(text, file.string(), false);
+  const RecordedConfig record = ReadRecord(text, file.string());
   if (!record.missing.empty()) {
     throw BadInput(Concat(file.string(), ": expected every setting of this version, got none of ",
                           FirstOf(record.missing), "; another version wrote the file"));
@@ -98,9 +98,7 @@ std::optional<std::string> TrainCommand(const PolicyInfo& info, const std::strin
   const auto agents = EmbeddedAgents();
   if (std::ranges::find(agents, info.agent, &NamedAgent::name) == agents.end()) return std::nullopt;
   try {
-    const RecordedConfig record = ReadRecord(info.config, kWhere, true);
-    if (!record.is_of_this_version()) return std::nullopt;
-    const Config& config = record.config;
+    const Config config = ReadRecord(info.config, kWhere).config;
     const Config named = BuildConfig("", {{"agent", info.agent}});
     std::string command =
         Concat("./upswing train --agent ", info.agent, " --seed ", config.train.seed);

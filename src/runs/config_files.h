@@ -39,9 +39,9 @@ std::string SettingsMark(const Config& config);
 /// The shell command that trains a policy like this: its agent, its seed, and a flag per setting
 /// that differs from the named agent's.
 ///
-/// Nothing if the policy's file has an agent or a setting that this version lacks, as files of
-/// other versions may. Nothing if a setting's text does not fit on a command line. Throws BadInput
-/// that begins with `where`.
+/// For a policy of another version, the command leaves out settings that this version lacks.
+/// Nothing if this version lacks the agent, or if a setting's text does not fit on a command line.
+/// Throws BadInput that begins with `where`.
 std::optional<std::string> TrainCommand(const PolicyInfo& info, const std::string& where);
 
 }  // namespace upswing
