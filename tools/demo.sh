@@ -1,7 +1,7 @@
 # shellcheck shell=sh
 # ./upswing demo: builds the page and serves it with the program. Read by ./upswing, whose functions
 # it uses, after tools/web.sh.
-: "${root:?}" "${setup:?}" "${program:?}"
+: "${root:?}" "${setup:?}" "${program:?}" "${python:?}"
 
 page=$root/build/web
 program=${UPSWING:-$program} # tests set another one
@@ -22,13 +22,14 @@ demo() {
   exec "$program" demo "$@"
 }
 
-# A checksum of all sources of the page.
+# A checksum of all sources of the page and of its core.
 page_hash() {
   (cd "$root/web" && find . \( -name node_modules -o -name tests \) -prune -o -type f -print0 |
     LC_ALL=C sort -z | xargs -0 sha256sum | sha256sum)
+  "$python" -B "$root/web/wasm/build.py" --key
 }
 
-# Sets up Node, and builds the page if it is missing or made from other sources.
+# Builds the page, with Node and the core, if it is missing or made from other sources.
 build_demo() {
   set_up_node
   (
@@ -36,6 +37,7 @@ build_demo() {
     stamp=$page.stamp
     hash=$(page_hash)
     [ ! -f "$page/index.html" ] || [ "$(cat "$stamp" 2>/dev/null)" != "$hash" ] || exit 0
+    set_up_core
     say "building the page"
     rm -f "$stamp"
     cd web

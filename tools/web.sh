@@ -1,5 +1,5 @@
 # shellcheck shell=sh
-# Sets up the page's tools: Node, its packages, a Chromium for the tests.
+# Sets up the page's tools: Node, its packages, its core in WebAssembly, a Chromium for the tests.
 # Read by ./upswing and tools/web_test, which have the repository's folder in $root.
 : "${root:?}"
 
@@ -85,13 +85,19 @@ set_up_chromium() {
     fail "no Chromium could be installed (see above); set UPSWING_CHROMIUM to one"
 }
 
-# The compiler of web/wasm, for the test that the module is up to date. The test compiles nothing if
-# the record of the module has the hashes of module and sources.
-set_up_wasm() {
-  [ "${UPSWING_COMPILE_WASM:-}" = 1 ] ||
-    ! "$python" -B "$root/web/wasm/build.py" --check 2>/dev/null || return 0
-  for name in zig highway muparser; do
-    version=$(sed -n 's/^[a-z]*\(==\| @ .*_\)\([0-9.]*[0-9]\).*/\2/p' "$root/tools/$name-requirements.txt")
-    "$root/tools/fetch_wheel" $name "$root/build/deps/$name-$version" </dev/null || exit 1
-  done
+# Compiles the page's core, build/wasm/core.wasm, unless its sources are unchanged. The compiler is
+# fetched first.
+set_up_core() {
+  ! "$python" -B "$root/web/wasm/build.py" --check 2>/dev/null || return 0
+  (
+    lock
+    for name in zig highway muparser; do
+      version=$(sed -n 's/^[a-z]*\(==\| @ .*_\)\([0-9.]*[0-9]\).*/\2/p' "$root/tools/$name-requirements.txt")
+      "$root/tools/fetch_wheel" $name "$root/build/deps/$name-$version" ||
+        fail "the page's core, a part in WebAssembly, is compiled with it. Without a network: copy" \
+          "build/deps and build/wasm from another machine with the same sources"
+    done
+    say "compiling the page's core (about 2 minutes the first time)"
+    "$python" -B web/wasm/build.py >&2 || fail "the page's core could not be compiled (see above)"
+  ) </dev/null || exit 1
 }

@@ -7,6 +7,7 @@ import { single } from './build/single.ts';
 export default defineConfig({
   base: './', // served from any folder
   plugins: [mujoco(), addresses(), offline(), single()],
+  server: { fs: { allow: ['..'] } }, // build/wasm/core.wasm
   optimizeDeps: { exclude: ['@mujoco/mujoco'] },
   build: {
     outDir: '../build/web',

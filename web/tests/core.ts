@@ -5,7 +5,7 @@ import { startCore } from '../src/core';
 /// The core for all unit tests.
 
 export function coreModule(): Promise<WebAssembly.Module> {
-  const path = fileURLToPath(new URL('../wasm/core.wasm', import.meta.url));
+  const path = fileURLToPath(new URL('../../build/wasm/core.wasm', import.meta.url));
   return WebAssembly.compile(readFileSync(path));
 }
 

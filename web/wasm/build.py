@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
 """Compiles base, nn, pendulum, rl, control and agents to WebAssembly, for the page.
 
-    build.py [MODULE]     writes MODULE, by default core.wasm next to this file, and a record of its
-                          sources and versions, by default core.txt
-    build.py --versions   prints the versions of compiler and libraries
-    build.py --check      compares core.wasm and the sources with the hashes of the record
+    build.py           writes build/wasm/core.wasm, unless it is there and its sources are unchanged
+    build.py --check   fails if the module is missing or out of date; compiles nothing
+    build.py --key     prints the hash of the sources and of all versions
 
 The compiler is Zig's clang. Its C++ library is compiled here with exceptions, which refuse invalid
-files. ./upswing test installs both in build/deps. The same versions give the same bytes on any
-machine.
+files. ./upswing demo and ./upswing test install both in build/deps; without them this program exits
+with 77. The same versions give the same bytes on any machine.
 """
 
+import fcntl
 import hashlib
 import os
 import re
@@ -24,6 +24,9 @@ ROOT = HERE.parent.parent
 SOURCE = ROOT / "src"
 DEPS = ROOT / "build/deps"
 WORK = ROOT / "build/wasm"
+MODULE = WORK / "core.wasm"
+KEY = WORK / "core.key"  # the key of MODULE
+NO_COMPILER = 77  # exit status, as of a skipped test
 
 
 def pinned(name):
@@ -124,45 +127,35 @@ def included(sources):
     return sorted(found)
 
 
-def sources_hash():
-    """SHA-256 of the sources, headers, named agents, pinned versions, and this file with its flags."""
+def key():
+    """SHA-256 of the sources, headers, named agents, versions, and this file with its flags. The same
+    key means the same module."""
     text = hashlib.sha256()
     for path in [*included([*own_sources(), STREAMS, ROOT / "src/agents/named_agents.cc.in"]),
                  *(path for folder in CONFIGS.values() for path in sorted(folder.glob("*.toml"))),
                  Path(__file__).resolve()]:
         data = path.read_bytes()
         text.update(f"{path.relative_to(ROOT)} {len(data)}\n".encode() + data)
-    text.update(" ".join(map(str, (project_version(), ZIG.name, HIGHWAY.name, MUPARSER.name))).encode())
+    text.update(f"{project_version()} {versions()}".encode())
     return text.hexdigest()
 
 
-def record(module):
-    """The lines of a module's record: versions, hash of the sources, hash of the module."""
-    return [versions(), f"sources {sources_hash()}",
-            f"module {hashlib.sha256(module.read_bytes()).hexdigest()}"]
-
-
-def recorded(module):
-    """The lines of the record next to a module."""
-    return module.with_suffix(".txt").read_text(encoding="utf-8").splitlines()
-
-
-def is_recorded(module):
-    """Whether a module and the sources have the hashes of the module's record."""
-    return recorded(module)[1:] == record(module)[1:]
+def is_current():
+    """Whether the module is there and its sources and versions are unchanged."""
+    return MODULE.exists() and KEY.exists() and KEY.read_text(encoding="utf-8") == key()
 
 
 def run(program, *arguments):
-    """Runs Zig with a cache, so that repeated compilations are short. Returns its command line of the
-    linker, if -v asks for it."""
+    """Runs Zig with a cache, so that repeated compilations are short. Returns its output. Exits if it
+    fails."""
     cache = str((WORK / "cache").relative_to(ROOT))
     environment = os.environ | {"ZIG_LOCAL_CACHE_DIR": cache, "ZIG_GLOBAL_CACHE_DIR": cache}
     done = subprocess.run([ZIG / "zig", program, *map(str, arguments)], check=False, cwd=ROOT,
                           env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                           encoding="utf-8")
-    if done.returncode != 0 or (done.stdout and not done.stdout.startswith("wasm-ld ")):
+    if done.returncode != 0:
         sys.exit(f"build.py: {done.stdout}")
-    return done.stdout.split()
+    return done.stdout
 
 
 def compile_one(source, flags):
@@ -177,8 +170,26 @@ def compile_one(source, flags):
     # The same paths in the module on any machine, such as in failed assertions.
     maps = [f"-ffile-prefix-map={folder}={name}" for folder, name in
             ((ROOT, "."), (DEPS.resolve(), "deps"))]
-    run(program, *TARGET, *maps, *flags, "-c", relative, "-o", target)
+    warnings = run(program, *TARGET, *maps, *flags, "-c", relative, "-o", target)
+    if warnings:
+        sys.exit(f"build.py: {warnings}")
     return target
+
+
+def generated(name, text):
+    """Writes a source, unless it is there with this text: Zig compiles a new file again."""
+    path = WORK / name
+    if not path.exists() or path.read_text(encoding="utf-8") != text:
+        path.write_text(text, encoding="utf-8")
+    return path
+
+
+def joined(sources):
+    """One source for each layer that includes those of the layer, which halves the time: most of it
+    goes into headers."""
+    for layer in LAYERS:
+        names = [path.relative_to(ROOT) for path in sources if path.is_relative_to(SOURCE / layer)]
+        yield generated(f"{layer}.cc", "".join(f'#include "{name}"\n' for name in names))
 
 
 def jobs():
@@ -189,10 +200,8 @@ def jobs():
         link = headers / Path(name).name
         if not link.is_symlink():
             link.symlink_to(Path("/usr/include") / name)
-    agents = WORK / "named_agents.cc"
-    agents.write_text(named_agents(), encoding="utf-8")
-    tag = WORK / "exception_tag.s"
-    tag.write_text(EXCEPTION_TAG, encoding="utf-8")
+    agents = generated("named_agents.cc", named_agents())
+    tag = generated("exception_tag.s", EXCEPTION_TAG)
     # Zig leaves some headers out of the C++ library. Sources that mention them still compile, but
     # are not linked.
     own = ["-std=c++20", "-Wall", "-Wextra", "-Wpedantic", "-ffp-contract=off",
@@ -200,8 +209,11 @@ def jobs():
            "-U_LIBCPP_HAS_FILESYSTEM", "-D_LIBCPP_HAS_FILESYSTEM=1", *include(SOURCE, ROOT),
            *(f"-isystem{folder}" for folder in (headers, HIGHWAY, MUPARSER / "include"))]
     fast = {SOURCE / f"{name}.cc" for name in FAST}
-    for source in [*own_sources(), agents]:
-        yield source, [*own, "-O3" if source in fast else "-Oz"]
+    small = [path for path in own_sources() if path not in fast and path.is_relative_to(SOURCE)]
+    for source in [*joined(small), *sorted(HERE.glob("*.cc")), agents]:
+        yield source, [*own, "-Oz"]
+    for source in sorted(fast):
+        yield source, [*own, "-O3"]
     for name in PARSER:
         yield (MUPARSER / f"src/muParser{name}.cpp",
                ["-std=c++20", "-Oz", "-w", "-ffp-contract=off", f"-I{MUPARSER / 'include'}",
@@ -220,29 +232,54 @@ def jobs():
     yield tag, []
 
 
-def make(module):
-    """Writes the module and its record."""
-    for folder in (ZIG, HIGHWAY, MUPARSER):
-        if not folder.exists():
-            sys.exit(f"build.py: {folder} is missing: ./upswing test installs it")
-    WORK.mkdir(parents=True, exist_ok=True)
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        objects = list(pool.map(lambda job: compile_one(*job), jobs()))
-    linked = WORK / "core.wasm"
-    linker = run("cc", "-v", *TARGET, "-mexec-model=reactor", "-s", f"-Wl,--max-memory={MEMORY}",
-                 f"-Wl,-z,stack-size={STACK}", "-o", linked.relative_to(ROOT),
-                 *(path.relative_to(ROOT) for path in objects))
+def link(objects):
+    """Links the module and returns its path."""
+    linked = WORK / "linked.wasm"
+    # -O2: without it, Zig adds its run-time library for undefined behaviour.
+    output = run("cc", "-v", *TARGET, "-O2", "-mexec-model=reactor", "-s",
+                 f"-Wl,--max-memory={MEMORY}", f"-Wl,-z,stack-size={STACK}",
+                 "-o", linked.relative_to(ROOT), *(path.relative_to(ROOT) for path in objects))
+    # The last line is the linker's. Lines before it made C's library.
+    linker = output.splitlines()[-1].split()
     # Shortens the addresses in the code: 8 kB less to load. Zig's cc does not know this option.
     run(*linker, "--compress-relocations")
-    module.write_bytes(linked.read_bytes())
-    module.with_suffix(".txt").write_text("\n".join(record(module)) + "\n", encoding="utf-8")
+    return linked
+
+
+def compile_module():
+    """Writes the module and its key."""
+    made_from = key()
+    KEY.unlink(missing_ok=True)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        objects = list(pool.map(lambda job: compile_one(*job), jobs()))
+    link(objects).replace(MODULE)
+    KEY.write_text(made_from, encoding="utf-8")
+
+
+def make():
+    """Compiles the module unless it is current. Another process that makes it is waited for."""
+    if is_current():
+        return
+    for folder in (ZIG, HIGHWAY, MUPARSER):
+        if not folder.exists():
+            print(f"build.py: {folder} is missing: ./upswing demo or ./upswing test installs it",
+                  file=sys.stderr)
+            sys.exit(NO_COMPILER)
+    WORK.mkdir(parents=True, exist_ok=True)
+    with open(WORK / ".lock", "w", encoding="utf-8") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not is_current():
+            compile_module()
 
 
 if __name__ == "__main__":
-    if sys.argv[1:] == ["--versions"]:
-        print(versions())
-    elif sys.argv[1:] == ["--check"]:
-        if not is_recorded(HERE / "core.wasm"):
-            sys.exit("build.py: core.txt records other sources or another module: run web/wasm/build.py")
-    else:
-        make(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / "core.wasm")
+    match sys.argv[1:]:
+        case []:
+            make()
+        case ["--check"]:
+            if not is_current():
+                sys.exit(f"build.py: {MODULE} is missing or out of date: run web/wasm/build.py")
+        case ["--key"]:
+            print(key())
+        case _:
+            sys.exit("build.py: expected --check, --key or nothing")

@@ -1,5 +1,5 @@
 import wasmUrl from '@mujoco/mujoco/mujoco.wasm?url';
-import coreUrl from '../../wasm/core.wasm?url';
+import coreUrl from '../../../build/wasm/core.wasm?url';
 import { startCore } from '../core';
 import { BadInput } from '../bad_input';
 import { Mujoco } from '../mujoco';
