@@ -1,6 +1,7 @@
 import { core } from './core';
 import type { Core } from './core';
 import type { Controller, Decision, Memory } from './decision';
+import { Fields } from './fields';
 
 /// Description of a policy file by the core (web/wasm/api.cc).
 interface About {
@@ -16,6 +17,9 @@ interface About {
   selfCheckError: number;
   metadata: Record<string, string>;
 }
+
+const DECISION_FIELDS = new Fields('decision', ['torque', 'value']);
+const GAUSSIAN_FIELDS = new Fields('gaussian', ['low', 'high', 'mean', 'log_std']);
 
 const forgotten = new FinalizationRegistry<() => void>((close) => close());
 
@@ -102,12 +106,12 @@ export class CoreController implements Controller {
     );
   }
 
-  /// The decision in a row: torque, V, and the numbers of its kind (web/wasm/api.cc).
+  /// The decision in a row: DECISION_FIELDS, then the numbers of its kind (web/wasm/api.cc).
   private decision(row: Float64Array): Decision {
     const { kind, limit } = this.about;
     const { torques } = this;
-    const [torque, value] = row as unknown as [number, number];
-    const rest = row.subarray(2);
+    const { torque, value } = DECISION_FIELDS.object(row);
+    const rest = row.subarray(DECISION_FIELDS.size);
     switch (kind) {
       case 'q':
         return { kind, torques, q: rest, action: torques.indexOf(torque), torque, value };
@@ -123,11 +127,11 @@ export class CoreController implements Controller {
       case 'computed':
         return { kind, limit, torque, value };
       default: {
-        const [low, high, mean, logStd] = rest as unknown as [number, number, number, number];
+        const { low, high, mean, log_std } = GAUSSIAN_FIELDS.object(rest);
         const squashed = Number(kind === 'squashed-gaussian');
         const probabilities = (pieces: number) =>
           core().numbers(pieces + 2, (at) =>
-            core().exports.gaussian_probabilities(mean, logStd, squashed, at, pieces + 2),
+            core().exports.gaussian_probabilities(mean, log_std, squashed, at, pieces + 2),
           );
         return { kind: 'gaussian', limit, low, high, probabilities, torque, value };
       }

@@ -1,4 +1,5 @@
 import { BadInput } from './bad_input';
+import { findFields } from './fields';
 
 /// Our own core in C++ (web/wasm/api.cc), compiled to WebAssembly: policies, formulas and learning.
 /// Only this file knows its memory.
@@ -34,6 +35,7 @@ interface Exports {
     size: number,
   ): void;
   numbers(): number;
+  field_table(): void;
   pendulum_at(): void;
   pendulum_check(): number;
   pendulum_step(): void;
@@ -146,8 +148,8 @@ export class Core {
     }
   }
 
-  /// The numbers that `work` computes from `input`: a view of the core's memory, valid until the
-  /// next call.
+  /// The numbers that `work` computes from `input`, both in the order of Fields: a view of the core's
+  /// memory, valid until the next call.
   formula(input: readonly number[], work: () => void): Float64Array {
     const numbers = () => new Float64Array(this.exports.memory.buffer, this.exports.numbers(), 32);
     numbers().set(input);
@@ -159,9 +161,13 @@ export class Core {
 let started: Core | null = null;
 let compiled: WebAssembly.Module | null = null;
 
-/// Starts the core. Call this before anything else.
+/// Starts the core. Call this before anything else. Throws Error if its structs differ from the
+/// page's.
 export async function startCore(module: WebAssembly.Module): Promise<void> {
-  started = await Core.start(module);
+  const core = await Core.start(module);
+  core.exports.field_table();
+  findFields(core.text);
+  started = core;
   compiled = module;
 }
 

@@ -1,12 +1,10 @@
 import { core } from './core';
-import { plantNumbers } from './pendulum';
+import { Fields } from './fields';
+import { COORDINATES, PLANT_FIELDS, STATE_FIELDS } from './pendulum';
 import type { Plant, State } from './pendulum';
 
-const SIZE = 13; // numbers that identification adds to an observation
-
-function numbers({ q1, q2, w1, w2 }: State): number[] {
-  return [q1, q2, w1, w2];
-}
+const IDENTIFIER_FIELDS = new Fields('identifier', COORDINATES, ['torque', 'noise']);
+export const IDENTIFIED_FIELDS = new Fields('identified', ['identified']);
 
 const forgotten = new FinalizationRegistry<() => void>((close) => close());
 
@@ -17,7 +15,7 @@ export class Identifier {
   constructor(nominal: Plant) {
     const { exports } = core();
     let at = 0;
-    core().formula(plantNumbers(nominal), () => {
+    core().formula(PLANT_FIELDS.numbers(nominal), () => {
       at = exports.identifier_open();
     });
     this.at = at;
@@ -26,20 +24,20 @@ export class Identifier {
 
   /// Forgets everything about the plant.
   begin(measured: State): void {
-    core().formula(numbers(measured), () => core().exports.identifier_begin(this.at));
+    core().formula(STATE_FIELDS.numbers(measured), () => core().exports.identifier_begin(this.at));
   }
 
   /// Call after a control period under `torque` (N·m). `noise`: of the sensors.
   update(measured: State, torque: number, noise: number): void {
-    core().formula([...numbers(measured), torque, noise], () =>
-      core().exports.identifier_update(this.at),
-    );
+    const numbers = IDENTIFIER_FIELDS.numbers(measured, { torque, noise });
+    core().formula(numbers, () => core().exports.identifier_update(this.at));
   }
 
   /// The numbers that identification adds to the observation of a state.
   observe(state: State): Float64Array {
-    return core()
-      .formula(numbers(state), () => core().exports.identifier_observe(this.at))
-      .slice(0, SIZE);
+    const observed = core().formula(STATE_FIELDS.numbers(state), () =>
+      core().exports.identifier_observe(this.at),
+    );
+    return IDENTIFIED_FIELDS.readAll(observed, 'identified').slice();
   }
 }

@@ -1,4 +1,5 @@
 import { core } from './core';
+import { Fields } from './fields';
 
 /// The double pendulum and its task as formulas: those of src/pendulum/task.cc, in the core. Its
 /// constants, which a test compares with the program's, are needed before there is a core.
@@ -25,8 +26,7 @@ export interface Plant {
 
 export type Parameter = keyof Plant;
 
-/// In the core's order.
-const PARAMETERS = [
+export const PARAMETERS = [
   'mass1',
   'mass2',
   'length1',
@@ -70,6 +70,26 @@ export interface State {
   w2: number;
 }
 
+export const COORDINATES = ['q1', 'q2', 'w1', 'w2'] as const satisfies readonly (keyof State)[];
+
+// The core's structs (web/wasm/fields.h).
+export const PLANT_FIELDS = new Fields('plant', PARAMETERS);
+export const STATE_FIELDS = new Fields('state', COORDINATES);
+const JUDGED_FIELDS = new Fields('judged', PARAMETERS, COORDINATES, ['torque', 'goal1', 'goal2']);
+const CAPSULE_FIELDS = new Fields('capsule', ['mass', 'radius', 'length']);
+const CAPSULE_INERTIA_FIELDS = new Fields('capsule_inertia', ['across', 'along']);
+const JUDGEMENT_NAMES = [
+  'observation',
+  'energy',
+  'normalized_energy',
+  'tip_height',
+  'relative_height',
+  'inverted',
+  'reward_terms',
+] as const;
+export const JUDGEMENT_FIELDS = new Fields('judgement', JUDGEMENT_NAMES);
+type Judgement = (typeof JUDGEMENT_NAMES)[number];
+
 export const HANGING: Readonly<State> = { q1: 0, q2: 0, w1: 0, w2: 0 };
 
 /// A pose at rest that a policy for any pose can reach, by its name in the program: which links
@@ -106,20 +126,20 @@ export function restIn(goal: Goal | null): State {
 /// Principal moments of inertia (kg·m²) of a solid capsule, across and along its axis: mass m (kg),
 /// radius r (m), length l of its cylinder (m).
 export function capsuleInertia(m: number, r: number, l: number) {
-  const [across, along] = core().formula([m, r, l], core().exports.capsule_inertia);
-  return { across: across!, along: along! };
+  const capsule = CAPSULE_FIELDS.numbers({ mass: m, radius: r, length: l });
+  return CAPSULE_INERTIA_FIELDS.object(core().formula(capsule, core().exports.capsule_inertia));
 }
 
-/// All the core's numbers about a state under a torque, in its order (web/wasm/api.cc). A call
-/// takes 3 µs, a tenth of a policy's decision, so one call for all is cheap enough.
-function at(
-  plant: Plant,
-  { q1, q2, w1, w2 }: State,
-  torque = 0,
-  goal: Goal | null = null,
-): Float64Array {
-  const numbers = [...plantNumbers(plant), q1, q2, w1, w2, torque, ...goalNumbers(goal)];
+/// The core's judgement of a state under a torque. A call takes 4 µs, a tenth of a policy's decision,
+/// so one call for all fields is cheap enough.
+function judge(plant: Plant, state: State, torque = 0, goal: Goal | null = null): Float64Array {
+  const [goal1, goal2] = goalNumbers(goal);
+  const numbers = JUDGED_FIELDS.numbers(plant, state, { torque, goal1, goal2 });
   return core().formula(numbers, core().exports.pendulum_at);
+}
+
+function judged(name: Judgement, plant: Plant, state: State): number {
+  return JUDGEMENT_FIELDS.read(judge(plant, state), name);
 }
 
 /// The plant's parameters of an object with more keys.
@@ -127,41 +147,36 @@ export function plantIn(given: Plant): Plant {
   return Object.fromEntries(PARAMETERS.map((name) => [name, given[name]])) as unknown as Plant;
 }
 
-/// In the core's order.
-export function plantNumbers(plant: Plant): number[] {
-  return PARAMETERS.map((name) => plant[name]);
-}
-
 /// Mechanical energy (J), with thin-rod inertias m l²/12 and heights counted from the pivot.
 export function energy(plant: Plant, s: State): number {
-  return at(plant, s)[8]!;
+  return judged('energy', plant, s);
 }
 
 /// Energy mapped so that hanging at rest is 0 and upright at rest is 1.
 export function normalizedEnergy(plant: Plant, s: State): number {
-  return at(plant, s)[10]!;
+  return judged('normalized_energy', plant, s);
 }
 
 /// Height of the second link's tip over the pivot (m).
 export function tipHeight(plant: Plant, s: State): number {
-  return at(plant, s)[11]!;
+  return judged('tip_height', plant, s);
 }
 
 /// tipHeight over l1 + l2, as in the observation: -1 hanging, 1 upright.
 export function relativeHeight(plant: Plant, s: State): number {
-  return at(plant, s)[7]!;
+  return judged('relative_height', plant, s);
 }
 
 /// Both links within 30° of the goal's directions; the second by its absolute angle q1 + q2.
 export function inverted(s: State, goal: Goal | null = null): boolean {
-  return at(NOMINAL, s, 0, goal)[12] === 1;
+  return JUDGEMENT_FIELDS.read(judge(NOMINAL, s, 0, goal), 'inverted') === 1;
 }
 
 export const OBSERVATION_SIZE = 8;
 /// [cos q1, sin q1, w1/10, cos q2, sin q2, w2/20, Ê, ĥ] with Ê = normalizedEnergy and ĥ =
 /// relativeHeight.
 export function observe(plant: Plant, s: State): Float32Array {
-  return Float32Array.from(at(plant, s).subarray(0, OBSERVATION_SIZE));
+  return Float32Array.from(JUDGEMENT_FIELDS.readAll(judge(plant, s), 'observation'));
 }
 
 /// Writes the memory of `steps` control steps into the end of `observation`. `before` is the
@@ -192,19 +207,19 @@ export function rewardTerms(
   tau: number,
   goal: Goal | null = null,
 ): number[] {
-  return [...at(plant, s, tau, goal).subarray(13, 18)];
+  return [...JUDGEMENT_FIELDS.readAll(judge(plant, s, tau, goal), 'reward_terms')];
 }
 
 /// Why the physics is not stable for a plant; empty if it is.
 export function plantProblem(plant: Plant): string {
   let stable = 0;
-  core().formula(plantNumbers(plant), () => (stable = core().exports.pendulum_check()));
+  core().formula(PLANT_FIELDS.numbers(plant), () => (stable = core().exports.pendulum_check()));
   return stable === 0 ? core().text : '';
 }
 
 /// The model as MJCF, with all digits of the plant's numbers. Contacts and constraints are off: a
 /// step takes less time and the trajectory is the same.
 export function mjcf(plant: Plant): string {
-  core().formula(plantNumbers(plant), core().exports.pendulum_mjcf);
+  core().formula(PLANT_FIELDS.numbers(plant), core().exports.pendulum_mjcf);
   return core().text;
 }

@@ -1,5 +1,7 @@
 import { core } from './core';
 import type { Disturbance } from './disturbance';
+import { Fields } from './fields';
+import { COORDINATES, STATE_FIELDS } from './pendulum';
 import type { State } from './pendulum';
 
 /// Output of the sensors at a control step.
@@ -8,6 +10,10 @@ export interface Reading {
   torque: number; // N·m, during the last change of the velocities
   noise: number; // rad/s, standard deviation of that change by rounding
 }
+
+const MODEL = ['sensor_latency', 'encoder_counts', 'velocity_window', 'velocity_filter'] as const;
+const SENSORS_FIELDS = new Fields('sensors', COORDINATES, ['torque'], MODEL);
+const READING_FIELDS = new Fields('reading', COORDINATES, ['torque', 'noise']);
 
 const forgotten = new FinalizationRegistry<() => void>((close) => close());
 
@@ -23,18 +29,16 @@ export class Sensors {
   }
 
   /// Begins in a state, as if the joints had moved with its velocities before.
-  begin({ q1, q2, w1, w2 }: State): void {
-    core().formula([q1, q2, w1, w2], () => core().exports.sensors_begin(this.at));
+  begin(state: State): void {
+    core().formula(STATE_FIELDS.numbers(state), () => core().exports.sensors_begin(this.at));
   }
 
   /// Call at each control step, after a control period under this torque (N·m).
-  measure({ q1, q2, w1, w2 }: State, before: number, model: Readonly<Disturbance>): Reading {
-    const { sensor_latency, encoder_counts, velocity_window, velocity_filter } = model;
-    const input = [q1, q2, w1, w2, before];
-    input.push(sensor_latency, encoder_counts, velocity_window, velocity_filter);
-    const [m1, m2, v1, v2, torque, noise] = core().formula(input, () =>
-      core().exports.sensors_measure(this.at),
-    ) as unknown as [number, number, number, number, number, number];
-    return { state: { q1: m1, q2: m2, w1: v1, w2: v2 }, torque, noise };
+  measure(state: State, before: number, model: Readonly<Disturbance>): Reading {
+    const numbers = SENSORS_FIELDS.numbers(state, { torque: before }, model);
+    const { torque, noise, ...measured } = READING_FIELDS.object(
+      core().formula(numbers, () => core().exports.sensors_measure(this.at)),
+    );
+    return { state: measured, torque, noise };
   }
 }

@@ -1,5 +1,6 @@
 import { core } from './core';
-import { HANGING, NOMINAL, plantNumbers } from './pendulum';
+import { Fields } from './fields';
+import { COORDINATES, HANGING, NOMINAL, PARAMETERS, STATE_FIELDS } from './pendulum';
 import type { Plant, State } from './pendulum';
 
 const FASTEST = 150; // rad/s, 0.75 rad in a step
@@ -44,16 +45,17 @@ export class ClosedForm implements Simulator {
   }
 
   step(torque: number, push: Push | null): boolean {
-    const { q1, q2, w1, w2 } = this.state;
     const { link, along, force } = push ?? NONE;
-    const before = [...plantNumbers(this.plant), q1, q2, w1, w2];
-    const numbers = [...before, torque, link, along, force.x, force.z];
-    const after = core().formula(numbers, core().exports.pendulum_step);
-    const state = { q1: after[0]!, q2: after[1]!, w1: after[2]!, w2: after[3]! };
+    const { x, z } = force;
+    const pushed = { torque, link, along, x, z };
+    const numbers = PUSHED_FIELDS.numbers(this.plant, this.state, pushed);
+    const state = STATE_FIELDS.object(core().formula(numbers, core().exports.pendulum_step));
     const sound = isSound(state);
     this.state = sound ? state : { ...HANGING };
     return sound;
   }
 }
 
+const PUSHED_NAMES = ['torque', 'link', 'along', 'x', 'z'] as const;
+const PUSHED_FIELDS = new Fields('pushed', PARAMETERS, COORDINATES, PUSHED_NAMES);
 const NONE = { link: 0, along: 0, force: { x: 0, z: 0 } };

@@ -2,11 +2,8 @@
 // page deletes. Texts are UTF-8, most of them JSON. A failed call returns 0 and leaves a message.
 #include <algorithm>
 #include <cmath>
-#include <cstring>
-#include <initializer_list>
 #include <limits>
 #include <numeric>
-#include <type_traits>
 
 #include "agents/controllers.h"
 #include "agents/loaded_policy.h"
@@ -19,6 +16,7 @@
 #include "pendulum/sensors.h"
 #include "pendulum/timestep.h"
 #include "rl/ppo/softmax.h"
+#include "web/wasm/fields.h"
 #include "web/wasm/learner.h"
 #include "web/wasm/step.h"
 
@@ -66,7 +64,10 @@ struct Controller {
     return {};
   }
   /// Length of a decision; see PolicyDecide.
-  size_t columns() const { return 2 + (gaussian() ? 4 : torques().size()); }
+  size_t columns() const {
+    const size_t of_kind = gaussian() ? CountFields<GaussianFields>() : torques().size();
+    return CountFields<DecisionFields>() + of_kind;
+  }
   /// Whether it is computed from the equations of motion, and may plan.
   bool computed() const { return learned == nullptr; }
   double self_check_error() const { return computed() ? 0 : learned->self_check().error; }
@@ -102,43 +103,49 @@ json About(const Controller& c, const std::map<std::string, std::string>& metada
           {"metadata", metadata}};
 }
 
-Plant PlantAt(const double* values) {
-  Plant plant;
-  for (double* field : {&plant.mass1, &plant.mass2, &plant.length1, &plant.length2, &plant.damping1,
-                        &plant.damping2, &plant.gravity, &plant.torque_limit}) {
-    *field = *values++;
-  }
-  return plant;
-}
-
-/// Torque, V and Q of a Q-network.
-void DecideByQ(const Controller& c, Matrix<const float> obs, Policy::Memory& memory,
-               std::span<double> row) {
+/// Decides by a Q-network, and writes Q into `of_kind`.
+DecisionFields DecideByQ(const Controller& c, Matrix<const float> obs, Policy::Memory& memory,
+                         std::span<double> of_kind) {
+  DecisionFields decision;
   std::vector<float> q(c.torques().size());
-  c.learned->Act(obs, {row.data(), 1, 1}, memory);
+  c.learned->Act(obs, {&decision.torque, 1, 1}, memory);
   c.learned->Values(obs, {q.data(), 1, static_cast<int>(q.size())}, memory);
   // Q = V + A - mean(A), so V is the mean of Q. A plain network has no V.
   const double sum = std::accumulate(q.begin(), q.end(), 0.0);
-  row[1] = c.learned->parts().shape.dueling() ? sum / static_cast<double>(q.size()) : kNone;
-  std::ranges::copy(q, row.data() + 2);
+  decision.value = c.learned->parts().shape.dueling() ? sum / static_cast<double>(q.size()) : kNone;
+  std::ranges::copy(q, of_kind.begin());
+  return decision;
 }
 
-/// Torque and distribution of an actor, V of its critic.
-void DecideByActor(const Controller& c, Matrix<const float> obs, Policy::Memory& memory,
-                   std::span<double> row) {
+/// Decides by an actor with V of its critic, and writes its distribution into `of_kind`.
+DecisionFields DecideByActor(const Controller& c, Matrix<const float> obs, Policy::Memory& memory,
+                             std::span<double> of_kind) {
+  DecisionFields decision;
   std::vector<float> outputs(static_cast<size_t>(c.learned->num_outputs()));
   float value = static_cast<float>(kNone);
   c.learned->Outputs(obs, {outputs.data(), 1, c.learned->num_outputs()}, memory);
-  c.learned->Choose(outputs, row.first(1));
+  c.learned->Choose(outputs, {&decision.torque, 1});
   if (c.learned->num_values() > 0) c.learned->Values(obs, {&value, 1, 1}, memory);
-  row[1] = value;
+  decision.value = value;
   if (c.gaussian()) {
-    c.learned->Spread(outputs, row.subspan(2, 1), row.subspan(3, 1));
-    std::ranges::copy(outputs, row.data() + 4);
+    GaussianFields gaussian;
+    c.learned->Spread(outputs, {&gaussian.low, 1}, {&gaussian.high, 1});
+    gaussian.mean = outputs[0];
+    gaussian.log_std = outputs[1];
+    WriteFields(gaussian, of_kind);
   } else {
     const std::vector<double> logits(outputs.begin(), outputs.end());
-    Softmax<double>(logits, row.subspan(2));
+    Softmax<double>(logits, of_kind);
   }
+  return decision;
+}
+
+/// Decides by a controller.
+DecisionFields DecideByFormula(const Controller& c, Matrix<const float> obs,
+                               Policy::Memory& memory) {
+  DecisionFields decision{0, kNone};
+  c.loaded.policy->Act(obs, {&decision.torque, 1, 1}, memory);
+  return decision;
 }
 
 }  // namespace
@@ -206,10 +213,9 @@ UPSWING_EXPORT(memory_open) Policy::Memory* MemoryOpen(const Controller* control
 
 UPSWING_EXPORT(memory_close) void MemoryClose(Policy::Memory* memory) { delete memory; }
 
-/// The policy's decision about an observation (D): torque, V (NaN: not estimated), then the numbers
-/// of its kind. Q-network: Q of each torque. Categorical actor: each torque's probability. Gaussian
-/// actor: the ends of the central 68% (N·m), μ and ln σ. Without a memory, decides as at the
-/// beginning of an episode.
+/// The policy's decision about an observation (D): DecisionFields, then the numbers of its kind.
+/// Q-network: Q of each torque. Categorical actor: each torque's probability. Gaussian actor:
+/// GaussianFields. Without a memory, decides as at the beginning of an episode.
 UPSWING_EXPORT(policy_decide)
 int PolicyDecide(Controller* controller, Policy::Memory* episode, const float* obs, double* to) {
   return Guarded([&] {
@@ -217,17 +223,19 @@ int PolicyDecide(Controller* controller, Policy::Memory* episode, const float* o
     const Policy& policy = *c.loaded.policy;
     const Matrix<const float> observation(obs, 1, policy.obs_size());
     const std::span<double> row(to, c.columns());
+    const std::span<double> of_kind = row.subspan(CountFields<DecisionFields>());
     if (episode == nullptr && c.computed()) c.memory = policy.Start(1);
     Policy::Memory& memory = episode != nullptr ? *episode : *c.memory;
+    DecisionFields decision;
     if (c.computed()) {
-      policy.Act(observation, {to, 1, 1}, memory);
-      row[1] = kNone;
+      decision = DecideByFormula(c, observation, memory);
     } else if (c.learned->is_actor()) {
-      DecideByActor(c, observation, memory, row);
+      decision = DecideByActor(c, observation, memory, of_kind);
     } else {
-      DecideByQ(c, observation, memory, row);
+      decision = DecideByQ(c, observation, memory, of_kind);
     }
-    if (!std::isfinite(row[0])) row[0] = 0;  // an overflow gives no torque
+    if (!std::isfinite(decision.torque)) decision.torque = 0;  // an overflow gives no torque
+    WriteFields(decision, row);
     return 1;
   });
 }
@@ -250,113 +258,82 @@ void ObservationRemember(const float* before, double torque, int steps, float* o
 
 UPSWING_EXPORT(numbers) double* Numbers() { return number.data(); }
 
+/// Leaves the names of the fields of all structs; see FieldTable.
+UPSWING_EXPORT(field_table) void FieldTableAsText() { text = FieldTable(); }
+
 namespace {
 
-// Inputs of the formulas, in the order in which the page writes their numbers.
-
-/// A pendulum at a control step.
-struct PendulumInput {
-  std::array<double, 8> plant;
-  PendulumState state;
-  double torque;  // N·m
-};
-
-struct PushedInput : PendulumInput {
-  double link, along, x, z;  // see Push
-};
-
-/// The goal is as in an observation; zeros: it is always upright.
-struct JudgedInput : PendulumInput {
-  double goal1, goal2;
-};
-
-/// A measured state, and the torque of the control period before it.
-struct IdentifierInput {
-  PendulumState state;
-  double torque, noise;  // see Identifier::Update
-};
-
-/// A state at a control step, and the torque of the control period before it.
-struct SensorsInput {
-  PendulumState state;
-  double torque;  // N·m
-  SensorModel model;
-};
-
-struct CapsuleInput {
-  double mass, radius, length;  // kg, m
-};
-
-/// The page's numbers as a struct of doubles.
 template <typename T>
 T Input() {
-  static_assert(std::is_trivially_copyable_v<T> && sizeof(T) <= sizeof(number));
-  T input;
-  std::memcpy(&input, number.data(), sizeof(T));
-  return input;
+  return ReadFields<T>(number);
 }
 
-/// Gives numbers to the page.
-void Output(std::initializer_list<double> numbers) { std::ranges::copy(numbers, number.begin()); }
+template <typename T>
+void Output(const T& fields) {
+  WriteFields(fields, number);
+}
 
 }  // namespace
 
-/// Input: plant, state, torque, goal. Output: observation (8), energy, energy upright, normalised
-/// energy, tip height, whether both links point to the goal within 30°, the reward's terms (5).
+/// Input: JudgedFields. Output: JudgementFields.
 UPSWING_EXPORT(pendulum_at) void PendulumAt() {
-  const auto in = Input<JudgedInput>();
-  const Plant plant = PlantAt(in.plant.data());
+  const auto in = Input<JudgedFields>();
+  const Plant& plant = in.plant;
   const PendulumState& s = in.state;
   const bool any_pose = in.goal1 != 0;
   const Pose goal = any_pose ? Pose{in.goal1 > 0, in.goal2 > 0} : Pose();
-  double* to = std::ranges::copy(Observe(plant, s), number.data()).out;
-  to = std::ranges::copy(
-           std::array{Energy(plant, s), EnergyTarget(plant), NormalizedEnergy(plant, s),
-                      TipHeight(plant, s), Inverted(SeenFrom(goal, s)) ? 1.0 : 0.0},
-           to)
-           .out;
-  std::ranges::copy(
-      any_pose ? RewardTerms(plant, s, in.torque, goal) : RewardTerms(plant, s, in.torque), to);
+  JudgementFields out;
+  std::ranges::copy(Observe(plant, s), out.observation.begin());
+  out.energy = Energy(plant, s);
+  out.normalized_energy = NormalizedEnergy(plant, s);
+  out.tip_height = TipHeight(plant, s);
+  out.relative_height = out.observation.back();
+  out.inverted = Inverted(SeenFrom(goal, s)) ? 1 : 0;
+  out.reward_terms =
+      any_pose ? RewardTerms(plant, s, in.torque, goal) : RewardTerms(plant, s, in.torque);
+  Output(out);
 }
 
-/// Input: plant (8). 1 if the physics is stable for it.
+/// Input: PlantFields. 1 if the physics is stable for it.
 UPSWING_EXPORT(pendulum_check) int PendulumCheck() {
   return Guarded([] {
-    CheckTimestep(PlantAt(number.data()), "plant");
+    CheckTimestep(Input<PlantFields>().plant, "plant");
     return 1;
   });
 }
 
-/// One physics step. Output: the state after it (4).
+/// One physics step. Input: PushedFields. Output: StateFields after it.
 UPSWING_EXPORT(pendulum_step) void PendulumStep() {
-  const auto in = Input<PushedInput>();
+  const auto in = Input<PushedFields>();
   const Push push{static_cast<int>(in.link), in.along, in.x, in.z};
-  const PendulumState s = Step(PlantAt(in.plant.data()), in.state, in.torque, push);
-  Output({s.q1, s.q2, s.w1, s.w2});
+  Output(StateFields{Step(in.plant, in.state, in.torque, push)});
 }
 
-/// An estimator of the plant of one pendulum, from its nominal plant (8).
+/// An estimator of the plant of one pendulum, from its nominal PlantFields.
 UPSWING_EXPORT(identifier_open) Identifier* IdentifierOpen() {
-  return std::make_unique<Identifier>(PlantAt(number.data()), 1).release();
+  return std::make_unique<Identifier>(Input<PlantFields>().plant, 1).release();
 }
 
 UPSWING_EXPORT(identifier_close) void IdentifierClose(Identifier* identifier) { delete identifier; }
 
-/// Begins in a measured state.
+/// Begins in measured StateFields.
 UPSWING_EXPORT(identifier_begin) void IdentifierBegin(Identifier* identifier) {
-  identifier->Begin(0, Input<PendulumState>());
+  identifier->Begin(0, Input<StateFields>().state);
 }
 
+/// Input: IdentifierFields.
 UPSWING_EXPORT(identifier_update) void IdentifierUpdate(Identifier* identifier) {
-  const auto in = Input<IdentifierInput>();
+  const auto in = Input<IdentifierFields>();
   identifier->Update(0, in.torque, in.state, in.noise);
 }
 
-/// Input: state. Output: the estimate's part of its observation (kIdentifiedSize).
+/// Input: StateFields. Output: IdentifiedFields.
 UPSWING_EXPORT(identifier_observe) void IdentifierObserve(const Identifier* identifier) {
   std::array<float, kIdentifiedSize> added;
-  identifier->Observe(0, Input<PendulumState>(), added);
-  std::ranges::copy(added, number.begin());
+  identifier->Observe(0, Input<StateFields>().state, added);
+  IdentifiedFields out;
+  std::ranges::copy(added, out.identified.begin());
+  Output(out);
 }
 
 /// The sensors of one pendulum.
@@ -367,27 +344,30 @@ UPSWING_EXPORT(sensors_open) Sensors* SensorsOpen() {
 
 UPSWING_EXPORT(sensors_close) void SensorsClose(Sensors* sensors) { delete sensors; }
 
-/// Begins in a state.
+/// Begins in StateFields.
 UPSWING_EXPORT(sensors_begin) void SensorsBegin(Sensors* sensors) {
-  sensors->Begin(0, Input<PendulumState>());
+  sensors->Begin(0, Input<StateFields>().state);
 }
 
-/// Output: measured state (4), Sensors::Torque and SensorModel::velocity_noise.
+/// Input: SensorsFields. Output: ReadingFields.
 UPSWING_EXPORT(sensors_measure) void SensorsMeasure(Sensors* sensors) {
-  const auto in = Input<SensorsInput>();
-  const PendulumState s = sensors->Measure(0, in.model, in.state, in.torque);
-  Output({s.q1, s.q2, s.w1, s.w2, sensors->Torque(0, in.model), in.model.velocity_noise()});
+  const auto in = Input<SensorsFields>();
+  ReadingFields out;
+  out.state = sensors->Measure(0, in.model, in.state, in.torque);
+  out.torque = sensors->Torque(0, in.model);
+  out.noise = in.model.velocity_noise();
+  Output(out);
 }
 
-/// Output: a capsule's inertia across and along its axis.
+/// Input: CapsuleFields. Output: CapsuleInertiaFields.
 UPSWING_EXPORT(capsule_inertia) void CapsuleInertiaOf() {
-  const auto in = Input<CapsuleInput>();
+  const auto in = Input<CapsuleFields>();
   const CapsuleInertia inertia(in.mass, in.radius, in.length);
-  Output({inertia.across, inertia.along});
+  Output(CapsuleInertiaFields{inertia.across, inertia.along});
 }
 
-/// Input: plant (8). Leaves the model as MJCF.
-UPSWING_EXPORT(pendulum_mjcf) void PendulumMjcf() { text = Mjcf(PlantAt(number.data())); }
+/// Input: PlantFields. Leaves the model as MJCF.
+UPSWING_EXPORT(pendulum_mjcf) void PendulumMjcf() { text = Mjcf(Input<PlantFields>().plant); }
 
 // ----------------------------------------------------------------------------------------------
 // Learners.
