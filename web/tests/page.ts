@@ -116,7 +116,7 @@ async function setBack(page: Page): Promise<void> {
     }
     delete (upswing.clock as Partial<Clock>).advance; // a test may have stopped it
     upswing.learn.stop();
-    upswing.laboratory = '';
+    upswing.router.laboratoryHash = '';
     await upswing.agents.forgetOwn();
     scrollTo({ top: 0, behavior: 'instant' });
   });
