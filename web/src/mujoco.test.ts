@@ -1,12 +1,16 @@
+import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
 import loadMujoco from '@mujoco/mujoco';
 import type { MainModule } from '@mujoco/mujoco';
 import { beforeAll, expect, test } from 'vitest';
-import { mjcf, NOMINAL, PHYSICS_STEPS } from './pendulum';
-import type { State } from './pendulum';
+import { HANGING, mjcf, NOMINAL, PHYSICS_STEPS } from './pendulum';
+import type { Plant, State } from './pendulum';
 import { Mujoco } from './mujoco';
 import type { Push } from './simulator';
 import { pointOn } from './world';
 import { OTHER } from '../tests/plant';
+import { simulate } from '../tests/program';
 
 let mujoco: MainModule;
 beforeAll(async () => {
@@ -42,6 +46,61 @@ test("changing the model's plant equals a new model", () => {
   expectSame(simulator.state, { q1: q[0], q2: q[1], w1: w[0], w2: w[1] }, 1e-9);
   data.delete();
   model.delete();
+});
+
+/// The program's MuJoCo under these torques, one for each control step: the states before them.
+function native(plant: Plant, { q1, q2, w1, w2 }: State, torques: readonly number[]): State[] {
+  const folder = mkdtempSync(join(tmpdir(), 'upswing-'));
+  const file = join(folder, 'torques.csv');
+  writeFileSync(file, ['torque', ...torques].join('\n') + '\n');
+  const changes = Object.entries(plant).flatMap(([name, value]) => ['--set', `${name}=${value}`]);
+  const flags = ['--torque', file, `--start=${q1},${q2},${w1},${w2}`, '--physics', 'mujoco'];
+  const rows = simulate(...flags, ...changes);
+  rmSync(folder, { recursive: true });
+  return rows.map(([, q1, q2, w1, w2]) => ({ q1, q2, w1, w2 }) as State);
+}
+
+/// The same in the page's MuJoCo.
+function inPage(plant: Plant, start: State, torques: readonly number[]): State[] {
+  const simulator = new Mujoco(mujoco);
+  simulator.plant = plant;
+  simulator.state = start;
+  return torques.map((torque) => {
+    const before = simulator.state;
+    for (let i = 0; i < PHYSICS_STEPS; ++i) expect(simulator.step(torque, null)).toBe(true);
+    return before;
+  });
+}
+
+const apart = (a: State, b: State) =>
+  Math.max(...numbers(a).map((x, i) => Math.abs(x - numbers(b)[i]!)));
+
+// The page has another version of MuJoCo than the program (npm has no newer one).
+test.each<[string, Plant, State]>([
+  ['the nominal plant from rest', NOMINAL, HANGING],
+  ['the nominal plant in a fast spin', NOMINAL, { q1: 2, q2: -1, w1: 12, w2: -20 }],
+  ['the nominal plant from upright', NOMINAL, { q1: Math.PI, q2: 0.01, w1: 0, w2: 0 }],
+  ['another plant', OTHER, START],
+  ['no damping', { ...NOMINAL, damping1: 0, damping2: 0 }, { q1: 3, q2: 1, w1: 0, w2: 0 }],
+  ['strong damping', { ...OTHER, damping1: 2, damping2: 1.5 }, START],
+])("%s moves as in the program's MuJoCo", (_, plant, start) => {
+  // Beyond the limit, too; 3 s.
+  const torques = Array.from({ length: 150 }, (_, k) => 7 * Math.sin(k / 7) * Math.cos(k / 31));
+  const page = inPage(plant, start, torques);
+  const program = native(plant, start, torques);
+  expect(program.length).toBeGreaterThanOrEqual(torques.length);
+  // The motion is chaotic. A second start, 1e-8 away, shows by which factor it has magnified the
+  // rounding of earlier steps. A velocity of 30 rad/s is rounded to 4e-15, in each of 600 steps.
+  const SHIFT = 1e-8;
+  const ROUNDING = 1e-13;
+  const shifted = inPage(plant, { ...start, q2: start.q2 + SHIFT }, torques);
+  let magnified = 1;
+  page.forEach((state, k) => {
+    magnified = Math.max(magnified, apart(state, shifted[k]!) / SHIFT);
+    expect(apart(state, program[k]!)).toBeLessThan(ROUNDING * magnified);
+  });
+  expect(ROUNDING * magnified).toBeLessThan(1e-9); // so that the comparison says something
+  expect(apart(page.at(-1)!, page[0]!)).toBeGreaterThan(0.1);
 });
 
 test.each([
