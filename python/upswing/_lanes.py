@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import threading
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -14,11 +14,9 @@ from gymnasium.vector import (AsyncVectorEnv, AutoresetMode, SyncVectorEnv, Vect
                               VectorWrapper)
 
 from . import _upswing
+from ._limit import Limit
 from ._spaces import RESET, STEP, Spaces, flags, numbers, unpacked
 from .envs import DoublePendulumVectorEnv
-
-if TYPE_CHECKING:
-    from ._foreign import Limit
 
 Env = gym.Env[Any, Any]
 VecEnv = VectorEnv[Any, Any, Any]

@@ -1,6 +1,7 @@
 import { readFileSync } from 'node:fs';
 import { expect, test } from 'vitest';
-import { nameOf, resultOf, winnerOf } from './race';
+import { resultOf, winnerOf } from './race';
+import { nameOf } from './rivals';
 
 test('a contender has the name of its method, or its changed settings', () => {
   expect(nameOf('fast', {})).toBe('Dueling Double DQN');

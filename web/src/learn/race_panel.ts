@@ -1,7 +1,8 @@
 import { button, element, write } from '../page/dom';
 import type { LearnSettings } from './learner';
-import { nameOf, resultOf, RIVALS, stepsToSolve, winnerOf } from './race';
-import type { Rival } from './race';
+import { resultOf, stepsToSolve, winnerOf } from './race';
+import { nameOf, RIVALS } from './rivals';
+import type { Rival } from './rivals';
 import type { Session } from './session';
 
 /// The choice of a rival, the bet on a race, and its result.

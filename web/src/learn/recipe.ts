@@ -1,6 +1,6 @@
 import { quoted } from '../text';
 import type { LearnSettings, Setting } from './learner';
-import { RIVALS } from './race';
+import { RIVALS } from './rivals';
 
 /// A recipe gives the same agent, bit for bit, in any browser.
 export interface Recipe {
