@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Checks that folders are layers: includes point only to lower layers, and there is no cycle. Rooms
 of a folder are floors: a file includes its own room and lower floors. The product, src/, includes
-nothing of extras/.
+nothing of extras/. Modules of Python and TypeScript import each other without a cycle.
 
     tools/check_layers.py [ROOT]
 
-Prints a line FILE:LINE: PROBLEM for each wrong include. Exit code 1 if there is one.
+Prints a line FILE:LINE: PROBLEM for each wrong include or import. Exit code 1 if there is one.
 """
 
 import re
@@ -67,6 +67,13 @@ ALLOWED_FILES = {
 MAY_ASK_SYSTEM = re.compile(r"_test\.cc$|/testing\.h$")
 SYSTEM = re.compile(r"(unistd|fcntl|poll|sched|signal|csignal|filesystem|fstream|cstdio|stdio)(\.h)?$|"
                     r"sys/")
+
+# Folders of modules, with the ending of their files.
+MODULES = {"python/upswing": ".py", "web/src": ".ts"}
+IMPORT = {
+    ".py": re.compile(r"\s*from \.(?P<module>\w*) import (?P<names>[\w, ]*)"),
+    ".ts": re.compile(r"""[^/]*(?:\bfrom|\bimport\(?)\s*'(?P<module>\.[^']+)'"""),
+}
 
 SOURCE_ENDINGS = (".h", ".inc", ".cc", ".cc.in")
 INCLUDE = re.compile(r'\s*#\s*include\s*(["<])([^">]+)[">]')
@@ -145,8 +152,8 @@ def offence(root, file, quote, included):
 
 
 def cycles(edges):
-    """The cycles between folders, each as a list that begins with its alphabetically first
-    folder."""
+    """The cycles between folders or modules, each as a list that begins with its alphabetically
+    first one."""
     found = []
 
     def walk(path):
@@ -161,6 +168,55 @@ def cycles(edges):
     return found
 
 
+def imports(path):
+    """Yields (line, imported path) of a module's imports of other modules."""
+    for line, text in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+        if not (match := IMPORT[path.suffix].match(text)):
+            continue
+        if path.suffix == ".py":  # from .module import ..., from . import module, module
+            names = [match["module"]] if match["module"] else re.findall(r"\w+", match["names"])
+        else:
+            names = [match["module"]]
+        for name in names:
+            target = (path.parent / f"{name}{path.suffix}").resolve()
+            if target.is_file():
+                yield line, target
+
+
+def in_cycles(edges):
+    """The edges on a cycle and those between two cycles. Modules that import none of the others, or
+    that none of the others imports, are removed until none is left."""
+    while True:
+        imported = {target for targets in edges.values() for target in targets}
+        left = {module: {target: place for target, place in targets.items() if edges.get(target)}
+                for module, targets in edges.items() if module in imported}
+        left = {module: targets for module, targets in left.items() if targets}
+        if left == edges:
+            return edges
+        edges = left
+
+
+def module_cycles(root):
+    """Yields a line of text for each cycle between modules."""
+    for folder, ending in MODULES.items():
+        edges = {}  # module -> {imported module: place of the first import}
+        for path in sorted((root / folder).rglob(f"*{ending}")):
+            file = path.relative_to(root).as_posix()
+            for line, target in imports(path):
+                edges.setdefault(file, {}).setdefault(
+                    target.relative_to(root.resolve()).as_posix(), f"{file}:{line}")
+        edges = in_cycles(edges)
+        yield from (cycle_text(edges, cycle, "modules") for cycle in cycles(edges))
+
+
+def cycle_text(edges, cycle, what):
+    """The problem of a cycle between folders or modules."""
+    steps = list(zip(cycle, cycle[1:] + cycle[:1]))
+    first, *others = (edges[a][b] for a, b in steps)
+    return (f"{first}: a cycle between {what}: {' -> '.join(cycle + cycle[:1])} "
+            f"(and {', '.join(others)})")
+
+
 def check(root):
     """All problems, as lines of text."""
     problems = []
@@ -171,11 +227,8 @@ def check(root):
         folder, target = layer_of(file), layer_of(place_of(root, included))
         if target is not None and target != folder:
             edges.setdefault(folder, {}).setdefault(target, f"{file}:{line}")
-    for cycle in cycles(edges):
-        steps = list(zip(cycle, cycle[1:] + cycle[:1]))
-        where = ", ".join(edges[a][b] for a, b in steps[1:])
-        problems.append(f"{edges[steps[0][0]][steps[0][1]]}: a cycle between folders: "
-                        f"{' -> '.join(cycle + cycle[:1])} (and {where})")
+    problems += (cycle_text(edges, cycle, "folders") for cycle in cycles(edges))
+    problems += module_cycles(root)
     return problems
 
 

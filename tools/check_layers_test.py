@@ -26,6 +26,11 @@ GOOD = {
     "src/cli/say.h": "",
     "extras/machine/log.h": '#include "pendulum/task.h"\n',
     "extras/machine/log_command.cc": '#include "cli/say.h"\n#include "extras/machine/log.h"\n',
+    "python/upswing/_lanes.py": "from ._spaces import Spaces\nfrom . import _upswing\n",
+    "python/upswing/_spaces.py": "import numpy\n",
+    "web/src/page/page.ts": "import type { World } from '../world';\n",
+    "web/src/world.ts": "import {\n  core,\n} from './core';\n",
+    "web/src/core.ts": "// import { World } from './world';\n",
     "tools/fuzz/log_fuzz.cc": '#include "extras/machine/log.h"\n',
 }
 
@@ -125,6 +130,21 @@ class CheckLayers(unittest.TestCase):
                                  "src/rl/ppo.cc:1", 'expected "folder/file.h"')
         self.assert_one_offender({"tools/fuzz/ppo.cc": '#include "src/rl/dqn.h"\n'},
                                  "tools/fuzz/ppo.cc:1", 'expected "folder/file.h"')
+
+    def test_cycle_between_python_modules(self):
+        for text in ("from ._lanes import Lanes\n", "if TYPE_CHECKING:\n    from . import _lanes\n"):
+            self.assert_one_offender({"python/upswing/_spaces.py": text}, "python/upswing/_lanes.py:1",
+                                     "a cycle between modules: python/upswing/_lanes.py -> "
+                                     "python/upswing/_spaces.py -> python/upswing/_lanes.py")
+
+    def test_cycle_between_typescript_modules(self):
+        for text in ("import type { Page } from './page/page';\n", "import './page/page';\n",
+                     "import {\n  Page,\n} from './page/page';\n", "await import('./page/page');\n",
+                     "export { Page } from './page/page';\n"):
+            with self.subTest(text=text):
+                self.assert_one_offender({"web/src/core.ts": text}, "web/src/core.ts:" + str(text.count("\n")),
+                                         "a cycle between modules: web/src/core.ts -> web/src/page/page.ts "
+                                         "-> web/src/world.ts -> web/src/core.ts")
 
 
 if __name__ == "__main__":
