@@ -1,25 +1,20 @@
 #pragma once
 
 #include <span>
-#include <string>
-#include <vector>
 
 #include "base/progress.h"
 #include "base/thread_pool.h"
+#include "extras/machine/logs/log.h"
 #include "extras/machine/logs/windows.h"
-#include "extras/machine/twin/motion.h"
+#include "extras/machine/twin/fit_parameters.h"
+#include "extras/machine/twin/twin.h"
 
-/// Identification of a twin by multiple shooting (Bock, 1983): many windows of the logs, each with
-/// a free start state, and values that all windows share. Levenberg and Marquardt's method with a
-/// robust cost; the start states are eliminated window by window.
+/// Identification of a twin by multiple shooting (Bock, "Recent advances in parameter
+/// identification techniques for O.D.E.", 1983): many windows of the logs, each with a free start
+/// state, and values that all windows share. Its parts are the values (fit_parameters.h), the model
+/// (shooting.h), the prior (fit_prior.h), the solver (levenberg_marquardt.h) and the covariance
+/// (fit_covariance.h).
 namespace upswing::machine {
-
-/// The values to identify, by name. Other values stay at the first guess.
-struct Structure {
-  std::string name;
-  std::vector<std::string> values;
-  std::vector<std::string> of_session = {};  // values that differ between sessions
-};
 
 /// Settings of an identification.
 struct FitConfig {

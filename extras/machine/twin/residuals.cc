@@ -11,8 +11,9 @@ Constants ConstantsOf(const Twin& twin) {
   return c;
 }
 
-Share ShareOf(const MachineLog& log, const LogWindow& window, const std::array<bool, 2>& reported,
-              const Eigen::Vector4d& x, const Twin& twin, const Drive& drive, bool linearizes) {
+WindowResiduals ResidualsOf(const MachineLog& log, const LogWindow& window,
+                            const std::array<bool, 2>& reported, const Eigen::Vector4d& x,
+                            const Twin& twin, const Drive& drive, bool linearizes) {
   const int first = window.first, last = window.last;
   const Actuator& motor = twin.actuator;
   Motion motion;
@@ -20,11 +21,11 @@ Share ShareOf(const MachineLog& log, const LogWindow& window, const std::array<b
   Predict(BodyOf(twin), drive, {twin.sensors.zero1, twin.sensors.zero2}, {x(0), x(1), x(2), x(3)},
           log, first, last, motor.current_delay, motion, linearizes ? &tangents : nullptr);
   const int rows = last - first;
-  Share share;
+  WindowResiduals residuals;
   Eigen::Matrix<double, 4 + kConstants, Eigen::Dynamic> J(4 + kConstants,
                                                           linearizes ? 2 * rows : 0);
   Eigen::VectorXd r = Eigen::VectorXd::Zero(2 * rows);
-  const auto square = [&](Squares& s) {
+  const auto square = [&](SquaredResiduals& s) {
     s.mean = r.squaredNorm() / rows;
     if (!linearizes) return;
     s.H = J * J.transpose() / rows;
@@ -39,8 +40,8 @@ Share ShareOf(const MachineLog& log, const LogWindow& window, const std::array<b
       J(kTangents + j, i) += 1;
     }
   }
-  square(share.angle);
-  if (log.measured.empty()) return share;
+  square(residuals.angle);
+  if (log.measured.empty()) return residuals;
   int cursor = 0;
   r.setZero();
   if (linearizes) J.setZero();
@@ -63,8 +64,8 @@ Share ShareOf(const MachineLog& log, const LogWindow& window, const std::array<b
       J(kTangents - 1, i) += of_torque.by_lag[j];
     }
   }
-  square(share.torque);
-  return share;
+  square(residuals.torque);
+  return residuals;
 }
 
 }  // namespace upswing::machine

@@ -22,21 +22,22 @@ Constants ConstantsOf(const Twin& twin);
 
 /// The mean of a window's squared residuals over its rows, angles or torques, and its derivatives
 /// by start state and constants.
-struct Squares {
+struct SquaredResiduals {
   double mean = 0;                                                     // rad² or (N·m)²
   Eigen::Matrix<double, 4 + kConstants, 4 + kConstants> H = H.Zero();  // half of the second one
   Eigen::Matrix<double, 4 + kConstants, 1> g = g.Zero();               // half of the first one
 };
 
 /// The residuals of a window.
-struct Share {
-  Squares angle, torque;
+struct WindowResiduals {
+  SquaredResiduals angle, torque;
 };
 
 /// The residuals of a window from the start state x (rad, rad, rad/s, rad/s), predicted minus
 /// measured. `reported`: whether the joints report torques. Derivatives are zero unless
 /// `linearizes`.
-Share ShareOf(const MachineLog& log, const LogWindow& window, const std::array<bool, 2>& reported,
-              const Eigen::Vector4d& x, const Twin& twin, const Drive& drive, bool linearizes);
+WindowResiduals ResidualsOf(const MachineLog& log, const LogWindow& window,
+                            const std::array<bool, 2>& reported, const Eigen::Vector4d& x,
+                            const Twin& twin, const Drive& drive, bool linearizes);
 
 }  // namespace upswing::machine
