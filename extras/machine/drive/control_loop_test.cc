@@ -139,11 +139,9 @@ TEST(ControlLoop, ATwinGivesEqualBitsForEqualSeeds) {
   // The log has the times at which torques were sent: the twin, driven by its commands, repeats the
   // motion.
   const Twin twin = TestTwin();
-  Motion motion;
   const MachineLog& log = pieces[0];
   const PendulumState start{log.angle[0][0], log.angle[0][1], 0, 0};
-  Predict(BodyOf(twin), Drive::Commanded(log, twin), {twin.sensors.zero1, twin.sensors.zero2},
-          start, log, 0, 500, 0, motion);
+  const Motion motion = Predict(CommandedModel(log, twin), start, std::span(log.time).first(500));
   for (int k = 0; k < 500; ++k) {
     ASSERT_NEAR(motion.angle[k][0], log.angle[k][0], 0.005) << k;
     ASSERT_NEAR(motion.angle[k][1], log.angle[k][1], 0.005) << k;

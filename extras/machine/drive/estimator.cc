@@ -67,13 +67,14 @@ Estimator::Vector Estimator::Follow(const Drive& drive, Vector x, double begin,
   Manipulator body = model_->body;
   body.f1 = x[kFriction];
   body.f2 = x[kFriction + 1];
-  PendulumState state = StateOf(x);
-  int cursor = 0;
-  Joints acceleration = body.Acceleration(state, drive.At(begin, cursor));
+  MotionIntegrator integrator(body, drive);
+  MotionPoint point = integrator.Start(begin, StateOf(x));
   for (int i = 0; i < steps; ++i) {
-    state = StepMotion(body, drive, state, begin + i * h, h, cursor, acceleration);
+    point.time = begin + i * h;  // a sum of steps would have rounding errors
+    point = integrator.Step(point, h);
   }
-  x.head<4>() << state.q1, state.q2, state.w1, state.w2;
+  const PendulumState& end = point.state;
+  x.head<4>() << end.q1, end.q2, end.w1, end.w2;
   return x;
 }
 

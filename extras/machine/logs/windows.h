@@ -23,6 +23,12 @@ struct WindowRules {
 struct LogWindow {
   int log, first, last;
   PendulumState start;  // at the first row, from a cubic through the rows within 20 ms
+
+  int rows() const { return last - first; }
+  /// The times (rows) of its rows, s.
+  std::span<const double> TimesIn(const MachineLog& own) const {
+    return std::span(own.time).subspan(first, rows());
+  }
 };
 
 /// The windows of these logs that keep the rules and have no gap longer than five median cycles.

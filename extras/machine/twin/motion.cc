@@ -1,6 +1,7 @@
 #include "extras/machine/twin/motion.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <unsupported/Eigen/AutoDiff>
 
@@ -15,12 +16,13 @@ constexpr double kShortestLag = 1e-5;  // s; shorter lags count as this one
 using StateTangents = Eigen::Matrix<double, kTangents, 4>;
 using JointTangents = Eigen::Matrix<double, kTangents, 2>;
 
-/// The derivative of DryFriction(1, w) by w, s/rad. Dual numbers would take longer for it.
+/// The derivative of DryFriction(1, w) by w, s/rad.
 double FrictionSlope(double w) {
   return kFrictionSlope / (1 + kFrictionSlope * kFrictionSlope * w * w);
 }
 
-/// ∂F/∂(q1, q2, w1, w2) of F = M q̈ + c + g + d q̇ + f atan(100 q̇) at both joints, with q̈ held.
+/// ∂F/∂(q1, q2, w1, w2) of F = M q̈ + c + g + d q̇ + f atan(100 q̇) at both joints, with q̈ held. Dry
+/// friction is added to the derivatives of the rest, because dual numbers take longer for it.
 Eigen::Matrix<double, 4, 2> ForceByState(const Manipulator& m, const PendulumState& s,
                                          const Joints& a) {
   using Dual = Eigen::AutoDiffScalar<Eigen::Vector4d>;
@@ -28,7 +30,7 @@ Eigen::Matrix<double, 4, 2> ForceByState(const Manipulator& m, const PendulumSta
   const Pair q{{s.q1, 4, 0}, {s.q2, 4, 1}}, w{{s.w1, 4, 2}, {s.w2, 4, 3}};
   const auto angles = dynamics::AnglesOf(q);
   const auto M = dynamics::MassAt(m, angles.c2);
-  const Pair net = dynamics::NetTorque<false>(m, angles, w, Pair{Dual(0), Dual(0)});
+  const Pair net = dynamics::NetTorque</*kFriction=*/false>(m, angles, w, {Dual(0), Dual(0)});
   const Dual F1 = M.M11 * a[0] + M.M12 * a[1] - net.one;
   const Dual F2 = M.M12 * a[0] + M.M22 * a[1] - net.two;
   Eigen::Matrix<double, 4, 2> derivatives;
@@ -46,15 +48,71 @@ JointTangents AccelerationTangents(const Manipulator& m, const PendulumState& s,
   const Factors Y = Regressor(angles, {s.w1, s.w2}, {a[0], a[1]});
   JointTangents force = state * ForceByState(m, s, a);
   for (int j = 0; j < 2; ++j) {
-    force.col(j).segment<kNumManipulatorConstants>(4) +=
+    force.col(j).segment<kNumManipulatorConstants>(tangent::kBody) +=
         Eigen::Map<const Eigen::Vector<double, kNumManipulatorConstants>>(Y[j].data());
-    force(kTangents - 2, j) -= torque.by_delay[j];
-    force(kTangents - 1, j) -= torque.by_lag[j];
+    force(tangent::kDelay, j) -= torque.by_delay[j];
+    force(tangent::kLag, j) -= torque.by_lag[j];
   }
   const MassMatrix M = m.Mass(angles.c2);
   Eigen::Matrix2d inverse;
   inverse << M.M22, -M.M12, -M.M12, M.M11;
   return force * (inverse / -M.det);
+}
+
+/// The derivatives of the rate of a state: q̇1, q̇2, q̈1, q̈2.
+StateTangents RateOf(const PointTangents& point) {
+  StateTangents rate;
+  rate << point.state.rightCols<2>(), point.acceleration;
+  return rate;
+}
+
+/// A step of a prediction. Derivatives are filled if `has_tangents`.
+struct PredictedStep {
+  double h = 0;  // length, s
+  bool is_last = false;
+  MotionPoint before, after;
+  bool has_tangents = false;
+  PointTangents tangents_before, tangents_after;
+
+  /// Begins the next step with the point after this one, which the integration then takes further.
+  void Follow() {
+    before = after;
+    if (has_tangents) tangents_before = tangents_after;
+  }
+  /// Whether a moment (s) is in this step or an earlier one, or later than the last one.
+  bool Reaches(double moment) const { return is_last || moment < before.time + h; }
+  /// The moment's place in the step, from 0 to 1.
+  double ShareOf(double moment) const { return std::clamp((moment - before.time) / h, 0.0, 1.0); }
+};
+
+/// Fills angles and velocities of row k at a moment (s) of the step.
+void FillAngles(const PredictedStep& step, double moment, const Joints& zero, int k, Motion& motion,
+                MotionTangents* tangents) {
+  const double share = step.ShareOf(moment), h = step.h;
+  const PendulumState s = StateBetween(step.before.state, step.after.state, h, share);
+  motion.angle[k] = {s.q1 + zero[0], s.q2 + zero[1]};
+  motion.velocity[k] = {s.w1, s.w2};
+  if (tangents == nullptr) return;
+  // The cubic of StateBetween.
+  const StateTangents &before = step.tangents_before.state, &after = step.tangents_after.state;
+  const double rest = 1 - share, a = rest * rest, b = share * share;
+  tangents->angle.middleCols<2>(2 * k) =
+      a * (1 + 2 * share) * before.leftCols<2>() + b * (1 + 2 * rest) * after.leftCols<2>() +
+      h * share * rest * (rest * before.rightCols<2>() - share * after.rightCols<2>());
+}
+
+/// Fills the acceleration of row k at a moment (s) of the step.
+void FillAcceleration(const PredictedStep& step, double moment, int k, Motion& motion,
+                      MotionTangents* tangents) {
+  const double share = step.ShareOf(moment);
+  const Joints &before = step.before.acceleration, &after = step.after.acceleration;
+  for (int j = 0; j < 2; ++j) {
+    motion.acceleration[k][j] = before[j] + share * (after[j] - before[j]);
+    if (tangents != nullptr) tangents->jerk[k][j] = (after[j] - before[j]) / step.h;
+  }
+  if (tangents == nullptr) return;
+  tangents->acceleration.middleCols<2>(2 * k) =
+      (1 - share) * step.tangents_before.acceleration + share * step.tangents_after.acceleration;
 }
 
 }  // namespace
@@ -148,47 +206,71 @@ int MotionSteps(double seconds) {
   return std::max(1, static_cast<int>(std::ceil(seconds / kMotionStep - 1e-9)));
 }
 
-PendulumState StepMotion(const Manipulator& body, const Drive& drive, const PendulumState& now,
-                         double time, double h, int& cursor, Joints& acceleration,
-                         StepTangents* tangents) {
-  DriveTangents half, full;
-  const Joints u1 = drive.At(time + h / 2, cursor, tangents != nullptr ? &half : nullptr);
-  const Joints u2 = drive.At(time + h, cursor, tangents != nullptr ? &full : nullptr);
-  const auto acceleration_at = [&](const PendulumState& s, double share) {
-    return body.Acceleration(s, share < 1 ? u1 : u2);
-  };
-  if (tangents == nullptr) {
-    const PendulumState next = RungeKuttaStep(now, acceleration, h, acceleration_at);
-    acceleration = body.Acceleration(next, u2);
-    return next;
-  }
-  // The derivatives of each stage, as RungeKuttaStep makes it.
-  const auto rate_of = [](const StepTangents& t) {
-    StateTangents rate;
-    rate << t.state.rightCols<2>(), t.acceleration;
-    return rate;
-  };
-  StepTangents stage = *tangents;
-  StateTangents sum = rate_of(stage);
-  int stages = 1;
-  const PendulumState next =
-      RungeKuttaStep(now, acceleration, h, [&](const PendulumState& s, double share) {
-        const Joints a = acceleration_at(s, share);
-        stage.state = tangents->state + h * share * rate_of(stage);
-        stage.acceleration = AccelerationTangents(body, s, a, share < 1 ? half : full, stage.state);
-        sum += (++stages < 4 ? 2 : 1) * rate_of(stage);
-        return a;
-      });
-  acceleration = body.Acceleration(next, u2);
-  tangents->state += h / 6 * sum;
-  tangents->acceleration = AccelerationTangents(body, next, acceleration, full, tangents->state);
-  return next;
+MotionPoint MotionIntegrator::Start(double time, const PendulumState& state) {
+  return {time, state, body_.Acceleration(state, drive_.At(time, cursor_))};
 }
 
-void Predict(const Manipulator& body, const Drive& drive, const Joints& zero,
-             const PendulumState& start, const MachineLog& log, int first, int last,
-             double acceleration_age, Motion& motion, MotionTangents* tangents) {
-  const int rows = last - first;
+MotionPoint MotionIntegrator::Start(double time, const PendulumState& state,
+                                    PointTangents& tangents) {
+  DriveTangents of_torque;
+  const Joints torque = drive_.At(time, cursor_, &of_torque);
+  const MotionPoint point{time, state, body_.Acceleration(state, torque)};
+  tangents.state.setIdentity();
+  tangents.acceleration =
+      AccelerationTangents(body_, state, point.acceleration, of_torque, tangents.state);
+  return point;
+}
+
+MotionPoint MotionIntegrator::Step(const MotionPoint& now, double h) {
+  const Joints half = drive_.At(now.time + h / 2, cursor_);
+  const Joints full = drive_.At(now.time + h, cursor_);
+  const PendulumState next =
+      RungeKuttaStep(now.state, now.acceleration, h, [&](const PendulumState& s, double share) {
+        return body_.Acceleration(s, share < 1 ? half : full);
+      });
+  return {now.time + h, next, body_.Acceleration(next, full)};
+}
+
+MotionPoint MotionIntegrator::Step(const MotionPoint& now, double h, PointTangents& tangents) {
+  DriveTangents of_half, of_full;
+  const Joints half = drive_.At(now.time + h / 2, cursor_, &of_half);
+  const Joints full = drive_.At(now.time + h, cursor_, &of_full);
+  // RungeKuttaStep asks for the accelerations of the stages 2, 3 and 4. Each stage begins at the
+  // start and goes the share of the step with the rate of the stage before it.
+  constexpr std::array kWeights{1, 2, 2, 1};
+  PointTangents stage = tangents;
+  StateTangents rates = RateOf(stage);  // sum with the weights
+  size_t stages = 1;
+  const auto acceleration_at = [&](const PendulumState& s, double share) {
+    const Joints a = body_.Acceleration(s, share < 1 ? half : full);
+    stage.state = tangents.state + h * share * RateOf(stage);
+    stage.acceleration =
+        AccelerationTangents(body_, s, a, share < 1 ? of_half : of_full, stage.state);
+    rates += kWeights[stages] * RateOf(stage);
+    ++stages;
+    return a;
+  };
+  const PendulumState next = RungeKuttaStep(now.state, now.acceleration, h, acceleration_at);
+  const Joints acceleration = body_.Acceleration(next, full);
+  tangents.state += h / 6 * rates;
+  tangents.acceleration = AccelerationTangents(body_, next, acceleration, of_full, tangents.state);
+  return {now.time + h, next, acceleration};
+}
+
+MotionModel CommandedModel(const MachineLog& log, const Twin& twin) {
+  return {BodyOf(twin), Drive::Commanded(log, twin), {twin.sensors.zero1, twin.sensors.zero2}};
+}
+
+MotionModel ReportedModel(const MachineLog& log, const Twin& twin) {
+  return {BodyOf(twin, /*reported=*/true),
+          Drive::Measured(log, twin),
+          {twin.sensors.zero1, twin.sensors.zero2}};
+}
+
+Motion Predict(const MotionModel& model, const PendulumState& start, std::span<const double> times,
+               double late, MotionTangents* tangents) {
+  const int rows = static_cast<int>(times.size());
+  Motion motion;
   motion.angle.resize(rows);
   motion.velocity.resize(rows);
   motion.acceleration.resize(rows);
@@ -197,59 +279,33 @@ void Predict(const Manipulator& body, const Drive& drive, const Joints& zero,
     tangents->acceleration.resize(kTangents, 2 * rows);
     tangents->jerk.resize(rows);
   }
-  const double begin = log.time[first], end = log.time[last - 1];
-  const int steps = MotionSteps(end - begin);
-  const double h = std::max((end - begin) / steps, 1e-9);
+  const double begin = times.front(), seconds = times.back() - begin;
+  const int steps = MotionSteps(seconds);
+  PredictedStep step;
+  step.h = std::max(seconds / steps, 1e-9);
+  step.has_tangents = tangents != nullptr;
 
-  PendulumState now = start;
-  now.q1 -= zero[0];
-  now.q2 -= zero[1];
-  int cursor = 0;
-  DriveTangents of_torque;
-  Joints k1 = body.Acceleration(now, drive.At(begin, cursor, &of_torque));
-  StepTangents before, t;
-  if (tangents != nullptr) {
-    before.state.setIdentity();
-    before.acceleration = AccelerationTangents(body, now, k1, of_torque, before.state);
-  }
+  MotionIntegrator integrator(model.body, model.drive);
+  PendulumState state = start;
+  state.q1 -= model.zero[0];
+  state.q2 -= model.zero[1];
+  step.after = step.has_tangents ? integrator.Start(begin, state, step.tangents_after)
+                                 : integrator.Start(begin, state);
   int row = 0, late_row = 0;
-  for (int step = 0; step < steps; ++step) {
-    const double time = begin + step * h;
-    Joints after = k1;
-    if (tangents != nullptr) t = before;
-    const PendulumState next =
-        StepMotion(body, drive, now, time, h, cursor, after, tangents != nullptr ? &t : nullptr);
-
-    const bool is_last = step + 1 == steps;
-    for (; row < rows && (is_last || log.time[first + row] < time + h); ++row) {
-      const double share = std::clamp((log.time[first + row] - time) / h, 0.0, 1.0);
-      const PendulumState s = StateBetween(now, next, h, share);
-      motion.angle[row] = {s.q1 + zero[0], s.q2 + zero[1]};
-      motion.velocity[row] = {s.w1, s.w2};
-      if (tangents == nullptr) continue;
-      // The cubic of StateBetween.
-      const double rest = 1 - share, a = rest * rest, b = share * share;
-      tangents->angle.middleCols<2>(2 * row) =
-          a * (1 + 2 * share) * before.state.leftCols<2>() +
-          b * (1 + 2 * rest) * t.state.leftCols<2>() +
-          h * share * rest * (rest * before.state.rightCols<2>() - share * t.state.rightCols<2>());
+  for (int i = 0; i < steps; ++i) {
+    step.Follow();
+    step.before.time = begin + i * step.h;  // a sum of steps would have rounding errors
+    step.is_last = i + 1 == steps;
+    step.after = step.has_tangents ? integrator.Step(step.before, step.h, step.tangents_after)
+                                   : integrator.Step(step.before, step.h);
+    for (; row < rows && step.Reaches(times[row]); ++row) {
+      FillAngles(step, times[row], model.zero, row, motion, tangents);
     }
-    for (; late_row < rows; ++late_row) {
-      const double moment = log.time[first + late_row] - acceleration_age;
-      if (!is_last && moment >= time + h) break;
-      const double share = std::clamp((moment - time) / h, 0.0, 1.0);
-      for (int j = 0; j < 2; ++j) {
-        motion.acceleration[late_row][j] = k1[j] + share * (after[j] - k1[j]);
-        if (tangents != nullptr) tangents->jerk[late_row][j] = (after[j] - k1[j]) / h;
-      }
-      if (tangents == nullptr) continue;
-      tangents->acceleration.middleCols<2>(2 * late_row) =
-          (1 - share) * before.acceleration + share * t.acceleration;
+    for (; late_row < rows && step.Reaches(times[late_row] - late); ++late_row) {
+      FillAcceleration(step, times[late_row] - late, late_row, motion, tangents);
     }
-    now = next;
-    k1 = after;
-    if (tangents != nullptr) before = t;
   }
+  return motion;
 }
 
 }  // namespace upswing::machine

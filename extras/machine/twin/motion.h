@@ -1,11 +1,13 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 #include <vector>
 
 #include "extras/machine/logs/log.h"
 #include "extras/machine/twin/twin.h"
 #include "pendulum/equations.h"
+#include "pendulum/regressor.h"
 
 /// A twin's motion under the torques of a log.
 namespace upswing::machine {
@@ -46,38 +48,78 @@ class Drive {
   std::vector<Joints> slopes_;    // (n) their derivatives by the lag, N·m/s
 };
 
-/// Number of values that a motion has derivatives by: the start's q1, q2, w1, w2; the constants of
-/// Manipulator in their order; delay and lag of the drive.
-inline constexpr int kTangents = 16;
+/// Rows of the derivatives of a motion: by the start state (q1, q2, w1, w2), by the constants of
+/// Manipulator in their order, and by the drive's times.
+namespace tangent {
+enum Row {
+  kStart = 0,
+  kBody = kStart + 4,
+  kDelay = kBody + kNumManipulatorConstants,
+  kLag,
+  kRows,
+};
+}
+inline constexpr int kTangents = tangent::kRows;
 
-/// Derivatives of a state and of its acceleration. A row for each value.
-struct StepTangents {
+/// A point of a motion.
+struct MotionPoint {
+  double time;  // s
+  PendulumState state;
+  Joints acceleration;  // rad/s²
+};
+
+/// The derivatives of a point.
+struct PointTangents {
   Eigen::Matrix<double, kTangents, 4> state;  // q1, q2, w1, w2
   Eigen::Matrix<double, kTangents, 2> acceleration;
 };
 
-/// One step of Runge-Kutta of order 4 of length `h` (s) from `time` (s), under the torques of a
-/// drive. `acceleration` (rad/s²): in, of the state before the step; out, of the state after it.
-/// `tangents`, unless null, change as both.
-PendulumState StepMotion(const Manipulator& body, const Drive& drive, const PendulumState& now,
-                         double time, double h, int& cursor, Joints& acceleration,
-                         StepTangents* tangents = nullptr);
+/// Integrates the motion of a body under the torques of a drive. Both must outlive it.
+class MotionIntegrator {
+ public:
+  MotionIntegrator(const Manipulator& body, const Drive& drive) : body_(body), drive_(drive) {}
+
+  /// The point in a state at a time (s).
+  MotionPoint Start(double time, const PendulumState& state);
+  /// The same with its derivatives.
+  MotionPoint Start(double time, const PendulumState& state, PointTangents& tangents);
+  /// The point after a step of Runge-Kutta of order 4 of length `h` (s).
+  MotionPoint Step(const MotionPoint& now, double h);
+  /// The same. `tangents`: in, of the point before the step; out, of the point after it.
+  MotionPoint Step(const MotionPoint& now, double h, PointTangents& tangents);
+
+ private:
+  const Manipulator& body_;
+  const Drive& drive_;
+  int cursor_ = 0;
+};
 
 /// The equations of motion of a twin. `reported`: driven by reported torques instead of commanded
 /// ones. Reported torques lack current_inertia · q̈, so each joint has less armature.
 Manipulator BodyOf(const Twin& twin, bool reported = false);
 
-/// A predicted motion at the rows of a log.
+/// A twin as the model of a log: its body, its torques over the time of the log, and its encoders.
+struct MotionModel {
+  Manipulator body;
+  Drive drive;
+  Joints zero{};  // measured angles of joints that hang, rad
+};
+/// The model of a twin that the log's commands drive.
+MotionModel CommandedModel(const MachineLog& log, const Twin& twin);
+/// The model of a twin that the log's reported torques drive.
+MotionModel ReportedModel(const MachineLog& log, const Twin& twin);
+
+/// A predicted motion at n moments.
 struct Motion {
-  std::vector<Joints> angle;         // as the encoders would show them, rad
-  std::vector<Joints> velocity;      // rad/s
-  std::vector<Joints> acceleration;  // rad/s², current_delay before each row
+  std::vector<Joints> angle;         // (n) as the encoders would show them, rad
+  std::vector<Joints> velocity;      // (n) rad/s
+  std::vector<Joints> acceleration;  // (n) of late moments, rad/s²
 };
 
-/// Derivatives of a predicted motion. Columns 2k and 2k + 1 are of the joints in row k.
+/// Derivatives of a predicted motion. Columns 2k and 2k + 1 are of the joints at moment k.
 struct MotionTangents {
   Eigen::Matrix<double, kTangents, Eigen::Dynamic> angle, acceleration;
-  std::vector<Joints> jerk;  // rad/s³, where `acceleration` is
+  std::vector<Joints> jerk;  // (n) rad/s³, where `acceleration` is
 };
 
 /// Longest step of the integration (Runge-Kutta of order 4), s. Dry friction needs short steps: a
@@ -86,12 +128,10 @@ inline constexpr double kMotionStep = 0.0005;
 /// Number of equal steps for a time of `seconds`, at least 1.
 int MotionSteps(double seconds);
 
-/// The motion from row `first` to before row `last`, from a state at the first row's time. The
-/// state's angles are measured ones: joints that hang show Twin::sensors' zeros.
-/// `acceleration_age`: time before each row for which `acceleration` is filled, s. `tangents` are
-/// filled unless null.
-void Predict(const Manipulator& body, const Drive& drive, const Joints& zero,
-             const PendulumState& start, const MachineLog& log, int first, int last,
-             double acceleration_age, Motion& motion, MotionTangents* tangents = nullptr);
+/// The motion at the moments `times` (n; s, growing), from a state at the first one. The state's
+/// angles are measured ones. `late`: time from a moment of `acceleration` to the moment of the
+/// angles, s. `tangents` are filled unless null.
+Motion Predict(const MotionModel& model, const PendulumState& start, std::span<const double> times,
+               double late = 0, MotionTangents* tangents = nullptr);
 
 }  // namespace upswing::machine

@@ -94,9 +94,8 @@ TEST(Predict, ConservesEnergyWithoutFrictionAndTorque) {
     log.time.push_back(0.002 * k);
     log.angle.push_back({});
   }
-  Motion motion;
   const Manipulator body = BodyOf(twin);
-  Predict(body, Drive::Commanded(log, twin), {}, {1, 0.5, 0, 0}, log, 0, log.rows(), 0, motion);
+  const Motion motion = Predict({body, Drive::Commanded(log, twin)}, {1, 0.5, 0, 0}, log.time);
   const auto energy = [&](int k) {
     return body
         .At({motion.angle[k][0], motion.angle[k][1], motion.velocity[k][0], motion.velocity[k][1]})
@@ -117,9 +116,8 @@ void ExpectPredictionRepeatsTheLog(double delay, double current_delay) {
                                  [](const CycleInput& in) -> Joints {
                                    return {1.5 * std::sin(6 * in.time), std::cos(4 * in.time)};
                                  });
-  Motion motion;
-  Predict(BodyOf(twin), Drive::Commanded(log, twin), {0.02, -0.01}, {0.52, -0.31, 0, 0}, log, 0,
-          log.rows(), twin.actuator.current_delay, motion);
+  const Motion motion = Predict(CommandedModel(log, twin), {0.52, -0.31, 0, 0}, log.time,
+                                twin.actuator.current_delay);
   const Drive drive = Drive::Commanded(log, twin);
   for (int k = 10; k < log.rows() - 2; k += 20) {
     int cursor = 0;
@@ -150,19 +148,22 @@ TEST(Predict, KnowsItsDerivatives) {
                                  });
   std::array<double, kTangents> values{0.5, -0.3, 1, 2};
   const Manipulator body = BodyOf(twin);
-  const auto* constants = &body.J1;
-  std::copy(constants, constants + 10, values.begin() + 4);
-  values[14] = 0.0023;  // no event is at an end of a step, where the derivative jumps
-  values[15] = twin.actuator.lag;
+  for (int k = 0; k < kNumManipulatorConstants; ++k) {
+    values[tangent::kBody + k] = body.*kManipulatorConstants[k];
+  }
+  // No event is at an end of a step, where the derivative jumps.
+  values[tangent::kDelay] = 0.0023;
+  values[tangent::kLag] = twin.actuator.lag;
   const auto predict = [&](const std::array<double, kTangents>& v, MotionTangents* tangents) {
     Twin other = twin;
-    other.actuator.delay = v[14];
-    other.actuator.lag = v[15];
-    Motion motion;
-    Predict({v[4], v[5], v[6], v[7], v[8], v[9], v[10], v[11], v[12], v[13]},
-            Drive::Commanded(log, other), {}, {v[0], v[1], v[2], v[3]}, log, 2, log.rows(), 0.003,
-            motion, tangents);
-    return motion;
+    other.actuator.delay = v[tangent::kDelay];
+    other.actuator.lag = v[tangent::kLag];
+    MotionModel model{Manipulator(), Drive::Commanded(log, other)};
+    for (int k = 0; k < kNumManipulatorConstants; ++k) {
+      model.body.*kManipulatorConstants[k] = v[tangent::kBody + k];
+    }
+    return Predict(model, {v[0], v[1], v[2], v[3]}, std::span(log.time).subspan(2), 0.003,
+                   tangents);
   };
   MotionTangents tangents;
   predict(values, &tangents);

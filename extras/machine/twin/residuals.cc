@@ -1,6 +1,97 @@
 #include "extras/machine/twin/residuals.h"
 
+#include "extras/machine/logs/check.h"
+
 namespace upswing::machine {
+namespace {
+
+constexpr int kStartStates = tangent::kBody - tangent::kStart;
+constexpr int kVariables = kStartStates + kConstants;
+// A column of derivatives begins with those of the motion.
+static_assert(kStartStates + constant::kBody == tangent::kBody);
+static_assert(kStartStates + constant::kLag + 1 == kTangents);
+
+/// Residuals of a window of n rows, with their derivatives unless J is empty.
+struct Residuals {
+  Eigen::VectorXd r;                                    // (2 n)
+  Eigen::Matrix<double, kVariables, Eigen::Dynamic> J;  // (kVariables × 2 n)
+
+  Residuals(int rows, bool linearizes)
+      : r(Eigen::VectorXd::Zero(2 * rows)), J(kVariables, linearizes ? 2 * rows : 0) {}
+
+  void SetZero() {
+    r.setZero();
+    J.setZero();
+  }
+  /// Sets the derivatives of residual i by the motion, and by the zeros. Start states have measured
+  /// angles, so a larger zero is a smaller true angle at the start.
+  void SetTangents(int i, const Eigen::Matrix<double, kTangents, 1>& by_motion) {
+    J.col(i).setZero();
+    J.col(i).head<kTangents>() = by_motion;
+    J(kStartStates + constant::kZero1, i) = -by_motion(tangent::kStart);
+    J(kStartStates + constant::kZero2, i) = -by_motion(tangent::kStart + 1);
+  }
+  void Add(int i, int constant, double derivative) { J(kStartStates + constant, i) += derivative; }
+
+  SquaredResiduals Square() const {
+    const double rows = static_cast<double>(r.size()) / 2;
+    SquaredResiduals squared;
+    squared.mean = r.squaredNorm() / rows;
+    if (J.cols() == 0) return squared;
+    squared.H = J * J.transpose() / rows;
+    squared.g = J * r / rows;
+    return squared;
+  }
+};
+
+/// A predicted window; its derivatives are empty unless asked for.
+struct PredictedWindow {
+  Motion motion;
+  MotionTangents tangents;
+};
+
+void SetAngles(const MachineLog& log, const LogWindow& window, const PredictedWindow& predicted,
+               bool linearizes, Residuals& of) {
+  for (int k = 0; k < window.rows(); ++k) {
+    for (int j = 0; j < 2; ++j) {
+      const int i = 2 * k + j;
+      of.r(i) = predicted.motion.angle[k][j] - log.angle[window.first + k][j];
+      if (!linearizes) continue;
+      of.SetTangents(i, predicted.tangents.angle.col(i));
+      of.Add(i, constant::kZero1 + j, 1);
+    }
+  }
+}
+
+/// The reported torque is that of the drive, current_delay before the row, without the part that
+/// opposes the acceleration.
+void SetTorques(const ModelledLog& modelled, const LogWindow& window,
+                const PredictedWindow& predicted, bool linearizes, Residuals& of) {
+  const auto& [log, reported, motor, model] = modelled;
+  const auto& [motion, tangents] = predicted;
+  of.SetZero();
+  int cursor = 0;
+  for (int k = 0; k < window.rows(); ++k) {
+    DriveTangents of_torque;
+    const double time = log.time[window.first + k] - motor.current_delay;
+    const Joints torque = model.drive.At(time, cursor, linearizes ? &of_torque : nullptr);
+    for (int j = 0; j < 2; ++j) {
+      if (!reported[j]) continue;
+      const int i = 2 * k + j;
+      of.r(i) = torque[j] - motor.current_inertia * motion.acceleration[k][j] -
+                log.measured[window.first + k][j];
+      if (!linearizes) continue;
+      of.SetTangents(i, -motor.current_inertia * tangents.acceleration.col(i));
+      of.Add(i, constant::kDelay, of_torque.by_delay[j]);
+      of.Add(i, constant::kLag, of_torque.by_lag[j]);
+      of.Add(i, constant::kCurrentDelay,
+             of_torque.by_delay[j] + motor.current_inertia * tangents.jerk[k][j]);
+      of.Add(i, constant::kCurrentInertia, -motion.acceleration[k][j]);
+    }
+  }
+}
+
+}  // namespace
 
 Constants ConstantsOf(const Twin& twin) {
   const Manipulator m = BodyOf(twin);
@@ -11,61 +102,27 @@ Constants ConstantsOf(const Twin& twin) {
   return c;
 }
 
-WindowResiduals ResidualsOf(const MachineLog& log, const LogWindow& window,
-                            const std::array<bool, 2>& reported, const Eigen::Vector4d& x,
-                            const Twin& twin, const Drive& drive, bool linearizes) {
-  const int first = window.first, last = window.last;
-  const Actuator& motor = twin.actuator;
-  Motion motion;
-  MotionTangents tangents;
-  Predict(BodyOf(twin), drive, {twin.sensors.zero1, twin.sensors.zero2}, {x(0), x(1), x(2), x(3)},
-          log, first, last, motor.current_delay, motion, linearizes ? &tangents : nullptr);
-  const int rows = last - first;
-  WindowResiduals residuals;
-  Eigen::Matrix<double, 4 + kConstants, Eigen::Dynamic> J(4 + kConstants,
-                                                          linearizes ? 2 * rows : 0);
-  Eigen::VectorXd r = Eigen::VectorXd::Zero(2 * rows);
-  const auto square = [&](SquaredResiduals& s) {
-    s.mean = r.squaredNorm() / rows;
-    if (!linearizes) return;
-    s.H = J * J.transpose() / rows;
-    s.g = J * r / rows;
-  };
-  for (int k = 0; k < rows; ++k) {
-    for (int j = 0; j < 2; ++j) {
-      const int i = 2 * k + j;
-      r(i) = motion.angle[k][j] - log.angle[first + k][j];
-      if (!linearizes) continue;
-      J.col(i) << tangents.angle.col(i), -tangents.angle(0, i), -tangents.angle(1, i), 0, 0;
-      J(kTangents + j, i) += 1;
-    }
-  }
-  square(residuals.angle);
-  if (log.measured.empty()) return residuals;
-  int cursor = 0;
-  r.setZero();
-  if (linearizes) J.setZero();
-  for (int k = 0; k < rows; ++k) {
-    DriveTangents of_torque;
-    const double time = log.time[first + k] - motor.current_delay;
-    const Joints torque = drive.At(time, cursor, linearizes ? &of_torque : nullptr);
-    for (int j = 0; j < 2; ++j) {
-      if (!reported[j]) continue;
-      const int i = 2 * k + j;
-      r(i) = torque[j] - motor.current_inertia * motion.acceleration[k][j] -
-             log.measured[first + k][j];
-      if (!linearizes) continue;
-      const Eigen::Matrix<double, kTangents, 1> slope =
-          -motor.current_inertia * tangents.acceleration.col(i);
-      J.col(i) << slope, -slope(0), -slope(1),
-          of_torque.by_delay[j] + motor.current_inertia * tangents.jerk[k][j],
-          -motion.acceleration[k][j];
-      J(kTangents - 2, i) += of_torque.by_delay[j];
-      J(kTangents - 1, i) += of_torque.by_lag[j];
-    }
-  }
-  square(residuals.torque);
-  return residuals;
+ModelledLog::ModelledLog(const MachineLog& of, const Twin& twin)
+    : log(of),
+      reported{HasTorque(of.measured, 0), HasTorque(of.measured, 1)},
+      motor(twin.actuator),
+      model(CommandedModel(of, twin)) {}
+
+WindowResiduals ResidualsOf(const ModelledLog& modelled, const LogWindow& window,
+                            const Eigen::Vector4d& x, bool linearizes) {
+  const MachineLog& log = modelled.log;
+  PredictedWindow predicted;
+  predicted.motion =
+      Predict(modelled.model, {x(0), x(1), x(2), x(3)}, window.TimesIn(log),
+              modelled.motor.current_delay, linearizes ? &predicted.tangents : nullptr);
+  Residuals residuals(window.rows(), linearizes);
+  WindowResiduals result;
+  SetAngles(log, window, predicted, linearizes, residuals);
+  result.angle = residuals.Square();
+  if (log.measured.empty()) return result;
+  SetTorques(modelled, window, predicted, linearizes, residuals);
+  result.torque = residuals.Square();
+  return result;
 }
 
 }  // namespace upswing::machine

@@ -11,9 +11,21 @@
 /// The residuals of a window of a log, with their derivatives: what a fit sums.
 namespace upswing::machine {
 
-/// Number of constants: those of the motion without the start, zeros, current_delay and
-/// current_inertia.
-inline constexpr int kConstants = kTangents - 4 + 4;
+/// Rows of the constants that residuals depend on besides the start state: those of the motion,
+/// zeros, current_delay and current_inertia.
+namespace constant {
+enum Row {
+  kBody = 0,
+  kDelay = kBody + kNumManipulatorConstants,
+  kLag,
+  kZero1,
+  kZero2,
+  kCurrentDelay,
+  kCurrentInertia,
+  kRows,
+};
+}
+inline constexpr int kConstants = constant::kRows;
 using Constants = Eigen::Matrix<double, kConstants, 1>;
 using ConstantsMatrix = Eigen::Matrix<double, kConstants, kConstants>;
 
@@ -33,11 +45,19 @@ struct WindowResiduals {
   SquaredResiduals angle, torque;
 };
 
-/// The residuals of a window from the start state x (rad, rad, rad/s, rad/s), predicted minus
-/// measured. `reported`: whether the joints report torques. Derivatives are zero unless
-/// `linearizes`.
-WindowResiduals ResidualsOf(const MachineLog& log, const LogWindow& window,
-                            const std::array<bool, 2>& reported, const Eigen::Vector4d& x,
-                            const Twin& twin, const Drive& drive, bool linearizes);
+/// A log, which must outlive this, and a twin as its model.
+struct ModelledLog {
+  ModelledLog(const MachineLog& of, const Twin& twin);
+
+  const MachineLog& log;
+  std::array<bool, 2> reported;  // whether the joints report torques
+  Actuator motor;
+  MotionModel model;
+};
+
+/// The residuals of a window of the log from the start state x (rad, rad, rad/s, rad/s), predicted
+/// minus measured. Derivatives are zero unless `linearizes`.
+WindowResiduals ResidualsOf(const ModelledLog& modelled, const LogWindow& window,
+                            const Eigen::Vector4d& x, bool linearizes);
 
 }  // namespace upswing::machine

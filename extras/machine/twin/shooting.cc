@@ -4,8 +4,6 @@
 #include <cmath>
 #include <set>
 
-#include "extras/machine/logs/check.h"
-
 namespace upswing::machine {
 namespace {
 
@@ -30,9 +28,6 @@ double MedianError(const std::vector<WindowResiduals>& residuals,
 ShootingModel::ShootingModel(std::span<const MachineLog> logs, const FitParameters& parameters,
                              const WindowRules& rules, ThreadPool* pool)
     : logs_(logs), parameters_(parameters), pool_(pool) {
-  for (const MachineLog& log : logs) {
-    reported_.push_back({HasTorque(log.measured, 0), HasTorque(log.measured, 1)});
-  }
   windows_ =
       CutWindows(logs, rules, parameters.FirstNumber("length1"), parameters.FirstNumber("length2"));
   for (const LogWindow& w : windows_) {
@@ -62,15 +57,13 @@ std::vector<WindowResiduals> ShootingModel::ResidualsAt(const FitPoint& point,
   for (int s = 0; s < parameters_.sessions().size(); ++s) {
     twins.push_back(parameters_.TwinAt(point.theta, s));
   }
-  std::vector<Drive> drives;  // (logs)
+  std::vector<ModelledLog> modelled;  // (logs)
   for (size_t i = 0; i < logs_.size(); ++i) {
-    drives.push_back(Drive::Commanded(logs_[i], twins[parameters_.sessions().of_log[i]]));
+    modelled.emplace_back(logs_[i], twins[parameters_.sessions().of_log[i]]);
   }
   std::vector<WindowResiduals> residuals(windows_.size());
   ParallelFor(pool_, windows(), [&](int w) {
-    const int log = LogOfWindow(w);
-    residuals[w] = ResidualsOf(logs_[log], windows_[w], reported_[log], point.starts[w],
-                               twins[SessionOfWindow(w)], drives[log], linearizes);
+    residuals[w] = ResidualsOf(modelled[LogOfWindow(w)], windows_[w], point.starts[w], linearizes);
   });
   return residuals;
 }

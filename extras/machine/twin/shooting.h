@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <span>
 #include <vector>
 
@@ -75,7 +74,6 @@ class ShootingModel {
   std::span<const MachineLog> logs_;
   const FitParameters& parameters_;
   ThreadPool* pool_;
-  std::vector<std::array<bool, 2>> reported_;  // (logs) whether the joints report torques
   std::vector<LogWindow> windows_;
   std::vector<Eigen::Vector4d> cubics_;  // (windows) start states
 };

@@ -19,23 +19,16 @@ void SimulatedMachine::Advance(double time) {
   const int steps = MotionSteps(time - begin);
   const double h = (time - begin) / steps;
   if (h <= 0) return;
-  int cursor = 0;
+  MotionIntegrator integrator(body_, drive_);
   for (int i = 0; i < steps; ++i) {
-    const double end = i + 1 == steps ? time : begin + (i + 1) * h;
-    moments_.push_back(After(moments_.back(), h, end, cursor));
+    MotionPoint next = integrator.Step(moments_.back(), h);
+    next.time = i + 1 == steps ? time : begin + (i + 1) * h;
+    moments_.push_back(next);
   }
   const double oldest = time - std::max({twin_.actuator.current_delay, -twin_.actuator.delay, 0.0});
   while (moments_.size() > 2 && moments_[1].time <= oldest) moments_.pop_front();
   constexpr double kKept = 0.2;  // s
   drive_.Forget(time - kKept);
-}
-
-SimulatedMachine::Moment SimulatedMachine::After(const Moment& moment, double h, double time,
-                                                 int& cursor) const {
-  Moment next = moment;
-  next.state = StepMotion(body_, drive_, next.state, next.time, h, cursor, next.acceleration);
-  next.time = time;
-  return next;
 }
 
 void SimulatedMachine::Command(const Joints& torque) {
@@ -48,23 +41,21 @@ void SimulatedMachine::Command(const Joints& torque) {
   Advance(now);
 }
 
-SimulatedMachine::Moment SimulatedMachine::Ago(double age) const {
+MotionPoint SimulatedMachine::Ago(double age) const {
   if (age < 0) {
-    Moment moment = moments_.back();
-    int cursor = 0;
+    MotionPoint moment = moments_.back();
+    MotionIntegrator integrator(body_, drive_);
     const int steps = MotionSteps(-age);
-    for (int i = 0; i < steps; ++i) {
-      moment = After(moment, -age / steps, moment.time - age / steps, cursor);
-    }
+    for (int i = 0; i < steps; ++i) moment = integrator.Step(moment, -age / steps);
     return moment;
   }
   const double then = time() - age;
   if (then <= moments_.front().time) return moments_.front();
   size_t i = moments_.size() - 1;
   while (i > 0 && moments_[i - 1].time > then) --i;
-  const Moment &a = moments_[i - 1], &b = moments_[i];
+  const MotionPoint &a = moments_[i - 1], &b = moments_[i];
   const double h = b.time - a.time, share = (then - a.time) / h;
-  Moment moment{then, StateBetween(a.state, b.state, h, share), {}};
+  MotionPoint moment{then, StateBetween(a.state, b.state, h, share), {}};
   for (int j = 0; j < 2; ++j) {
     moment.acceleration[j] = a.acceleration[j] + share * (b.acceleration[j] - a.acceleration[j]);
   }
@@ -73,7 +64,7 @@ SimulatedMachine::Moment SimulatedMachine::Ago(double age) const {
 
 MachineReading SimulatedMachine::Read() const {
   const MachineSensors& sensors = twin_.sensors;
-  const Moment late = Ago(twin_.actuator.current_delay);
+  const MotionPoint late = Ago(twin_.actuator.current_delay);
   int cursor = 0;
   const Joints torque = drive_.At(late.time, cursor);
   MachineReading reading{{state().q1 + sensors.zero1, state().q2 + sensors.zero2}, {}};

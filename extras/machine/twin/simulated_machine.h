@@ -44,22 +44,15 @@ class SimulatedMachine {
   const PendulumState& state() const { return moments_.back().state; }
 
  private:
-  struct Moment {
-    double time;
-    PendulumState state;
-    Joints acceleration;  // rad/s²
-  };
-  /// The moment at `time` (s), after `h` seconds of motion from another.
-  Moment After(const Moment& moment, double h, double time, int& cursor) const;
   /// The moment `age` seconds ago, by interpolation. Negative: ahead, under the torques sent so
   /// far.
-  Moment Ago(double age) const;
+  MotionPoint Ago(double age) const;
 
   Twin twin_;
   Manipulator body_;
   Drive drive_;
-  std::deque<Moment> moments_;  // the newest last; as long as reported torques are old and
-                                // torques act back
+  // The newest last; as long as reported torques are old and torques act back.
+  std::deque<MotionPoint> moments_;
 };
 
 /// The velocities (rad/s) that the control loop computes from measured angles: finite differences,

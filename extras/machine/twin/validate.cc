@@ -40,13 +40,10 @@ Estimate OverRuns(const Strata& sessions, const std::function<double(std::span<c
 
 std::vector<double> ErrorsIn(const MachineLog& log, const Twin& twin,
                              std::span<const LogWindow> windows, bool reported) {
-  const Drive drive = reported ? Drive::Measured(log, twin) : Drive::Commanded(log, twin);
-  const Manipulator body = BodyOf(twin, reported);
-  const Joints zero{twin.sensors.zero1, twin.sensors.zero2};
-  Motion motion;
+  const MotionModel model = reported ? ReportedModel(log, twin) : CommandedModel(log, twin);
   std::vector<double> errors;
   for (const LogWindow& w : windows) {
-    Predict(body, drive, zero, w.start, log, w.first, w.last, 0, motion);
+    const Motion motion = Predict(model, w.start, w.TimesIn(log));
     double sum = 0;
     for (int k = w.first; k < w.last; ++k) {
       for (int j = 0; j < 2; ++j) {
@@ -122,10 +119,7 @@ const LogWindow& MedianWindow(const MachineLog& log, const Twin& twin,
 
 /// A twin's prediction of a window, driven by commanded torques.
 Motion MotionIn(const MachineLog& log, const Twin& twin, const LogWindow& w) {
-  Motion motion;
-  Predict(BodyOf(twin), Drive::Commanded(log, twin), {twin.sensors.zero1, twin.sensors.zero2},
-          w.start, log, w.first, w.last, 0, motion);
-  return motion;
+  return Predict(CommandedModel(log, twin), w.start, w.TimesIn(log));
 }
 
 /// The measured and predicted angles of log `i` in one of its windows.
