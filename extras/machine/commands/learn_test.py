@@ -1,4 +1,4 @@
-#!/ usr / bin / env python3
+#!/usr/bin/env python3
 """Tests of `upswing machine learn`."""
 
 import signal
@@ -38,7 +38,7 @@ class Learn(ProgramTest):
         self.assertIn("try 1: tvlqr", done.stderr)
         report = (self.folder / "today/report.txt").read_text(encoding="utf-8")
         self.assertTrue(report.endswith(f"{command}\n"), report)
-#The command of the report runs the controller without learning.
+        # The command of the report runs the controller without learning.
         self.assertRegex(self.succeed(*command.split()[1:], "--seconds", 8),
                          r"the last \d\.\d\d s upright")
         self.refuse([*LEARN, "--link", TWIN], "today", code=2)
