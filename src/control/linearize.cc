@@ -18,7 +18,8 @@ LinearModel LinearizeUpright(const Manipulator& plant, int actuated_joint) {
   const auto angles = dynamics::AnglesOf<Dual>({q1, q2});
   const dynamics::JointPair<Dual> tau{actuated_joint == 1 ? u : none,
                                       actuated_joint == 1 ? none : u};
-  const auto r = dynamics::NetTorque<false>(plant, angles, {w1, w2}, tau);
+  // Dry friction is left out; see linearize.h.
+  const auto r = dynamics::NetTorque</*kFriction=*/false>(plant, angles, {w1, w2}, tau);
   const auto a = dynamics::AccelerationUnder(r, dynamics::MassAt(plant, angles.c2));
 
   LinearModel model;

@@ -32,7 +32,7 @@ Factors Regressor(const JointAngles<double>& angles, const Pair& velocity,
                   const Pair& acceleration) {
   Factors factors = FactorsOf([&](const Manipulator& unit) -> Pair {
     const Pair inertial = Times(dynamics::MassAt(unit, angles.c2), acceleration);
-    const Pair net = dynamics::NetTorque<false>(unit, angles, velocity, {0, 0});
+    const Pair net = dynamics::NetTorque</*kFriction=*/false>(unit, angles, velocity, {0, 0});
     return {inertial.one - net.one, inertial.two - net.two};
   });
   factors[0][column::kF1] = DryFriction(1, velocity.one);
@@ -50,7 +50,7 @@ MomentumRegressor MomentumRegressorOf(const JointAngles<double>& angles, const P
     const double rate = -angles.s2 * velocity.two;
     const Pair moved =
         Times({rate * (at1.M11 - at0.M11), rate * (at1.M12 - at0.M12), 0, 0}, velocity);
-    const Pair net = dynamics::NetTorque<false>(unit, angles, velocity, {0, 0});
+    const Pair net = dynamics::NetTorque</*kFriction=*/false>(unit, angles, velocity, {0, 0});
     return {-moved.one - net.one, -moved.two - net.two};
   });
   return of;
