@@ -120,6 +120,7 @@ void AddCatch(const LoadedPolicy& loaded, const LqrCatch& upright, CParts& parts
                           "0), which the C code does not model"));
   }
   const Manipulator m = ManipulatorOf(plant);
+  // In the order of the entries that extras/deploy/c/equations.c names.
   parts.constants.push_back({"plant", "of the equations of motion",
                              Floats(std::array{m.J1, m.J2, m.b, m.G1, m.G2, m.d1, m.d2, m.a})});
   parts.constants.push_back(
@@ -193,6 +194,7 @@ CHeader ControllerHeaderOf(const LoadedPolicy& loaded, const std::string& prefix
       AddPlan(dynamic_cast<const TvlqrPolicy&>(*loaded.policy).plan(), parts);
     } else {
       const bool energy = kind == "energy";
+      // In the order of the entries that extras/deploy/c/swing_up.c names.
       const std::vector<double> gains =
           energy ? std::vector{config.energy.kP, config.energy.kD, config.energy.kE}
                  : std::vector{config.pfl.kP, config.pfl.kD, config.pfl.kE};

@@ -1,19 +1,24 @@
 /* The swing-ups by energy shaping and by partial feedback linearisation (control/swing_up.h). */
 #include "catch.c"
 
+/* Entries of policy_law_gains: of the angle, the velocity and the energy. */
+enum { POLICY_KP, POLICY_KD, POLICY_KE };
+
 /* The law of the swing-up. */
 static inline float policy_law(const float *d) {
-  const float *c = policy_plant, *k = policy_law_gains;
+  const float kp = policy_law_gains[POLICY_KP], kd = policy_law_gains[POLICY_KD],
+              ke = policy_law_gains[POLICY_KE];
   const float w1 = d[2], w2 = d[3];
   const policy_equations e = policy_equations_at(d);
   /* Above that of rest upright. */
   const float energy = 0.5f * (e.m11 * w1 * w1 + 2.0f * e.m12 * w1 * w2 + e.m22 * w2 * w2) -
-                       c[3] * (1.0f - cosf(d[0])) - c[4] * (1.0f - cosf(d[0] + d[1]));
+                       policy_plant[POLICY_G1] * (1.0f - cosf(d[0])) -
+                       policy_plant[POLICY_G2] * (1.0f - cosf(d[0] + d[1]));
 #if POLICY_LAW == 'e'
-  return -(k[1] * (e.m12 * e.h2 - e.m22 * e.h1) + e.det * (w1 + k[0] * d[0])) /
-         (e.det * k[2] * energy + k[1] * e.m22);
+  return -(kd * (e.m12 * e.h2 - e.m22 * e.h1) + e.det * (w1 + kp * d[0])) /
+         (e.det * ke * energy + kd * e.m22);
 #else
-  const float acceleration = -k[0] * d[0] - k[1] * w1 - k[2] * energy * w1;
+  const float acceleration = -kp * d[0] - kd * w1 - ke * energy * w1;
   return e.det / e.m22 * acceleration + e.h1 - e.m12 / e.m22 * e.h2;
 #endif
 }
