@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "agents/controllers.h"
 #include "base/error.h"
 #include "base/format.h"
 #include "base/text.h"
@@ -37,39 +38,66 @@ constexpr double kLargestZero = 0.2;     // of the encoders, rad
 constexpr double kLongestSwinging = 60;  // until the links rest, s
 constexpr int kDraws = 5;                // machines of the posterior that judge a controller
 
-/// A controller to choose, and the share of dry friction that motors compensate under it.
+/// A controller to choose.
 struct Candidate {
-  PolicyArguments arguments;
-  double compensation;
+  std::string controller;   // its name (agents/controllers.h)
+  ControllerConfig config;  // with the design plant
+  double compensation = 0;  // share of dry friction that motors compensate under it
 };
 
-/// The candidates for a twin, the best first. The last two need milliseconds for a decision. They
+/// The candidates for a plant, the best first. The last two need milliseconds for a decision. They
 /// plan with dry friction, because noise makes its compensation shake a light link. Damping of the
 /// joint without a motor stands for its friction in the linear model of the regulator.
 std::vector<Candidate> CandidatesFor(const Plant& plant) {
   constexpr double kUsualCompensation = 0.95;
-  const auto with = [](const char* name, const std::vector<FlagValue>& flags) {
-    return Candidate{{name, flags, {}}, kUsualCompensation};
-  };
-  const std::vector<FlagValue> stiff{{"lqr_q1", "100"}, {"lqr_q2", "100"}, {"lqr_torque", "0.3"}};
-  std::vector<FlagValue> ahead = stiff;
-  ahead.insert(ahead.end(), {{"mpc_seconds", "0.3"}, {"mpc_angle_range", "9"}});
-  const Candidate rubbing{
-      {"mpc",
-       {{"mpc_seconds", "1"}},
-       {Concat("coulomb1=", plant.coulomb1), Concat("coulomb2=", plant.coulomb2)}},
-      0};
-  Candidate damped = rubbing;
+  ControllerConfig usual;
+  usual.plant = WithoutDryFriction(plant);
+
+  ControllerConfig stiff = usual;
+  stiff.lqr.q1 = stiff.lqr.q2 = 100;
+  stiff.lqr.torque = 0.3;
+
+  ControllerConfig slow = usual;
+  slow.tvlqr = {.seconds = 6, .reserve = 0.1};
+
+  ControllerConfig ahead = stiff;
+  ahead.mpc.seconds = 0.3;
+  ahead.mpc.angle_range = 9;
+
+  ControllerConfig rubbing = usual;
+  rubbing.mpc.seconds = 1;
+  rubbing.plant.coulomb1 = plant.coulomb1;
+  rubbing.plant.coulomb2 = plant.coulomb2;
+
+  ControllerConfig damped = rubbing;
   constexpr double kDamping = 2;  // for dry friction, s/rad
-  damped.arguments.made_for.push_back(
-      plant.actuated_joint == 1 ? Concat("damping2=", plant.damping2 + kDamping * plant.coulomb2)
-                                : Concat("damping1=", plant.damping1 + kDamping * plant.coulomb1));
-  return {with("tvlqr", {}),
-          with("tvlqr", stiff),
-          with("tvlqr", {{"tvlqr_seconds", "6"}, {"tvlqr_reserve", "0.1"}}),
-          with("mpc", ahead),
-          rubbing,
-          damped};
+  if (plant.actuated_joint == 1) {
+    damped.plant.damping2 += kDamping * plant.coulomb2;
+  } else {
+    damped.plant.damping1 += kDamping * plant.coulomb1;
+  }
+  return {{"tvlqr", usual, kUsualCompensation},
+          {"tvlqr", stiff, kUsualCompensation},
+          {"tvlqr", slow, kUsualCompensation},
+          {"mpc", ahead, kUsualCompensation},
+          {"mpc", rubbing, 0},
+          {"mpc", damped, 0}};
+}
+
+/// The arguments that design a candidate for a twin's plant, as a user gives them.
+PolicyArguments ArgumentsOf(const Candidate& candidate, const Plant& plant) {
+  const ControllerConfig usual;
+  const Plant usual_plant = WithoutDryFriction(plant);
+  PolicyArguments arguments;
+  arguments.name = candidate.controller;
+  for (const auto& [setting, before] : Differences(OptionsOf(candidate.config), OptionsOf(usual))) {
+    arguments.flags.push_back({setting.name, setting.plain_text()});
+  }
+  for (const auto& [setting, before] :
+       Differences(OptionsOf(candidate.config.plant), OptionsOf(usual_plant))) {
+    arguments.made_for.push_back(Concat(setting.name, "=", setting.plain_text()));
+  }
+  return arguments;
 }
 
 double ProcessorSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
@@ -147,27 +175,39 @@ class LearningSession {
     result_.computing += ProcessorSeconds() - begin;
   }
 
+  /// Moves the links with growing torques. `has_twin`: whether the twin can estimate the state and
+  /// its energy.
   void Excite(const Excitement& e, bool has_twin) {
-    const Limits& l = c_.limits;
-    const double energy = std::min(e.energy, kLimitShare * l.energy);
+    const double energy = std::min(e.energy, kLimitShare * c_.limits.energy);
     // Links that swing to this lean have this energy.
-    const double lean = std::min({e.lean, kLimitShare * l.angle, std::acos(1 - 2 * energy)});
-    const Manipulator body = BodyOf(twin_);
-    const double hanging = -body.At({}).energy;
-    const double velocity = kLimitShare * l.velocity;
-    const auto level = [=](const PendulumState& s) {
-      // Lean and velocity add up as energies do: links that lean and move go on to lean further.
-      const double motion = std::hypot(LargerMagnitude(Wrapped(s.q1), Wrapped(s.q1 + s.q2)) / lean,
-                                       LargerMagnitude(s.w1, s.w2) / velocity);
-      if (!has_twin) return motion;
-      return std::max(motion, (1 + body.At(s).energy / hanging) / energy);
-    };
+    const double lean =
+        std::min({e.lean, kLimitShare * c_.limits.angle, std::acos(1 - 2 * energy)});
     say_(fmt::format("excite: torques grow until the links lean {:.2f} rad, {:g} s", lean,
                      e.seconds));
     const Estimator estimator =
         has_twin ? Estimator(twin_, 1 / c_.hz) : Estimator(twin_.sensors, 1 / c_.hz);
-    Run({.limits = l, .seconds = e.seconds}, estimator,
-        Excitation(l.torque, c_.actuated_joint, level, c_.seed));
+    Run({.limits = c_.limits, .seconds = e.seconds}, estimator,
+        Excitation(c_.limits.torque, c_.actuated_joint,
+                   has_twin ? LevelWithEnergy(lean, energy) : LevelOfMotion(lean), c_.seed));
+  }
+
+  /// The level of an excitation, 1 at its aim: lean (rad) and velocity of the links.
+  Excitation::Level LevelOfMotion(double lean) const {
+    const double velocity = kLimitShare * c_.limits.velocity;
+    return [=](const PendulumState& s) {
+      // Lean and velocity add up as energies do: links that lean and move go on to lean further.
+      return std::hypot(LargerMagnitude(Wrapped(s.q1), Wrapped(s.q1 + s.q2)) / lean,
+                        LargerMagnitude(s.w1, s.w2) / velocity);
+    };
+  }
+
+  /// The same, or the energy (1: upright) of the twin as a share of `energy`, if that is more.
+  Excitation::Level LevelWithEnergy(double lean, double energy) const {
+    const Manipulator body = BodyOf(twin_);
+    const double hanging = -body.At({}).energy;
+    return [=, of_motion = LevelOfMotion(lean)](const PendulumState& s) {
+      return std::max(of_motion(s), (1 + body.At(s).energy / hanging) / energy);
+    };
   }
 
   RunOutcome Run(RunRules rules, const Estimator& estimator, MachineController controller) {
@@ -184,18 +224,7 @@ class LearningSession {
     }
     result_.motion += run.motion;
     logs_.push_back(ReadLog(rules.log).front());
-    Joints angle{}, torque{};
-    for (int k = 0; k < logs_.back().rows(); ++k) {
-      for (int j = 0; j < 2; ++j) {
-        angle[j] = LargerMagnitude(angle[j], logs_.back().angle[k][j]);
-        torque[j] = LargerMagnitude(torque[j], logs_.back().commanded[k][j]);
-      }
-    }
-    say_(
-        fmt::format("  {}: {:.1f} s, angles up to {:.2f} and {:.2f} rad, torques {:.2f} and "
-                    "{:.2f} N·m{}",
-                    rules.log, run.motion, angle[0], angle[1], torque[0], torque[1],
-                    run.reason.empty() ? "" : "; " + run.reason));
+    SayRun(rules.log, run);
     // A machine that does not answer gets no more torque.
     if (run.faulty) throw Ended{run.reason};
     const Joints& last = logs_.back().angle.back();
@@ -205,40 +234,71 @@ class LearningSession {
     return run;
   }
 
-  /// Identifies the twin from all logs, the last of which counts twice.
+  /// Says what the newest log has. `file`: its name.
+  void SayRun(const std::string& file, const RunOutcome& run) const {
+    const MachineLog& log = logs_.back();
+    Joints angle{}, torque{};
+    for (int k = 0; k < log.rows(); ++k) {
+      for (int j = 0; j < 2; ++j) {
+        angle[j] = LargerMagnitude(angle[j], log.angle[k][j]);
+        torque[j] = LargerMagnitude(torque[j], log.commanded[k][j]);
+      }
+    }
+    say_(
+        fmt::format("  {}: {:.1f} s, angles up to {:.2f} and {:.2f} rad, torques {:.2f} and "
+                    "{:.2f} N·m{}",
+                    file, run.motion, angle[0], angle[1], torque[0], torque[1],
+                    run.reason.empty() ? "" : "; " + run.reason));
+  }
+
+  /// Identifies the twin from all logs. The log of a try counts twice.
   void Fit(double window) {
     ExpectBudget();
     say_(fmt::format("identify: {}", Counted(std::ssize(logs_), "log")));
     Compute([&] {
       const Twin guess = FirstTwin(logs_, twin_);
       if (logs_.size() == 1 || ErrorOf(guess) < ErrorOf(twin_)) twin_ = guess;
-      FitConfig config{.windows = {window, window}, .iterations = 30, .tolerance = 1e-4};
-      std::vector<std::string> values =
-          Structures(/*has_motors=*/true, /*one_body=*/false).back().values;
-      values.emplace_back("length1");
-      std::vector<MachineLog> logs = logs_;
-      if (result_.tries > 0) logs.push_back(logs_.back());
-      const double quantum = twin_.sensors.quantum;
-      const FitResult fit = machine::Fit(logs, twin_, {"", values}, config, pool_);
-      if (!(fit.error < kLargestError)) {
-        throw Failure(
-            fmt::format("no twin follows the motion (error {:.2f} rad): are the signs of "
-                        "angles and torques right?",
-                        fit.error));
-      }
-      // Today's zeros and friction are known now.
-      twin_ = InSession(fit.twin, logs_.back());
-      MeasureLoop(logs_, twin_);
-      twin_.sensors.quantum = quantum;
-      twin_.name = "learned";
-      KeepValidCovariance();
+      const FitResult fit = FitLogs(window);
+      Adopt(fit.twin);
       WriteFileAtomically(out_ / "twin.toml", TwinText(twin_));
-      const Manipulator m = BodyOf(twin_);
-      say_(fmt::format(
-          "  error {:.4f} rad; gravity {:.2f} and {:.2f} N·m, dry friction {:.3f} and {:.3f} "
-          "N·m, delay {:.1f} ms, lag {:.1f} ms",
-          fit.error, m.G1, m.G2, m.f1, m.f2, 1e3 * twin_.actuator.delay, 1e3 * twin_.actuator.lag));
+      SayTwin(fit.error);
     });
+  }
+
+  /// Fits all values to windows of this length (s). Throws Failure if no twin follows the motion.
+  FitResult FitLogs(double window) const {
+    const FitConfig config{.windows = {window, window}, .iterations = 30, .tolerance = 1e-4};
+    std::vector<std::string> values =
+        Structures(/*has_motors=*/true, /*one_body=*/false).back().values;
+    values.emplace_back("length1");
+    std::vector<MachineLog> logs = logs_;
+    if (result_.tries > 0) logs.push_back(logs_.back());
+    FitResult fit = machine::Fit(logs, twin_, {"", values}, config, pool_);
+    if (!(fit.error < kLargestError)) {
+      throw Failure(
+          fmt::format("no twin follows the motion (error {:.2f} rad): are the signs of "
+                      "angles and torques right?",
+                      fit.error));
+    }
+    return fit;
+  }
+
+  /// Takes an identified twin as the machine's, with the zeros and friction of today.
+  void Adopt(const Twin& identified) {
+    const double quantum = twin_.sensors.quantum;
+    twin_ = InSession(identified, logs_.back());
+    MeasureLoop(logs_, twin_);
+    twin_.sensors.quantum = quantum;  // the user knows it
+    twin_.name = "learned";
+    KeepValidCovariance();
+  }
+
+  void SayTwin(double error) const {
+    const Manipulator m = BodyOf(twin_);
+    say_(fmt::format(
+        "  error {:.4f} rad; gravity {:.2f} and {:.2f} N·m, dry friction {:.3f} and {:.3f} "
+        "N·m, delay {:.1f} ms, lag {:.1f} ms",
+        error, m.G1, m.G2, m.f1, m.f2, 1e3 * twin_.actuator.delay, 1e3 * twin_.actuator.lag));
   }
 
   double ErrorOf(const Twin& twin) const {
@@ -314,14 +374,15 @@ class LearningSession {
       int most = -1;
       for (const Candidate& candidate : CandidatesFor(twin_.plant)) {
         try {
-          const MachinePolicy policy = GetMachinePolicy(candidate.arguments, "", twin_);
+          const PolicyArguments arguments = ArgumentsOf(candidate, twin_.plant);
+          const MachinePolicy policy = GetMachinePolicy(arguments, "", twin_);
           const int held = HeldBy(policy, candidate.compensation);
-          say_(fmt::format("design: {}: {} of {} machines of the twin", candidate.arguments.name,
-                           held, kDraws));
+          say_(fmt::format("design: {}: {} of {} machines of the twin", candidate.controller, held,
+                           kDraws));
           if (held <= most) continue;
           most = held;
           best = policy;
-          result_.controller = candidate.arguments;
+          result_.controller = arguments;
           result_.compensation = candidate.compensation;
         } catch (const Error& error) {
           say_(fmt::format("design: {}", error.what()));

@@ -56,13 +56,17 @@ std::optional<Robot> ParseRobot(const std::string& name) {
   throw BadInput(Concat("--robot: expected pendubot or acrobot, got \"", Printable(name), "\""));
 }
 
+Plant WithoutDryFriction(Plant plant) {
+  plant.coulomb1 = plant.coulomb2 = 0;
+  return plant;
+}
+
 MachinePolicy GetMachinePolicy(PolicyArguments a, const std::string& robot,
                                const std::optional<Twin>& twin) {
   const std::optional<Robot> asked = ParseRobot(robot);
   if (twin) {
-    a.plant = twin->plant;
+    a.plant = WithoutDryFriction(twin->plant);
     if (asked) a.plant->actuated_joint = static_cast<int>(*asked);
-    a.plant->coulomb1 = a.plant->coulomb2 = 0;
   }
   auto policy = std::make_shared<const LoadedPolicy>(GetPolicy(a));
   ExpectPendulum(*policy);

@@ -26,9 +26,13 @@ inline Robot RobotOf(const LoadedPolicy& policy) {
   return static_cast<Robot>(static_cast<int>(policy.plant.actuated_joint));
 }
 
+/// The plant for which controllers are designed: motors compensate most of the dry friction, and a
+/// linear model has none.
+Plant WithoutDryFriction(Plant plant);
+
 /// The policy that the arguments name, for this robot ("": the policy's own, a controller's that of
-/// the twin). With `twin`, a controller is designed for its plant without dry friction: the motors
-/// compensate most of it, and a linear model has none. Throws BadInput.
+/// the twin). With `twin`, a controller is designed for its plant without dry friction. Throws
+/// BadInput.
 MachinePolicy GetMachinePolicy(PolicyArguments a, const std::string& robot,
                                const std::optional<Twin>& twin = {});
 
