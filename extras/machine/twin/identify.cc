@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 
 #include "base/error.h"
 #include "base/text.h"
@@ -65,6 +66,125 @@ void ExpectCommands(const MachineLog& log) {
   }
 }
 
+/// Progress of several fits of equal weight, one after the other.
+class FitCounter {
+ public:
+  FitCounter(double fits, const Progress& progress) : fits_(fits), progress_(progress) {}
+  /// The progress of the next fit.
+  Progress NextPart() {
+    const double done = begun_++;
+    return [this, done](double step, double steps) {
+      if (progress_) progress_(done + step / steps, fits_);
+    };
+  }
+
+ private:
+  double fits_, begun_ = 0;
+  const Progress& progress_;
+};
+
+/// Twins of a structure from logs without those of a fold.
+struct LeftOut {
+  std::vector<Twin> twins;  // (logs) the twin that has not seen the log
+  double error;             // MeanOfSessions over 1 s, rad
+};
+
+/// Fits structures to the logs without a fold, and predicts those of the fold.
+class CrossValidation {
+ public:
+  CrossValidation(std::span<const MachineLog> logs, const Twin& first, const IdentifyConfig& config,
+                  ThreadPool* pool, FitCounter& counter)
+      : logs_(logs),
+        fold_of_(Folds(logs, config.folds)),
+        guesses_(config.folds, first),
+        config_(config.fit),
+        pool_(pool),
+        counter_(counter) {
+    // A comparison needs less than a result: windows in a row, and fewer digits.
+    config_.windows.hop = config_.windows.seconds;
+    config_.tolerance = std::max(1e-4, config_.tolerance);
+  }
+
+  /// Begins with the values of the structure before.
+  LeftOut LeaveOut(const Structure& structure) {
+    const int n = static_cast<int>(logs_.size());
+    for (int fold = 0; fold < static_cast<int>(guesses_.size()); ++fold) {
+      Twin& guess = guesses_[fold];
+      guess = Fit(Without(fold), guess, structure, config_, pool_, counter_.NextPart()).twin;
+    }
+    LeftOut result;
+    for (int i = 0; i < n; ++i) {
+      result.twins.push_back(InSession(guesses_[fold_of_[i]], logs_[i]));
+    }
+    std::vector<std::vector<double>> errors(n);
+    ParallelFor(pool_, n, [&](int i) {
+      errors[i] = WindowErrors(logs_[i], result.twins[i], kJudgedSeconds, /*reported=*/false);
+    });
+    result.error = MeanOfSessions(logs_, errors);
+    return result;
+  }
+
+ private:
+  std::vector<MachineLog> Without(int fold) const {
+    std::vector<MachineLog> others;
+    for (size_t i = 0; i < logs_.size(); ++i) {
+      if (fold_of_[i] != fold) others.push_back(logs_[i]);
+    }
+    return others;
+  }
+
+  std::span<const MachineLog> logs_;
+  std::vector<int> fold_of_;   // (logs)
+  std::vector<Twin> guesses_;  // (folds)
+  FitConfig config_;
+  ThreadPool* pool_;
+  FitCounter& counter_;
+};
+
+/// The least change between rows of joint 1, which is a step of the encoder or of the reports;
+/// nothing if no row differs.
+std::optional<double> LeastChange(std::span<const MachineLog> logs,
+                                  std::vector<Joints> MachineLog::*quantity) {
+  std::optional<double> least;
+  for (const MachineLog& log : logs) {
+    const std::vector<Joints>& values = log.*quantity;
+    for (size_t k = 1; k < values.size(); ++k) {
+      const double change = std::abs(values[k][0] - values[k - 1][0]);
+      if (change > 1e-9) least = std::min(change, least.value_or(change));
+    }
+  }
+  return least;
+}
+
+/// Timing of the cycles of a log.
+struct CycleTiming {
+  double period;                // median, s
+  double jitter;                // standard deviation of cycles that are not late, s
+  double cycles = 0, late = 0;  // numbers
+  double latest = 0;            // largest lateness, s
+};
+
+/// `cycles`: time between the rows, at least one, s.
+CycleTiming TimingOf(const std::vector<double>& cycles) {
+  constexpr double kGap = 5, kLate = 1.25;  // longest cycles that are late, on time; of the median
+  CycleTiming timing{.period = Median(cycles), .jitter = 0};
+  timing.cycles = static_cast<double>(cycles.size());
+  double squares = 0, on_time = 0;
+  for (const double cycle : cycles) {
+    if (cycle > kGap * timing.period) continue;
+    const double lateness = cycle - timing.period;
+    if (cycle > kLate * timing.period) {
+      ++timing.late;
+      timing.latest = std::max(timing.latest, lateness);
+    } else {
+      squares += lateness * lateness;
+      ++on_time;
+    }
+  }
+  timing.jitter = std::sqrt(squares / on_time);
+  return timing;
+}
+
 }  // namespace
 
 std::vector<Structure> Structures(bool has_motors, bool one_body) {
@@ -96,98 +216,49 @@ Identification Identify(std::span<const MachineLog> logs, const Twin& first,
                         const IdentifyConfig& config, ThreadPool* pool, const Progress& progress) {
   for (const MachineLog& log : logs) ExpectCommands(log);
   const std::vector<Structure> structures = Structures(HasCommands(logs), config.one_body);
+  FitCounter counter(1.0 + config.folds * static_cast<double>(structures.size()), progress);
   Identification result;
-  const int n = static_cast<int>(logs.size());
-  const double fits = 1.0 + config.folds * static_cast<double>(structures.size());
-  double done = 0;
-  const auto fit = [&](std::span<const MachineLog> own, const Twin& guess, const Structure& s,
-                       const FitConfig& how) {
-    const auto part = [&](double step, double steps) {
-      if (progress) progress(done + step / steps, fits);
-    };
-    FitResult r = Fit(own, guess, s, how, pool, part);
-    ++done;
-    return r;
-  };
-
   result.chosen = static_cast<int>(structures.size()) - 1;
-  // A comparison needs less than a result: windows in a row, and fewer digits.
-  FitConfig rough = config.fit;
-  rough.windows.hop = rough.windows.seconds;
-  rough.tolerance = std::max(1e-4, rough.tolerance);
   if (config.folds >= 2) {
-    const std::vector<int> fold = Folds(logs, config.folds);
-    double best = 0;
-    std::vector<Twin> guesses(config.folds, first);
-    for (int s = 0; s < static_cast<int>(structures.size()); ++s) {
-      std::vector<Twin> twins(n, first);
-      for (int f = 0; f < config.folds; ++f) {
-        std::vector<MachineLog> others;
-        for (int i = 0; i < n; ++i) {
-          if (fold[i] != f) others.push_back(logs[i]);
-        }
-        // Each structure begins with the values of the one before it.
-        guesses[f] = fit(others, guesses[f], structures[s], rough).twin;
-        for (int i = 0; i < n; ++i) {
-          if (fold[i] == f) twins[i] = InSession(guesses[f], logs[i]);
-        }
-      }
-      std::vector<std::vector<double>> errors(n);
-      ParallelFor(pool, n, [&](int i) {
-        errors[i] = WindowErrors(logs[i], twins[i], kJudgedSeconds, false);
-      });
-      const double error = MeanOfSessions(logs, errors);
-      result.structures.push_back({structures[s], error});
-      if (s > 0 && !(error < kWorthwhile * best)) continue;
-      best = error;
-      result.chosen = s;
-      result.left_out = twins;
+    CrossValidation validation(logs, first, config, pool, counter);
+    for (const Structure& structure : structures) {
+      const LeftOut left_out = validation.LeaveOut(structure);
+      const int index = static_cast<int>(result.structures.size());
+      result.structures.push_back({structure, left_out.error});
+      const double best = index > 0 ? result.structures[result.chosen].error : 0;
+      if (index > 0 && !(left_out.error < kWorthwhile * best)) continue;
+      result.chosen = index;
+      result.left_out = left_out.twins;
     }
   }
-  result.fit = fit(logs, first, structures[result.chosen], config.fit);
+  result.fit = Fit(logs, first, structures[result.chosen], config.fit, pool, counter.NextPart());
   MeasureLoop(logs, result.fit.twin);
   return result;
 }
 
 void MeasureLoop(std::span<const MachineLog> logs, Twin& twin) {
-  std::vector<double> periods, jitters, steps, torque_steps;
-  twin.loop.late = 0;
-  double cycles = 0, late = 0;
-  const auto note_step = [](double step, std::vector<double>& list) {
-    if (std::abs(step) > 1e-9) list.push_back(std::abs(step));
-  };
+  std::vector<double> periods, jitters;  // of logs
+  double cycles = 0, late = 0, latest = 0;
   for (const MachineLog& log : logs) {
     std::vector<double> own;
-    for (int k = 1; k < log.rows(); ++k) {
-      own.push_back(log.time[k] - log.time[k - 1]);
-      note_step(log.angle[k][0] - log.angle[k - 1][0], steps);
-      if (!log.measured.empty()) {
-        note_step(log.measured[k][0] - log.measured[k - 1][0], torque_steps);
-      }
-    }
+    for (int k = 1; k < log.rows(); ++k) own.push_back(log.time[k] - log.time[k - 1]);
     if (own.empty()) continue;
-    const double period = Median(own);
-    double squares = 0, on_time = 0;
-    for (const double p : own) {
-      if (p > 5 * period) continue;  // a gap
-      if (p > 1.25 * period) {
-        ++late;
-        twin.loop.late = std::max(twin.loop.late, p - period);
-      } else {
-        squares += (p - period) * (p - period);
-        ++on_time;
-      }
-    }
-    cycles += static_cast<double>(own.size());
-    periods.push_back(period);
-    jitters.push_back(std::sqrt(squares / on_time));
+    const CycleTiming timing = TimingOf(own);
+    periods.push_back(timing.period);
+    jitters.push_back(timing.jitter);
+    cycles += timing.cycles;
+    late += timing.late;
+    latest = std::max(latest, timing.latest);
   }
+  twin.loop.late = latest;
   if (periods.empty()) return;
   twin.loop.period = Median(periods);
   twin.loop.jitter = Median(jitters);
   twin.loop.late_share = late / cycles;
-  if (!steps.empty()) twin.sensors.quantum = std::ranges::min(steps);
-  if (!torque_steps.empty()) twin.sensors.torque_quantum = std::ranges::min(torque_steps);
+  MachineSensors& sensors = twin.sensors;
+  sensors.quantum = LeastChange(logs, &MachineLog::angle).value_or(sensors.quantum);
+  sensors.torque_quantum =
+      LeastChange(logs, &MachineLog::measured).value_or(sensors.torque_quantum);
 }
 
 }  // namespace upswing::machine
