@@ -113,10 +113,10 @@ struct Jump {
   double size;  // from the row before, rad
 };
 
-/// Speed of a joint, rad/s: the median of the three steps that end at `row` or begin there.
-double SpeedAt(const MachineLog& log, int joint, int row, bool ends) {
+/// Speed of a joint, rad/s: the median of the three steps to row `first` and the two after it.
+double SpeedFrom(const MachineLog& log, int joint, int first) {
   std::vector<double> speeds;
-  for (int k = ends ? row - 2 : row + 1; k <= (ends ? row : row + 3); ++k) {
+  for (int k = first; k < first + 3; ++k) {
     if (k < 1 || k >= log.rows()) continue;
     if (log.time[k] > log.time[k - 1]) speeds.push_back(SpeedTo(log, joint, k, 0));
   }
@@ -140,8 +140,9 @@ std::vector<Jump> JumpsOf(Pieces pieces, int joint) {
       const double seconds = log.time[k] - log.time[k - 1];
       const double size = log.angle[k][joint] - log.angle[k - 1][joint];
       if (std::abs(size) < kLeast || seconds > 5 * cycle) continue;
-      const double speed =
-          std::max(SpeedAt(log, joint, k - 1, true), SpeedAt(log, joint, k, false));
+      const double speed_before = SpeedFrom(log, joint, k - 3);
+      const double speed_after = SpeedFrom(log, joint, k + 1);
+      const double speed = std::max(speed_before, speed_after);
       const double step = std::max(seconds, cycle);
       if (std::abs(size) < kLeast + kJitter * speed * step + kAcceleration * step * step) continue;
       if (repeats(k) || (repeats(k - 1 - kRows) && speed > 0.5)) continue;

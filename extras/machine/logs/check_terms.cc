@@ -65,9 +65,15 @@ std::array<Terms, 2> TermsOf(const Window& window, const Reading& reading) {
       Terms& terms = both[row];
       const auto& momentum = plain.momentum[row];
       const auto& force = plain.force[row];
-      // Both columns of joint 1 contain w1. The second term has w2 only.
-      terms[kInertia] += end * momentum[row == 0 ? kJ1 : kJ2];
-      terms[kOther] += end * (row == 0 ? momentum[kJ2] - momentum[kJ1] : momentum[kA]);
+      if (row == 0) {
+        // (J1 + J2) w1 + J2 w2: the momentum of J1 is w1, that of J2 is w1 + w2.
+        terms[kInertia] += end * momentum[kJ1];
+        terms[kOther] += end * (momentum[kJ2] - momentum[kJ1]);
+      } else {
+        // J2 (w1 + w2) + a w2
+        terms[kInertia] += end * momentum[kJ2];
+        terms[kOther] += end * momentum[kA];
+      }
       terms[kCoupling] += end * momentum[kB] + dt * force[kB];
       terms[kTurnedCoupling] += end * turned2.momentum[row][kB] + dt * turned2.force[row][kB];
       terms[kLink2] += dt * force[kG2];

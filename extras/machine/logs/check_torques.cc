@@ -136,63 +136,105 @@ Pairs IdlePairs(Pieces pieces, int joint, int span) {
   return pairs;
 }
 
-void CheckTorque(Pieces pieces, int joint, const Reporter& report) {
-  const std::vector<Response> responses = ResponsesOf(pieces, joint, joint);
-  const Response best = BestOf(responses);
-  constexpr double kFollows = 0.6, kClear = 0.9, kBetter = 0.02;  // correlations
-  const double r = best.pairs.correlation(), gain = best.pairs.gain();
-  const auto add = [&](Severity severity, const std::string& text) {
-    report(severity, text, {},
-           {{"delay_rows", best.rows}, {"lag", best.lag}, {"gain", gain}, {"correlation", r}});
-  };
-  if (!(best.pairs.Sxx() > 1e-9 * best.pairs.n)) {
+constexpr double kFollows = 0.6, kClear = 0.9, kBetter = 0.02;  // correlations
+
+/// Reports a finding with the numbers of a response.
+void ReportResponse(const Reporter& report, Severity severity, const std::string& text,
+                    const Response& response) {
+  report(severity, text, {},
+         {{"delay_rows", response.rows},
+          {"lag", response.lag},
+          {"gain", response.pairs.gain()},
+          {"correlation", response.pairs.correlation()}});
+}
+
+/// Reports a command or a measurement that never changes. Returns whether one does, or the command
+/// is too short, so that there is no response to judge.
+bool LacksResponse(Pieces pieces, int joint, const Response& best, const Reporter& report) {
+  const double least = 1e-9 * best.pairs.n;
+  if (!(best.pairs.Sxx() > least)) {
     if (ActsWithoutCommand(pieces, joint)) {
-      add(Severity::kFault, fmt::format("measured torque of {:.2g} N·m (rms) without a command",
-                                        RmsOf(pieces, &MachineLog::measured, joint)));
+      ReportResponse(report, Severity::kFault,
+                     fmt::format("measured torque of {:.2g} N·m (rms) without a command",
+                                 RmsOf(pieces, &MachineLog::measured, joint)),
+                     best);
     }
-    return;
+    return true;
   }
   constexpr double kLongEnough = 0.1;  // s; a shorter command says nothing
-  if (CommandedSeconds(pieces, joint) < kLongEnough) return;
-  if (!(best.pairs.Syy() > 1e-9 * best.pairs.n)) {
-    return add(IsDriven(pieces, joint) ? Severity::kFault : Severity::kWarning,
-               "measured torque never changes: suspect a column without a measurement (leave it "
-               "out by --columns)");
-  }
+  if (CommandedSeconds(pieces, joint) < kLongEnough) return true;
+  if (best.pairs.Syy() > least) return false;
+  ReportResponse(report, IsDriven(pieces, joint) ? Severity::kFault : Severity::kWarning,
+                 "measured torque never changes: suspect a column without a measurement (leave it "
+                 "out by --columns)",
+                 best);
+  return true;
+}
+
+/// Reports columns that are swapped between the joints, or between commands and measurements.
+/// Returns whether they are.
+bool CheckSwappedTorques(Pieces pieces, int joint, const Response& best, const Reporter& report) {
+  const double r = best.pairs.correlation();
   if (r < kClear) {
     const Response other = BestOf(ResponsesOf(pieces, 1 - joint, joint));
     if (other.pairs.correlation() > std::max(kClear, r + kBetter)) {
-      return add(Severity::kFault,
-                 fmt::format("measured torque follows the command of joint {}: suspect swapped "
-                             "columns",
-                             2 - joint));
+      const int number = joint == 0 ? 2 : 1;
+      ReportResponse(report, Severity::kFault,
+                     fmt::format("measured torque follows the command of joint {}: suspect swapped "
+                                 "columns",
+                                 number),
+                     best);
+      return true;
     }
   }
-  const Response back = BestOf(ResponsesOf(pieces, joint, joint, /*is_swapped=*/true));
   constexpr double kWorse = 1.3;  // residual
-  if (best.rows == 0 && back.rows > 0 && best.residual() > kWorse * back.residual() &&
-      back.pairs.correlation() > kFollows) {
-    return add(Severity::kFault,
-               fmt::format("commanded follows measured after {}: suspect swapped columns",
-                           Counted(back.rows, "row")));
+  const Response back = BestOf(ResponsesOf(pieces, joint, joint, /*is_swapped=*/true));
+  const bool is_swapped = best.rows == 0 && back.rows > 0 &&
+                          best.residual() > kWorse * back.residual() &&
+                          back.pairs.correlation() > kFollows;
+  if (is_swapped) {
+    ReportResponse(report, Severity::kFault,
+                   fmt::format("commanded follows measured after {}: suspect swapped columns",
+                               Counted(back.rows, "row")),
+                   best);
   }
-  if (r < kFollows && !HasCommand(pieces, joint)) return;  // pushed by hand
-  if (r < kFollows) {
-    const double now = responses.front().pairs.correlation();
-    if (now < -kFollows) {
-      return add(Severity::kFault, "measured torque has the opposite sign of the command");
-    }
-    return add(Severity::kWarning,
-               fmt::format("measured torque does not follow the command (correlation {:.2f})", r));
+  return is_swapped;
+}
+
+/// Reports a measurement that does not follow the command, unless the joint is only pushed by hand.
+/// Returns whether there is none that follows.
+bool CheckFollows(Pieces pieces, int joint, const std::vector<Response>& responses,
+                  const Response& best, const Reporter& report) {
+  const double r = best.pairs.correlation();
+  if (r >= kFollows) return false;
+  if (!HasCommand(pieces, joint)) return true;
+  const Response& without_delay = responses.front();
+  if (without_delay.pairs.correlation() < -kFollows) {
+    ReportResponse(report, Severity::kFault, "measured torque has the opposite sign of the command",
+                   best);
+  } else {
+    ReportResponse(
+        report, Severity::kWarning,
+        fmt::format("measured torque does not follow the command (correlation {:.2f})", r), best);
   }
+  return true;
+}
+
+void CheckTorque(Pieces pieces, int joint, const Reporter& report) {
+  const std::vector<Response> responses = ResponsesOf(pieces, joint, joint);
+  const Response best = BestOf(responses);
+  if (LacksResponse(pieces, joint, best, report)) return;
+  if (CheckSwappedTorques(pieces, joint, best, report)) return;
+  if (CheckFollows(pieces, joint, responses, best, report)) return;
   if (CheckTorqueGain(best, report)) return;
+  const double r = best.pairs.correlation(), gain = best.pairs.gain();
   constexpr double kProportional = 0.95, kLow = 0.6, kHigh = 1.6;  // correlation, gains
   const bool is_odd = r > kProportional && (gain < kLow || gain > kHigh);
   std::string text = fmt::format(
       "measured follows commanded after {} and a lag of {:.0f} ms, gain {:.2f}, correlation {:.3f}",
       DelayText(responses, best), 1e3 * best.lag, gain, r);
   if (is_odd) text += ": suspect one of them in amperes or another unit (key factor)";
-  add(is_odd ? Severity::kWarning : Severity::kNote, text);
+  ReportResponse(report, is_odd ? Severity::kWarning : Severity::kNote, text, best);
 }
 
 /// Reports torques that no pendulum of this kind has, and commands that end at 1 exactly.
