@@ -153,6 +153,7 @@ Drive Drive::Commanded(const MachineLog& log, const Twin& twin) {
 
 Drive Drive::Measured(const MachineLog& log, const Twin& twin) {
   Drive drive(-twin.actuator.current_delay, 0);
+  drive.is_measured_ = true;
   drive.times_ = log.time;
   drive.commands_ = log.measured;
   return drive;
@@ -175,19 +176,26 @@ Joints Drive::At(double time, int& cursor, DriveTangents* tangents) const {
   if (times_.empty()) return {};
   time -= delay_;
   const int event = Find(time, cursor);
-  if (starts_.empty()) {
-    if (event < 0) return commands_.front();
-    if (event + 1 == static_cast<int>(times_.size())) return commands_.back();
-    const double share = (time - times_[event]) / (times_[event + 1] - times_[event]);
-    const Joints &a = commands_[event], &b = commands_[event + 1];
-    return {a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])};
-  }
+  return is_measured_ ? Interpolated(event, time) : Lagged(event, time, tangents);
+}
+
+Joints Drive::Interpolated(int event, double time) const {
+  if (event < 0) return commands_.front();
+  if (event + 1 == static_cast<int>(times_.size())) return commands_.back();
+  const double share = (time - times_[event]) / (times_[event + 1] - times_[event]);
+  const Joints &a = commands_[event], &b = commands_[event + 1];
+  return {a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])};
+}
+
+Joints Drive::Lagged(int event, double time, DriveTangents* tangents) const {
   if (event < 0) return {};
   const double age = time - times_[event], decay = std::exp(-age / lag_);
   const Joints &command = commands_[event], &start = starts_[event];
-  for (int j = 0; j < 2 && tangents != nullptr; ++j) {
-    tangents->by_delay[j] = (start[j] - command[j]) * decay / lag_;
-    tangents->by_lag[j] = slopes_[event][j] * decay + tangents->by_delay[j] * age / lag_;
+  if (tangents != nullptr) {
+    for (int j = 0; j < 2; ++j) {
+      tangents->by_delay[j] = (start[j] - command[j]) * decay / lag_;
+      tangents->by_lag[j] = slopes_[event][j] * decay + tangents->by_delay[j] * age / lag_;
+    }
   }
   return {command[0] + (start[0] - command[0]) * decay,
           command[1] + (start[1] - command[1]) * decay};

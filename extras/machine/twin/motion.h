@@ -41,11 +41,17 @@ class Drive {
   /// Index of the last event up to a time; -1: before the first.
   int Find(double time, int& cursor) const;
 
+  /// The torques at a time (s) without the delay, whose last event is `event`.
+  Joints Interpolated(int event, double time) const;
+  Joints Lagged(int event, double time, DriveTangents* tangents) const;
+
   double delay_, lag_;            // s
+  bool is_measured_ = false;      // interpolates between events; else each event is a command
   std::vector<double> times_;     // (n) of the events, s
-  std::vector<Joints> commands_;  // (n) from each event on, N·m; or the values at the events
-  std::vector<Joints> starts_;    // (n) torques at each event, N·m; empty: interpolated values
-  std::vector<Joints> slopes_;    // (n) their derivatives by the lag, N·m/s
+  std::vector<Joints> commands_;  // (n) from each event on, N·m; measured: the values there
+  // Of commands only:
+  std::vector<Joints> starts_;  // (n) torques at each event, N·m
+  std::vector<Joints> slopes_;  // (n) their derivatives by the lag, N·m/s
 };
 
 /// Rows of the derivatives of a motion: by the start state (q1, q2, w1, w2), by the constants of
