@@ -251,10 +251,10 @@ void PrintTwin(const Identification& found) {
   }
   if (twin.sessions.empty()) return;
   fmt::print("\nsession                        ");
-  for (const auto& [name, number] : twin.sessions.front().values) fmt::print(" {:>8}", name);
+  for (const Session::Value& v : twin.sessions.front().values) fmt::print(" {:>8}", v.setting);
   for (const Session& s : twin.sessions) {
     fmt::print("\n  {:<30}", Shortened(Printable(s.name), 30));
-    for (const auto& [name, number] : s.values) fmt::print("{:>8.4f} ", number);
+    for (const Session::Value& v : s.values) fmt::print("{:>8.4f} ", v.number);
   }
   fmt::print("\n");
 }

@@ -113,7 +113,7 @@ Session FitParameters::SessionAt(const VectorXd& theta, int session) const {
   Session result;
   result.name = sessions_.names[session];
   for (const int i : IndicesOfSession(session)) {
-    result.values.emplace_back(values_[i].name, NumberIn(own, values_[i].name));
+    result.values.push_back({values_[i].name, NumberIn(own, values_[i].name)});
   }
   return result;
 }

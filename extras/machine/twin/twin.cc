@@ -57,7 +57,8 @@ void ReadSessions(const toml::node& sessions, const std::string& where, Twin& tw
     const Options options = OptionsOf(own);
     ApplyTable(options, *node.as_table(), where, /*flat=*/true);
     for (const auto& [key, value] : *node.as_table()) {
-      session.values.emplace_back(key.str(), options.Find(key.str(), where).front()->number());
+      session.values.push_back(
+          {std::string(key.str()), options.Find(key.str(), where).front()->number()});
     }
   }
 }
@@ -177,8 +178,8 @@ std::string TwinText(const Twin& twin) {
   text += "\n" + OptionsOf(disturbance).Toml(/*comments=*/true, [](const Option&) { return true; });
   for (const Session& session : twin.sessions) {
     text += Concat("\n[sessions.", Quoted(session.name), "]\n");
-    for (const auto& [value, number] : session.values) {
-      text += Concat(value, " = ", FormatNumber(number), "\n");
+    for (const auto& [setting, number] : session.values) {
+      text += Concat(setting, " = ", FormatNumber(number), "\n");
     }
   }
   if (twin.uncertain.empty()) return text;
@@ -207,9 +208,9 @@ Twin InSession(const Twin& twin, const MachineLog& log) {
   for (const Session& session : twin.sessions) {
     if (session.name != name) continue;
     const Options options = OptionsOf(own);
-    for (const auto& [value, number] : session.values) {
-      *std::get<double*>(options.Get(value)->target) = number;
-      std::erase(own.uncertain, value);  // it is known
+    for (const auto& [setting, number] : session.values) {
+      *std::get<double*>(options.Get(setting)->target) = number;
+      std::erase(own.uncertain, setting);  // it is known
     }
     own.covariance.clear();
     for (const std::string& a : own.uncertain) {
@@ -252,7 +253,8 @@ int ActuatedJoint(const MachineLog& log, const Twin& twin) {
 
 Joints TorqueLimits(const Twin& twin, int actuated_joint) {
   Joints limit{twin.plant.torque_limit, twin.plant.torque_limit};
-  if (actuated_joint != 0) limit[2 - actuated_joint] = twin.actuator.passive_limit;
+  const int motor = actuated_joint - 1;  // index; -1: both joints drive
+  if (motor >= 0) limit[1 - motor] = twin.actuator.passive_limit;
   return limit;
 }
 

@@ -60,8 +60,13 @@ struct LoopTiming {
 /// the links hang, and dry friction holds the links a little off. Dry friction itself changes with
 /// temperature and wear, and screws or cables move.
 struct Session {
+  /// A setting of the twin, and its value in this session.
+  struct Value {
+    std::string setting;
+    double number = 0;
+  };
   std::string name;
-  std::vector<std::pair<std::string, double>> values;  // settings of the twin, by name
+  std::vector<Value> values;
 };
 
 /// The session of a log: its path from two folders above, without the last number of the file's
