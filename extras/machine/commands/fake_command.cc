@@ -1,7 +1,10 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <optional>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "base/error.h"
 #include "base/text.h"
@@ -21,16 +24,20 @@ struct FakeArguments {
   bool draw = false, quiet = false;
 };
 
-/// Parses JOINT@SECONDS.
+/// Parses JOINT@SECONDS. Throws BadInput.
 void ParseStuck(const std::string& text, MachineFaults& faults) {
-  const auto parts = Split(text, '@');
-  const auto joint = parts.empty() ? std::nullopt : ParseInteger(parts[0]);
-  const auto seconds = parts.size() == 2 ? ParseNumber(parts[1]) : std::nullopt;
-  if (!joint || *joint < 1 || *joint > 2 || !seconds || !(*seconds >= 0)) {
-    throw BadInput(
-        Concat("--stuck: expected JOINT@SECONDS such as 2@3.5, got \"", Printable(text), "\""));
+  const std::vector<std::string_view> parts = Split(text, '@');
+  if (parts.size() == 2) {
+    const std::optional<int64_t> joint = ParseInteger(parts[0]);
+    const std::optional<double> seconds = ParseNumber(parts[1]);
+    const bool is_joint = joint == 1 || joint == 2;
+    if (is_joint && seconds && *seconds >= 0) {
+      faults.stuck_after[static_cast<size_t>(*joint - 1)] = *seconds;
+      return;
+    }
   }
-  faults.stuck_after[static_cast<size_t>(*joint - 1)] = *seconds;
+  throw BadInput(
+      Concat("--stuck: expected JOINT@SECONDS such as 2@3.5, got \"", Printable(text), "\""));
 }
 
 int RunFake(const FakeArguments& a) {
