@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "mujoco/testing.h"
 #include "pendulum/pendulum_env.h"
+#include "pendulum/stages.h"
 
 namespace upswing {
 namespace {
@@ -41,32 +42,37 @@ TEST(Disturbance, SettingsAreChecked) {
   EXPECT_FALSE(disturbance.any());
 }
 
-TEST(Disturber, TorquesArriveAfterTheDelayAndNoneFromAnEarlierEpisode) {
-  Disturber motors({{0, 0}, {0, 0.02}, {0, 0.06}}, 3, {0, 0.06}, 1, "test");
+TEST(DelayedMotors, TorquesArriveAfterTheDelayAndNoneFromAnEarlierEpisode) {
+  DelayedMotors motors(3, 3);
+  Episodes episodes;
+  episodes.disturbances = {{0, 0}, {0, 0.02}, {0, 0.06}};
+  episodes.steps = {0, 0, 0};
+  StepResult result{EnvSpec()};
   // Torques that three motors apply when 1, 2, 3, … are chosen for all. The last two motors begin a
   // new episode before the step at which 5 is chosen.
   const double expected[7][3] = {{1, 0, 0}, {2, 1, 0}, {3, 2, 0}, {4, 3, 1},
                                  {5, 0, 0}, {6, 5, 0}, {7, 6, 0}};
-  std::vector<int64_t> steps{0, 0, 0};
   for (int k = 0; k < 7; ++k) {
     if (k == 4) {
-      motors.Begin(1, {});
-      motors.Begin(2, {});
-      steps[1] = steps[2] = 0;
+      motors.Begin(1, episodes, {});
+      motors.Begin(2, episodes, {});
+      episodes.steps[1] = episodes.steps[2] = 0;
     }
-    const auto held = motors.Apply(std::vector<double>(3, k + 1), steps);
-    for (size_t i = 0; i < 3; ++i) EXPECT_EQ(held[i], expected[k][i]) << k << ", " << i;
-    for (int64_t& step : steps) ++step;
+    const std::vector<double> chosen(3, k + 1);
+    ControlStep step{episodes, chosen, chosen, {nullptr, 3, 0}, result};
+    motors.Act(step);
+    for (size_t i = 0; i < 3; ++i) EXPECT_EQ(step.applied[i], expected[k][i]) << k << ", " << i;
+    for (int64_t& count : episodes.steps) ++count;
   }
 }
 
-TEST(Disturber, NoiseIsNormalAndIndependentOnAllFour) {
+TEST(NoisySensors, NoiseIsNormalAndIndependentOnAllFour) {
   constexpr int kCount = 20000;
-  Disturber sensors({{0.3, 0}}, 1, {0.3, 0}, 1, "test");
+  NoisySensors sensors(1, {}, 1, "test");
   const PendulumState truth{1, 2, 3, 4};
   double sum[4] = {}, product[4][4] = {}, fourth[4] = {}, lag = 0, last = 0;
   for (int n = 0; n < kCount; ++n) {
-    const PendulumState s = sensors.Measure(0, truth, 0).state;
+    const PendulumState s = sensors.Measure(0, {0.3, 0}, truth, 0).state;
     const double z[4] = {(s.q1 - 1) / 0.3, (s.q2 - 2) / 0.3, (s.w1 - 3) / 0.3, (s.w2 - 4) / 0.3};
     for (int i = 0; i < 4; ++i) {
       sum[i] += z[i];
@@ -89,14 +95,16 @@ TEST(Disturber, NoiseIsNormalAndIndependentOnAllFour) {
   EXPECT_NEAR(lag / kCount, 0, error);
 }
 
-TEST(Disturber, EachEnvironmentHasItsOwnStream) {
-  Disturber two({{1, 0}}, 2, {1, 0}, 7, "test");
-  Disturber second({{0, 0}, {1, 0}}, 2, {1, 0}, 7, "test"), other({{1, 0}}, 2, {1, 0}, 7, "other");
-  (void)two.Measure(0, {}, 0);  // leaves the second environment's stream unchanged
-  const double noise = two.Measure(1, {}, 0).state.q1;
-  EXPECT_EQ(noise, second.Measure(1, {}, 0).state.q1);
-  EXPECT_NE(noise, other.Measure(1, {}, 0).state.q1);
-  EXPECT_NE(noise, Disturber({{1, 0}}, 1, {1, 0}, 7, "test").Measure(0, {}, 0).state.q1);
+TEST(NoisySensors, EachEnvironmentHasItsOwnStream) {
+  const Disturbance noisy{1, 0}, silent{0, 0};
+  NoisySensors two(2, {}, 7, "test"), second(2, {}, 7, "test");
+  NoisySensors other(1, {}, 7, "other"), first(1, {}, 7, "test");
+  (void)two.Measure(0, noisy, {}, 0);  // leaves the second environment's stream unchanged
+  (void)second.Measure(0, silent, {}, 0);
+  const double noise = two.Measure(1, noisy, {}, 0).state.q1;
+  EXPECT_EQ(noise, second.Measure(1, noisy, {}, 0).state.q1);
+  EXPECT_NE(noise, other.Measure(0, noisy, {}, 0).state.q1);
+  EXPECT_NE(noise, first.Measure(0, noisy, {}, 0).state.q1);
 }
 
 TEST(DisturbedEnv, OnlyMeasurementsHaveNoise) {

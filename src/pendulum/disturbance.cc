@@ -29,43 +29,19 @@ Disturbance Larger(const Disturbance& a, const Disturbance& b) {
            std::max(x.velocity_filter, y.velocity_filter)}};
 }
 
-Disturber::Disturber(std::vector<Disturbance> disturbances, int num_envs,
-                     const Disturbance& largest, uint64_t seed, const std::string& stream,
-                     uint64_t first_index)
-    : capacity_(static_cast<size_t>(largest.delay_steps())),
-      disturbances_(std::move(disturbances)) {
+NoisySensors::NoisySensors(int num_envs, const SensorModel& slowest, uint64_t seed,
+                           const std::string& stream, uint64_t first_index) {
+  if (!slowest.exact()) sensors_.emplace(num_envs, slowest);
   const auto n = static_cast<size_t>(num_envs);
-  disturbances_.resize(n, disturbances_.front());
-  queues_.resize(n * capacity_);
-  applied_.resize(n);
-  if (!largest.sensors.exact()) sensors_.emplace(num_envs, largest.sensors);
   for (size_t i = 0; i < n; ++i) rngs_.emplace_back(seed, stream, first_index + i);
 }
 
-void Disturber::Begin(int env, const PendulumState& start) {
-  std::ranges::fill(Queue(env), 0.0);
+void NoisySensors::Begin(int env, const PendulumState& start) {
   if (sensors_) sensors_->Begin(env, start);
 }
 
-std::span<const double> Disturber::Apply(std::span<const double> torque,
-                                         std::span<const int64_t> steps) {
-  for (size_t i = 0; i < torque.size(); ++i) {
-    applied_[i] = torque[i];
-    const int delay = disturbances_[i].delay_steps();
-    // The queue is a ring as long as the delay: the new torque replaces the one that is due now.
-    if (delay > 0) std::swap(applied_[i], Queue(static_cast<int>(i))[steps[i] % delay]);
-  }
-  return applied_;
-}
-
-void Disturber::Undo(int env, int64_t step) {
-  const auto i = static_cast<size_t>(env);
-  const int delay = disturbances_[i].delay_steps();
-  if (delay > 0) std::swap(applied_[i], Queue(env)[static_cast<size_t>(step % delay)]);
-}
-
-Measurement Disturber::Measure(int env, const PendulumState& state, double torque) {
-  const Disturbance& disturbance = disturbances_[static_cast<size_t>(env)];
+Measurement NoisySensors::Measure(int env, const Disturbance& disturbance,
+                                  const PendulumState& state, double torque) {
   Measurement measured{state, torque};
   if (sensors_) {
     const SensorModel& model = disturbance.sensors;
@@ -80,8 +56,7 @@ Measurement Disturber::Measure(int env, const PendulumState& state, double torqu
   return measured;
 }
 
-void Disturber::State(const Archive& archive) {
-  archive.Array("queues", std::span(queues_));
+void NoisySensors::State(const Archive& archive) {
   if (sensors_) sensors_->State(archive.In("sensors"));
   for (size_t i = 0; i < rngs_.size(); ++i) rngs_[i].State(archive.In(Concat("rng.", i)));
 }

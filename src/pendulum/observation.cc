@@ -14,33 +14,21 @@ void Remember(std::span<const float> before, double torque, int steps, std::span
   std::ranges::copy(older, obs.subspan(first + kMemorySize).begin());
 }
 
+void WriteGoal(const Pose& goal, int memory, std::span<float> obs) {
+  const auto inputs = obs.last(static_cast<size_t>(kGoalSize + memory * kMemorySize));
+  std::ranges::copy(GoalInputs(goal), inputs.begin());
+}
+
 ObservationBuilder::ObservationBuilder(int num_envs, int memory,
-                                       const std::optional<Plant>& identified_from, bool any_pose)
-    : memory_(memory), goals_(any_pose ? static_cast<size_t>(num_envs) : 0) {
+                                       const std::optional<Plant>& identified_from)
+    : memory_(memory) {
   if (identified_from) identifier_.emplace(*identified_from, num_envs);
-}
-
-void ObservationBuilder::SetGoal(int env, const Pose& goal) {
-  goals_[static_cast<size_t>(env)] = std::ranges::find(kPoses, goal) - kPoses.begin();
-}
-
-std::optional<Pose> ObservationBuilder::goal(int env) const {
-  if (goals_.empty()) return std::nullopt;
-  return kPoses[static_cast<size_t>(goals_[static_cast<size_t>(env)])];
-}
-
-void ObservationBuilder::WriteGoal(int env, std::span<float> obs) const {
-  const std::optional<Pose> pose = goal(env);
-  if (!pose) return;
-  const auto at = obs.last(static_cast<size_t>(kGoalSize + memory_ * kMemorySize));
-  std::ranges::copy(GoalInputs(*pose), at.begin());
 }
 
 void ObservationBuilder::Begin(int env, const Plant& plant, const PendulumState& measured,
                                std::span<float> obs) {
-  std::ranges::fill(obs, 0.0F);
   std::ranges::copy(Observe(plant, measured), obs.begin());
-  WriteGoal(env, obs);
+  std::ranges::fill(obs.last(static_cast<size_t>(memory_ * kMemorySize)), 0.0F);
   if (!identifier_) return;
   identifier_->Begin(env, measured);
   identifier_->Observe(env, measured, obs.subspan(kObservationSize, kIdentifiedSize));
@@ -59,13 +47,11 @@ void ObservationBuilder::Complete(int env, const Measurement& measured,
     identifier_->Update(env, measured.torque, measured.state, measured.velocity_noise);
     identifier_->Observe(env, measured.state, obs.subspan(kObservationSize, kIdentifiedSize));
   }
-  WriteGoal(env, obs);
   if (memory_ > 0) Remember(before, chosen, memory_, obs);
 }
 
 void ObservationBuilder::State(const Archive& archive) {
   if (identifier_) identifier_->State(archive.In("identification"));
-  if (!goals_.empty()) archive.Array("goals", std::span(goals_), {0, kPoses.size() - 1});
 }
 
 ObservationInfo ObservationInfoOf(int64_t memory, bool identified, bool any_pose) {

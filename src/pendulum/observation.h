@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include "base/archive.h"
 #include "base/policy_info.h"
@@ -37,6 +36,9 @@ inline constexpr double kMemoryVelocity = 1.0, kMemoryTorque = 5.0;
 /// filled already. `before` is the previous observation, at which the torque (N·m) was chosen.
 void Remember(std::span<const float> before, double torque, int steps, std::span<float> obs);
 
+/// Writes the inputs of a goal into an observation with `memory` past steps.
+void WriteGoal(const Pose& goal, int memory, std::span<float> obs);
+
 /// Description, for a policy file, of observations with `memory` past steps; if `identified`, an
 /// identified plant; if `any_pose`, a goal.
 ObservationInfo ObservationInfoOf(int64_t memory, bool identified = false, bool any_pose = false);
@@ -44,19 +46,12 @@ ObservationInfo ObservationInfoOf(int64_t memory, bool identified = false, bool 
 /// Builds the observations (D) of N environments from what their sensors measure:
 ///   8             of the measured state, see Observe
 ///   13            of the identified plant, if there is one
-///   2             of the goal, if it can be any pose
+///   2             of the goal, if it can be any pose; WriteGoal writes them
 ///   3 × `memory`  of the past control steps
 class ObservationBuilder {
  public:
   /// `identified_from`: the nominal plant where identification starts; none: no identification.
-  /// `any_pose`: whether observations have a goal, which is upright at first.
-  ObservationBuilder(int num_envs, int memory, const std::optional<Plant>& identified_from,
-                     bool any_pose);
-
-  /// Sets the goal of the next observations, which must have one.
-  void SetGoal(int env, const Pose& goal);
-  /// Nothing if observations have none: it is upright.
-  std::optional<Pose> goal(int env) const;
+  ObservationBuilder(int num_envs, int memory, const std::optional<Plant>& identified_from);
 
   /// Writes the first observation of an episode. `plant` gives its energy and height. Its memory is
   /// zero.
@@ -69,15 +64,12 @@ class ObservationBuilder {
   void Complete(int env, const Measurement& measured, std::span<const float> before, double chosen,
                 std::span<float> obs);
 
-  /// Saves or loads the identified plants and the goals.
+  /// Saves or loads the identified plants.
   void State(const Archive& archive);
 
  private:
-  void WriteGoal(int env, std::span<float> obs) const;
-
   int memory_;
   std::optional<Identifier> identifier_;
-  std::vector<int64_t> goals_;  // (N) indices of kPoses; empty: always upright
 };
 
 }  // namespace upswing

@@ -15,6 +15,7 @@
 #include "pendulum/own_reward.h"
 #include "pendulum/physics.h"
 #include "pendulum/randomization.h"
+#include "pendulum/stage.h"
 #include "pendulum/start_states.h"
 #include "pendulum/task.h"
 
@@ -76,7 +77,8 @@ class PendulumEnv : public VectorEnv {
   void Step(Matrix<const double> action, StepResult& result) override {
     Step(action.values(), result);
   }
-  /// Steps every environment under the torque (N), N·m.
+  /// Steps every environment under the torque (N), N·m: act, integrate, judge, observe, keep time,
+  /// begin the next step.
   void Step(std::span<const double> torque, StepResult& result);
   void SetStartNoise(double sigma) override { config_.start.noise = sigma; }
   void State(const Archive& archive) override;
@@ -89,74 +91,37 @@ class PendulumEnv : public VectorEnv {
   void Hold(int env);
 
   /// The plant of the running episode.
-  const Plant& plant(int env) const {
-    return plants_.empty() ? config_.plant(env) : plants_[static_cast<size_t>(env)];
-  }
+  const Plant& plant(int env) const { return episodes_.plants[static_cast<size_t>(env)]; }
   /// The pose that the running episode asks for; nothing without any_pose: it is upright.
-  std::optional<Pose> goal(int env) const { return builder_.goal(env); }
+  std::optional<Pose> goal(int env) const { return episodes_.goal(env); }
   /// The disturbance of the running episode.
-  Disturbance disturbance(int env) const {
-    return disturber_ ? disturber_->disturbance(env) : Disturbance();
+  const Disturbance& disturbance(int env) const {
+    return episodes_.disturbances[static_cast<size_t>(env)];
   }
-  PendulumState state(int env) const { return physics_->state(env); }
+  PendulumState state(int env) const { return episodes_.state(env); }
   /// See Physics::Push.
-  void Push(int env, const std::array<double, 2>& torque) { physics_->Push(env, torque); }
+  void Push(int env, const std::array<double, 2>& torque) { episodes_.physics->Push(env, torque); }
   /// Begins an episode of an environment in a state.
   void SetState(int env, const PendulumState& state);
 
  private:
+  /// Begins a new episode in a random state.
   void Reset(int env);
-  /// Gives a new episode its own plant and disturbance.
-  void Randomize(int env);
 
-  // The stages of a step. The torques `chosen` (N) are in N·m.
-  /// Applies sensors, identification and memory to the observations of the successors.
-  void ObserveSuccessors(std::span<const double> chosen, StepResult& result);
-  /// Counts the steps of the episodes and truncates those whose time is up.
-  void KeepTime(StepResult& result);
-  /// Judges by the goals of the episodes.
-  void JudgeByGoal(StepResult& result) const;
-  /// Replaces the built-in reward by the expression of the settings.
-  void JudgeByOwnReward(StepResult& result);
   /// Puts held environments back into their states.
   void RestoreHeld(StepResult& result);
   /// Replaces the results of steps that blew up or were held back: the successor by the last
   /// observation, the rest by zeros.
-  void StandIn(StepResult& result) const;
+  void StandIn(const ControlStep& step) const;
   /// Makes the successors the present observations, and begins new episodes.
   void BeginNextStep(const StepResult& result);
 
-  /// What the environment's sensors measure now, with noise drawn from its stream. `torque` (N·m)
-  /// acted in the last control period; 0 at the start.
-  Measurement Measure(int env, double torque);
-  /// The plant whose energy and height are in the observations.
-  const Plant& ObservedPlant(int env) const;
-  bool IsHeld(int env) const { return !held_.empty() && held_[static_cast<size_t>(env)]; }
-
-  /// One environment's observation (D) within a table of observations.
-  template <typename Table>
-  auto Row(Table& table, int env) const {
-    const auto size = static_cast<size_t>(spec_.obs_size);
-    return std::span(table).subspan(static_cast<size_t>(env) * size, size);
-  }
-
   PendulumEnvConfig config_;
   EnvSpec spec_;
-  std::unique_ptr<Physics> physics_;
-  int64_t episode_steps_;
-  std::optional<Disturber> disturber_;  // none if sensors and motors are perfect
-  std::optional<Posterior> posterior_;  // if plants and sensors are drawn from it
-  std::unique_ptr<OwnReward> reward_;   // if the settings have an expression
-  std::vector<Rng> rngs_;               // (N)
-  // Only with randomised plants, else empty:
-  std::vector<Plant> plants_;         // (N) plants of the running episodes
-  std::vector<Rng> plant_rngs_;       // (N) streams for the plants of the next episodes
-  std::vector<Rng> plant_seeds_;      // (N) plant_rngs_ before the draws of the running episodes
-  std::vector<int64_t> step_counts_;  // (N) control steps since the episode began
-  std::vector<std::optional<PendulumState>> held_;  // (N) states that the next Step keeps; or empty
-  std::vector<float> obs_;                          // (N, D)
-  ObservationBuilder builder_;
-  bool exact_;  // whether the physics' observations, of true states and plants, hold
+  Episodes episodes_;
+  std::vector<std::unique_ptr<Stage>> stages_;
+  std::vector<Rng> rngs_;   // (N) streams of the start states
+  std::vector<float> obs_;  // (N, D)
 };
 
 }  // namespace upswing

@@ -20,8 +20,7 @@ class PolicyController {
         before_(obs_.size()),
         memory_(policy_->policy->Start(1)),
         builder_(1, policy_->memory(),
-                 policy_->identifies() ? std::optional(policy_->plant) : std::nullopt,
-                 policy_->seeks_any_pose()) {}
+                 policy_->identifies() ? std::optional(policy_->plant) : std::nullopt) {}
 
   double Torque(int64_t step, const PendulumState& state) {
     const Plant& plant = policy_->plant;
@@ -31,6 +30,7 @@ class PolicyController {
       obs_.swap(before_);
       builder_.Next(0, plant, {state, torque_}, before_, torque_, obs_);
     }
+    if (policy_->seeks_any_pose()) WriteGoal(Pose(), policy_->memory(), obs_);  // upright
     policy_->policy->Act({obs_.data(), 1, policy_->policy->obs_size()}, {&torque_, 1, 1}, *memory_);
     torque_ = std::clamp(torque_, -plant.torque_limit, +plant.torque_limit);
     return torque_;
