@@ -20,6 +20,9 @@ constexpr double kNearby = 1e-3;       // rad, rad/s: no jump of the torque this
 const StateVector kRange(3.14, 3.14, 4, 4);  // ± range of samples, rad, rad/s
 constexpr double kUprightShare = 0.005;      // largest share of kRange about upright
 
+// Ends the description of the work of a controller that simulates.
+constexpr const char* kOnlyNearUpright = "; away from upright none of the simulation.";
+
 /// The settings that the controller was made with.
 ControllerConfig ConfigOf(const LoadedPolicy& loaded) {
   ControllerConfig config;
@@ -130,7 +133,48 @@ void AddCatch(const LoadedPolicy& loaded, const LqrCatch& upright, CParts& parts
   parts.macros.emplace_back("ACTUATED_JOINT", Concat(plant.actuated_joint));
 }
 
-void AddPlan(const SwingUp& plan, CParts& parts) {
+void AddGain(const Lqr& lqr, CParts& parts) {
+  parts.constants.push_back({"gain", "N m/rad, N m s/rad", Floats(lqr.K)});
+}
+
+void AddRegulator(const LoadedPolicy& /*loaded*/, const ControllerConfig& config, CParts& parts) {
+  parts.task.goal = "holds a double pendulum with one motor upright";
+  parts.work = "a product of four numbers.";
+  AddGain(SolveLqr(config.lqr, config.plant), parts);
+}
+
+/// Adds the regulator that catches, of a controller that swings up.
+void AddCatchingRegulator(const LoadedPolicy& loaded, const ControllerConfig& config,
+                          CParts& parts) {
+  const LqrCatch upright(config.lqr, config.plant);
+  AddGain(upright.lqr(), parts);
+  AddCatch(loaded, upright, parts);
+  parts.work = Concat("up to ", upright.steps(),
+                      " control periods of simulation near upright, of 16 derivatives each");
+}
+
+/// Adds a law that pumps energy, as extras/deploy/c/swing_up.c computes it.
+void AddLaw(const std::string& law, const std::vector<double>& gains, CParts& parts) {
+  parts.constants.push_back({"law_gains", "of angle, velocity and energy", Floats(gains)});
+  parts.macros.emplace_back("LAW", law);
+  parts.work += kOnlyNearUpright;
+}
+
+void AddEnergyShaping(const LoadedPolicy& loaded, const ControllerConfig& config, CParts& parts) {
+  AddCatchingRegulator(loaded, config, parts);
+  const EnergyShapingConfig& energy = config.energy;
+  AddLaw("'e' /* energy shaping */", {energy.kP, energy.kD, energy.kE}, parts);
+}
+
+void AddPartialFeedback(const LoadedPolicy& loaded, const ControllerConfig& config, CParts& parts) {
+  AddCatchingRegulator(loaded, config, parts);
+  const PartialFeedbackConfig& pfl = config.pfl;
+  AddLaw("'p' /* partial feedback linearisation */", {pfl.kP, pfl.kD, pfl.kE}, parts);
+}
+
+void AddPlan(const LoadedPolicy& loaded, const ControllerConfig& config, CParts& parts) {
+  AddCatchingRegulator(loaded, config, parts);
+  const SwingUp& plan = dynamic_cast<const TvlqrPolicy&>(*loaded.policy).plan();
   const int steps = plan.trajectory.steps();
   std::vector<double> places, gains, costs;
   for (size_t t = 0; t < static_cast<size_t>(steps); ++t) {
@@ -145,72 +189,81 @@ void AddPlan(const SwingUp& plan, CParts& parts) {
   parts.constants.push_back({"plan_gain", "N m/rad, N m s/rad", Floats(gains)});
   parts.constants.push_back({"plan_cost", "of leaving the plan", Floats(costs)});
   parts.macros.emplace_back("PLAN_STEPS", Concat(steps, " /* control periods */"));
-  parts.work += Concat(", and ", 2 * steps, " quadratic forms");
+  parts.work += Concat(", and ", 2 * steps, " quadratic forms", kOnlyNearUpright);
+}
+
+/// A controller that has C code.
+struct CController {
+  const char* name;
+  const char* file;       // of extras/deploy/c
+  int state_bytes;        // of its struct
+  bool simulates = true;  // whether it looks ahead near upright
+  /// Adds its constants, and its work at each decision.
+  void (*add)(const LoadedPolicy& loaded, const ControllerConfig& config, CParts& parts);
+};
+
+constexpr CController kControllersInC[] = {
+    {.name = "lqr", .file = "lqr.c", .state_bytes = 4, .simulates = false, .add = AddRegulator},
+    {.name = "energy", .file = "swing_up.c", .state_bytes = 4, .add = AddEnergyShaping},
+    {.name = "pfl", .file = "swing_up.c", .state_bytes = 4, .add = AddPartialFeedback},
+    {.name = "tvlqr", .file = "tvlqr.c", .state_bytes = 12, .add = AddPlan},
+};
+
+/// Why a controller has no C code.
+struct WithoutC {
+  const char* name;
+  const char* what;
+};
+
+constexpr WithoutC kWithoutC[] = {
+    {"mpc",
+     "a controller that optimises a trajectory at each decision; tvlqr follows one that is planned "
+     "once"},
+    {"hybrid", "two of them; export the policy that swings up, and lqr, each by itself"},
+};
+
+/// Throws BadInput if the controller has no C code.
+const CController& CControllerCalled(const std::string& name) {
+  for (const CController& controller : kControllersInC) {
+    if (name == controller.name) return controller;
+  }
+  std::string what = "a controller without C code";
+  for (const WithoutC& refused : kWithoutC) {
+    if (name == refused.name) what = refused.what;
+  }
+  throw BadInput(Concat(name, ": expected ", Join(ControllersInC(), ", "),
+                        " or a learned policy for C, got ", what));
 }
 
 }  // namespace
 
+std::vector<std::string> ControllersInC() { return NamesOf(kControllersInC); }
+
 CHeader ControllerHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
-  const std::string kind = loaded.policy->kind();
-  for (const auto& [refused, what] :
-       {std::pair{"mpc",
-                  "a controller that optimises a trajectory at each decision; tvlqr follows one "
-                  "that is planned once"},
-        {"hybrid", "two of them; export the policy that swings up, and lqr, each by itself"}}) {
-    if (kind != refused) continue;
-    throw BadInput(
-        Concat(kind, ": expected lqr, energy, pfl, tvlqr or a learned policy for C, got ", what));
-  }
+  const CController& controller = CControllerCalled(loaded.policy->kind());
   const ControllerConfig config = ConfigOf(loaded);
   const double limit = config.plant.torque_limit;
   const double tolerance = kTorqueShare * limit;
-  const bool simulates = kind != "lqr";
   CHeader header;
   header.prefix = prefix;
-  header.state_bytes = kind == "tvlqr" ? 12 : 4;
+  header.state_bytes = controller.state_bytes;
   // The deviation; a simulating controller also copies it, and needs five arrays for a step.
-  header.stack_bytes = 4 * sizeof(float) * (simulates ? 7 : 1);
+  header.stack_bytes = 4 * sizeof(float) * (controller.simulates ? 7 : 1);
   CParts parts;
   parts.task = PendulumTask(config.plant.actuated_joint, 0);
-  parts.task.file = kind == "lqr" || kind == "tvlqr" ? kind + ".c" : "swing_up.c";
-  if (!simulates) parts.task.goal = "holds a double pendulum with one motor upright";
+  parts.task.file = controller.file;
   parts.origin =
       Concat("It is ", CommentText(loaded.name), ": ", CommentText(loaded.policy->description()));
   parts.limit = limit;
   parts.period = kControlPeriod;
   parts.plant_use = "of which it knows all";
   parts.plant = config.plant;
-  parts.work = "a product of four numbers.";
-  const auto gain = [&](const Lqr& lqr) {
-    parts.constants.push_back({"gain", "N m/rad, N m s/rad", Floats(lqr.K)});
-  };
-  if (simulates) {
-    const LqrCatch upright(config.lqr, config.plant);
-    gain(upright.lqr());
-    AddCatch(loaded, upright, parts);
-    parts.work = Concat("up to ", upright.steps(),
-                        " control periods of simulation near upright, of 16 derivatives each");
-    if (kind == "tvlqr") {
-      AddPlan(dynamic_cast<const TvlqrPolicy&>(*loaded.policy).plan(), parts);
-    } else {
-      const bool energy = kind == "energy";
-      // In the order of the entries that extras/deploy/c/swing_up.c names.
-      const std::vector<double> gains =
-          energy ? std::vector{config.energy.kP, config.energy.kD, config.energy.kE}
-                 : std::vector{config.pfl.kP, config.pfl.kD, config.pfl.kE};
-      parts.constants.push_back({"law_gains", "of angle, velocity and energy", Floats(gains)});
-      parts.macros.emplace_back(
-          "LAW", energy ? "'e' /* energy shaping */" : "'p' /* partial feedback linearisation */");
-    }
-    parts.work += "; away from upright none of the simulation.";
-  } else {
-    gain(SolveLqr(config.lqr, config.plant));
-  }
+  controller.add(loaded, config, parts);
 
   std::vector<float> states, torques;
   DrawSamples(loaded, tolerance, states, torques);
   parts.samples = {{"sample_states", "q1, q2, w1, w2", states}, {"sample_torques", "N m", torques}};
-  if (simulates) {
+  if (controller.simulates) {
     parts.samples.push_back({"sample_steps", "deviations a control period later",
                              StepsFrom(states, torques, config.plant)});
   }

@@ -54,8 +54,11 @@ struct CSamples {
 /// Draws the samples, the same in every call. `layers` are the layers of the header's network.
 CSamples DrawSamples(const ExportedPolicy& policy, const std::vector<LayerView>& layers);
 
-/// The C header of a controller: lqr, energy, pfl or tvlqr. CHeaderOf checks the prefix. Throws
-/// BadInput for other policies.
+/// Names of the controllers that have C code.
+std::vector<std::string> ControllersInC();
+
+/// The C header of a controller with C code. CHeaderOf checks the prefix. Throws BadInput for other
+/// policies.
 CHeader ControllerHeaderOf(const LoadedPolicy& loaded, const std::string& prefix);
 
 /// Writes `text` and the number of constants. `header` already has the sizes in RAM and the prefix.

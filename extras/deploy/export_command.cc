@@ -8,6 +8,7 @@
 #include "base/format.h"
 #include "base/text.h"
 #include "cli/commands.h"
+#include "extras/deploy/c_header.h"
 #include "extras/deploy/export.h"
 #include "os/streams.h"
 #include "runs/find_policy.h"
@@ -97,8 +98,8 @@ int RunExport(const ExportArguments& a) {
 void AddExport(CommandLine& line) {
   ExportArguments& a = line.Runs(RunExport);
   line.Texts("policies", a.policies, "POLICY|RUN",
-             "policies: policy.safetensors, run folders or shipped policies; for --c also lqr, "
-             "energy, pfl or tvlqr");
+             Concat("policies: policy.safetensors, run folders or shipped policies; for --c also ",
+                    Join(ControllersInC(), ", ")));
   AddControllers(line, a.controller);
   line.Text(
       "--onnx", a.onnx, "FILE",

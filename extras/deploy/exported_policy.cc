@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/text.h"
+#include "extras/deploy/c_header.h"
 #include "pendulum/observation.h"
 
 namespace upswing::deploy {
@@ -88,8 +89,8 @@ ExportedPolicy ViewForExport(const LoadedPolicy& loaded) {
   exported.policy = dynamic_cast<const NetworkPolicy*>(loaded.policy.get());
   if (exported.policy == nullptr) {
     throw BadInput(Concat(loaded.name, ": expected a learned policy, got ",
-                          loaded.policy->description(),
-                          "; --c exports lqr, energy, pfl and tvlqr"));
+                          loaded.policy->description(), "; --c exports ",
+                          Join(ControllersInC(), ", ")));
   }
   const NetworkPolicyParts& parts = exported.policy->parts();
   exported.limit = LargestSize(exported.is_discrete() ? parts.torques : parts.action_limit);

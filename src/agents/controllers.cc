@@ -1,7 +1,5 @@
 #include "agents/controllers.h"
 
-#include <algorithm>
-
 #include "base/error.h"
 #include "base/text.h"
 #include "control/hybrid.h"
@@ -11,13 +9,6 @@
 
 namespace upswing {
 namespace {
-
-/// A controller's name and its factory.
-struct NamedController {
-  const char* name;
-  std::shared_ptr<const Policy> (*make)(const ControllerConfig& config);
-  bool only_balances = false;
-};
 
 using Made = std::shared_ptr<const Policy>;
 
@@ -69,23 +60,29 @@ Made MakeHybrid(const ControllerConfig& config) {
                                         config.swing_up_policy, config.plant);
 }
 
-constexpr NamedController kControllers[] = {
-    {"energy", MakeEnergyShaping},
-    {"hybrid", MakeHybrid},
-    {"lqr",
-     [](const ControllerConfig& config) -> Made {
-       return std::make_shared<LqrPolicy>(config.lqr, config.plant);
-     },
-     true},
-    {"mpc",
-     [](const ControllerConfig& config) -> Made {
-       return std::make_shared<MpcPolicy>(config.lqr, config.mpc, config.plant);
-     }},
-    {"pfl", MakePartialFeedback},
-    {"tvlqr",
-     [](const ControllerConfig& config) -> Made {
-       return std::make_shared<TvlqrPolicy>(config.lqr, config.tvlqr, config.plant);
-     }},
+Made MakeLqr(const ControllerConfig& config) {
+  return std::make_shared<LqrPolicy>(config.lqr, config.plant);
+}
+
+Made MakeMpc(const ControllerConfig& config) {
+  return std::make_shared<MpcPolicy>(config.lqr, config.mpc, config.plant);
+}
+
+Made MakeTvlqr(const ControllerConfig& config) {
+  return std::make_shared<TvlqrPolicy>(config.lqr, config.tvlqr, config.plant);
+}
+
+constexpr ControllerKind kControllers[] = {
+    {"energy", "pumps energy by energy shaping until lqr catches", MakeEnergyShaping},
+    {"hybrid", "lets lqr catch what --swing-up POLICY swings up", MakeHybrid},
+    {.name = "lqr",
+     .help = "holds the pendulum upright and does not swing it up",
+     .make = MakeLqr,
+     .only_balances = true},
+    {"mpc", "plans again at each decision", MakeMpc},
+    {"pfl", "pumps energy by partial feedback linearisation until lqr catches",
+     MakePartialFeedback},
+    {"tvlqr", "follows a planned swing-up", MakeTvlqr},
 };
 
 }  // namespace
@@ -101,16 +98,22 @@ void ControllerConfig::Describe(Options& o) {
       "none";
 }
 
-std::vector<std::string> ControllerNames() { return NamesOf(kControllers); }
+std::span<const ControllerKind> ControllerKinds() { return kControllers; }
 
-bool IsController(const std::string& name) {
-  return std::ranges::any_of(kControllers,
-                             [&](const NamedController& c) { return name == c.name; });
+const ControllerKind* FindController(const std::string& name) {
+  for (const ControllerKind& kind : kControllers) {
+    if (name == kind.name) return &kind;
+  }
+  return nullptr;
 }
 
+std::vector<std::string> ControllerNames() { return NamesOf(kControllers); }
+
+bool IsController(const std::string& name) { return FindController(name) != nullptr; }
+
 bool OnlyBalances(const std::string& name) {
-  return std::ranges::any_of(
-      kControllers, [&](const NamedController& c) { return name == c.name && c.only_balances; });
+  const ControllerKind* kind = FindController(name);
+  return kind != nullptr && kind->only_balances;
 }
 
 bool HasSection(const std::string& controller, const std::string& section) {
@@ -119,9 +122,7 @@ bool HasSection(const std::string& controller, const std::string& section) {
 
 std::shared_ptr<const Policy> MakeController(const std::string& name,
                                              const ControllerConfig& config) {
-  for (const NamedController& controller : kControllers) {
-    if (name == controller.name) return controller.make(config);
-  }
+  if (const ControllerKind* kind = FindController(name)) return kind->make(config);
   throw BadInput(Concat("expected a controller, one of ", Join(ControllerNames(), ", "), ", got \"",
                         name, "\""));
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,21 @@ struct ControllerConfig {
   void Describe(Options& options);
 };
 
+/// A kind of controller. Commands, help texts, Python and the page read these from one table, in
+/// controllers.cc.
+struct ControllerKind {
+  const char* name;
+  const char* help;  // what it does, with the controller as the subject: "follows a plan"
+  std::shared_ptr<const Policy> (*make)(const ControllerConfig& config);
+  bool only_balances = false;  // holds the pendulum upright and cannot swing it up
+};
+
+/// All kinds, in alphabetical order.
+std::span<const ControllerKind> ControllerKinds();
+
+/// The kind of this name; null if there is none.
+const ControllerKind* FindController(const std::string& name);
+
 /// Names of the controllers, in alphabetical order.
 std::vector<std::string> ControllerNames();
 
@@ -35,8 +51,8 @@ bool IsController(const std::string& name);
 /// Whether a controller only holds the pendulum upright and cannot swing it up.
 bool OnlyBalances(const std::string& name);
 
-/// Whether a controller has the settings of this section: its own, or those of lqr, which all
-/// controllers use.
+/// Whether a controller has the settings of this section: the section of its own name, or that of
+/// lqr, which all controllers use.
 bool HasSection(const std::string& controller, const std::string& section);
 
 /// Designs a controller. Throws BadInput if the name is unknown or no such controller exists for

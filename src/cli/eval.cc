@@ -3,6 +3,7 @@
 #include <functional>
 
 #include "agents/arguments.h"
+#include "agents/controllers.h"
 #include "agents/loaded_policy.h"
 #include "base/error.h"
 #include "base/text.h"
@@ -65,6 +66,15 @@ int RunEval(const EvalArguments& a) {
   return 0;
 }
 
+/// A line about each controller.
+std::string ControllerHelp() {
+  std::string lines;
+  for (const ControllerKind& kind : ControllerKinds()) {
+    lines += fmt::format("  {:<6}  {}\n", kind.name, kind.help);
+  }
+  return lines;
+}
+
 }  // namespace
 
 void AddEval(CommandLine& line) {
@@ -106,19 +116,13 @@ void AddEval(CommandLine& line) {
       "have the mean difference of each policy to the first, with a 95% bootstrap interval of\n"
       "pairs.\n"
       "All need one plant and one goal; --plant, --goal set them.\n\n"
-      "Controllers:\n"
-      "  lqr     holds the pendulum upright and does not swing it up\n"
-      "  tvlqr   follows a planned swing-up\n"
-      "  mpc     plans again at each decision\n"
-      "  pfl     pumps energy by partial feedback linearisation until lqr catches\n"
-      "  energy  pumps energy by energy shaping until lqr catches\n"
-      "  hybrid  lets lqr catch what --swing-up POLICY swings up\n\n"
+      "Controllers:\n{}\n"
       "The plant's flags, such as --mass2 1.3, change it; --set mass2=1.3 does the same, and\n"
       "wins over the flag.\n"
       "With --randomize each episode draws its plant from a box around the nominal one. Observed\n"
       "energy and height are scaled by the episode's plant, which tells the policy of it; with\n"
       "--unknown-plant by the training's.\n",
-      kEvaluationSeconds, kHoldSeconds, kReturnSeconds));
+      kEvaluationSeconds, kHoldSeconds, kReturnSeconds, ControllerHelp()));
 }
 
 }  // namespace upswing

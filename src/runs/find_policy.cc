@@ -122,7 +122,7 @@ LoadedPolicy GetPolicy(const PolicyArguments& a) {
   CheckSettings(a, a.name.empty() ? std::vector<std::string>() : std::vector{a.name});
   ControllerConfig config;
   SetFlags(OptionsOf(config), a.flags);
-  if (a.name == "hybrid" && !config.swing_up.empty()) {
+  if (!config.swing_up.empty()) {
     const LoadedPolicy swing_up = SwingUpNamed(config.swing_up);
     config.plant = swing_up.plant;
     config.swing_up_policy = swing_up.policy;
