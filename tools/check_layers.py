@@ -71,8 +71,8 @@ SYSTEM = re.compile(r"(unistd|fcntl|poll|sched|signal|csignal|filesystem|fstream
 # Folders of modules, with the ending of their files.
 MODULES = {"python/upswing": ".py", "web/src": ".ts"}
 IMPORT = {
-    ".py": re.compile(r"\s*from \.(?P<module>\w*) import (?P<names>[\w, ]*)"),
-    ".ts": re.compile(r"""[^/]*(?:\bfrom|\bimport\(?)\s*'(?P<module>\.[^']+)'"""),
+    ".py": re.compile(r"^[ \t]*from \.(?P<module>\w*) import (?P<names>\([^)]*\)|[\w, ]*)", re.M),
+    ".ts": re.compile(r"""^[^/\n]*(?:\bfrom|\bimport\b\s*\(?)\s*'(?P<module>\.[^']+)'""", re.M),
 }
 
 SOURCE_ENDINGS = (".h", ".inc", ".cc", ".cc.in")
@@ -170,9 +170,9 @@ def cycles(edges):
 
 def imports(path):
     """Yields (line, imported path) of a module's imports of other modules."""
-    for line, text in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
-        if not (match := IMPORT[path.suffix].match(text)):
-            continue
+    text = path.read_text(encoding="utf-8")
+    for match in IMPORT[path.suffix].finditer(text):
+        line = 1 + text.count("\n", 0, match.start("module"))
         if path.suffix == ".py":  # from .module import ..., from . import module, module
             names = [match["module"]] if match["module"] else re.findall(r"\w+", match["names"])
         else:

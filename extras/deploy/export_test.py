@@ -228,15 +228,25 @@ class PageTest(ProgramTest):
                 self.refuse(["export", "run", "--page", name], f"{name}/agents.json",
                             "expected a list of agents")
 
-    def test_a_policy_that_does_not_tell_every_setting_has_no_command(self):
+    def test_the_command_of_a_policy_of_another_version(self):
+        """Settings that its file lacks have their defaults; others than this version's are left out."""
         self.succeed(*small(out="run"))
         metadata, tensors = read_tensors(self.folder / "run/policy.safetensors")
-        self.assertIn("\ngamma = 0.99\n", metadata["config"])
-        older = metadata["config"].replace("\ngamma = 0.99\n", "\n")
-        write_tensors(self.folder / "older.safetensors", metadata | {"config": older}, tensors)
-        self.succeed("export", "run", "older.safetensors", "--page", "page")
+        config = metadata["config"]
+        self.assertIn("\ngamma = 0.99\n", config)
+        for name, other in (("lacks", config.replace("\ngamma = 0.99\n", "\n")),
+                            ("setting", config.replace("[plant]\n", '[plant]\nmodel = ""\n')),
+                            ("section", config + "\n[gone]\nbins = 51\n"),
+                            ("top", "title = 1\n" + config)):
+            self.assertNotEqual(other, config)
+            write_tensors(self.folder / f"{name}.safetensors", metadata | {"config": other}, tensors)
+        names = [f"{name}.safetensors" for name in ("lacks", "setting", "section", "top")]
+        for name in names:
+            self.succeed("export", name, "--page", "page", "--id", name.split(".")[0])
+        self.succeed("export", "run", "--page", "page")
         entries = json.loads((self.folder / "page/agents.json").read_text())["agents"]
-        self.assertEqual(["command" in entry for entry in entries], [True, False])
+        commands = {entry["command"] for entry in entries}
+        self.assertEqual((len(entries), len(commands)), (5, 1), commands)
 
 
 class ShippedTest(ProgramTest):

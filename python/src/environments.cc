@@ -18,6 +18,7 @@
 #include "base/text.h"
 #include "mujoco/engines.h"
 #include "os/host.h"
+#include "pendulum/observation.h"
 #include "pendulum/pendulum_env.h"
 #include "python/src/bindings.h"
 #include "rl/ppo/ppo_config.h"

@@ -60,7 +60,8 @@ class Lanes:
             done = bool(flags(terminated, (), where + "terminated"))
             out = bool(flags(truncated, (), where + "truncated")) and not done
             if self.lengths[i] >= limit and not (done or out):
-                out = self._limit.reach()
+                self._limit.note_reached()
+                out = True
             a["terminated"][i], a["truncated"][i] = done, out
             if not (done or out):
                 a["obs"][i] = a["next_obs"][i]
@@ -127,7 +128,7 @@ class VectorLanes:
         self._lengths += 1
         late = ~done & (self._lengths >= self._limit.steps)
         if late.any():
-            self._limit.reach()
+            self._limit.note_reached()
         a["terminated"][:] = dead
         a["truncated"][:] = (done | late) & ~dead
         self._lengths[done | late] = 0

@@ -39,12 +39,11 @@ class Limit:
         if self.steps < 1:
             raise _upswing.InputError(f"max_episode_steps: expected 1 or more, got {self.steps}")
 
-    def reach(self) -> bool:
-        """Notes that the limit ends an episode. Warns once if it is the default. Returns True."""
+    def note_reached(self) -> None:
+        """Notes that the limit ends an episode. Warns once if it is the default."""
         if self._assumed:
             self._assumed = False
             warnings.warn(
                 f"env: an episode did not end within {self.steps:,} steps, the default of "
                 "max_episode_steps for an environment without a time limit; set max_episode_steps",
-                stacklevel=4)
-        return True
+                stacklevel=4)  # the caller of train or evaluate

@@ -10,8 +10,8 @@
 namespace upswing {
 namespace {
 
-/// The algorithm that makes a `MadeAgent` with the settings `config.*kSettings`.
-template <auto kSettings, typename MadeAgent>
+/// The row of an algorithm: its settings are `config.*kSettings`, its agent is an AgentType.
+template <auto kSettings, typename AgentType>
 Algorithm Entry(std::string name) {
   return {
       .name = std::move(name),
@@ -21,7 +21,7 @@ Algorithm Entry(std::string name) {
       },
       .make = [](const Config& config, const EnvSpec& spec, uint64_t seed,
                  ThreadPool& pool) -> std::unique_ptr<Agent> {
-        return std::make_unique<MadeAgent>(config.*kSettings, spec, seed, pool);
+        return std::make_unique<AgentType>(config.*kSettings, spec, seed, pool);
       },
   };
 }

@@ -12,6 +12,7 @@ namespace upswing {
 /// A learning algorithm: its name, its settings in a configuration, and its agent.
 struct Algorithm {
   std::string name;
+  /// The settings in `config`.
   AgentConfig& (*settings)(Config& config);
   const AgentConfig& (*settings_of_const)(const Config& config);
   /// Makes an agent with the settings of `config` for environments of this kind. The threads of the
@@ -23,7 +24,8 @@ struct Algorithm {
 /// All learning algorithms; the first is the default.
 std::span<const Algorithm> Algorithms();
 
-/// The algorithm that the configuration names; the default for another name.
+/// The algorithm that the configuration names. The default for an unknown name, which
+/// CheckAlgorithm in config_layers.cc refuses.
 const Algorithm& AlgorithmOf(const Config& config);
 
 }  // namespace upswing

@@ -16,6 +16,15 @@ const std::vector<std::string>& AlgorithmNames() {
   return kNames;
 }
 
+std::vector<std::string> AlgorithmsThat(const std::function<bool(AgentConfig&)>& can) {
+  std::vector<std::string> names;
+  for (const std::string& name : AlgorithmNames()) {
+    Config defaults(name);
+    if (can(defaults.learner())) names.push_back(name);
+  }
+  return names;
+}
+
 AgentConfig& Config::learner() { return AlgorithmOf(*this).settings(*this); }
 
 const AgentConfig& Config::learner() const { return AlgorithmOf(*this).settings_of_const(*this); }
@@ -46,7 +55,7 @@ void Config::DescribeEnvironment(Options& o) {
   o.Section("task");
   o.Add(&episode_seconds, "episode_seconds", {0.02, 1e6}, "s", "length of a training episode")
       .step = kControlPeriod;
-  o.Add(&random_start_share, "random_start_share", kUnit, "",
+  o.Add(&random_start_share, "random_start_share", kZeroToOne, "",
         "share of training episodes that start in a random state instead of hanging");
   o.Add(&random_start_velocity, "random_start_velocity", {0, 50}, "rad/s",
         "largest velocity of random start states");

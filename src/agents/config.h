@@ -27,6 +27,9 @@ inline constexpr std::string_view kScreened = "screened";
 /// Names of the learning algorithms; the first is the default.
 const std::vector<std::string>& AlgorithmNames();
 
+/// Names of the algorithms whose default settings `can` is true of.
+std::vector<std::string> AlgorithmsThat(const std::function<bool(AgentConfig&)>& can);
+
 /// All settings of a training. An agent's settings exist only for its algorithm. The same name can
 /// have another meaning and another default in another algorithm.
 struct Config {

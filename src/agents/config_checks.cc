@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "base/format.h"
 #include "base/text.h"
+#include "pendulum/own_reward.h"
 #include "pendulum/timestep.h"
 
 namespace upswing {
@@ -43,8 +44,11 @@ void CheckSettings(Config& config, const std::string& where) {
   try {
     config.learner().Check(config.train.envs);
     (void)config.randomization.MakePosterior();  // throws if there is none to draw from
-    if (!config.start_policy.empty() && config.algorithm == "ppo") {
-      throw BadInput("start_policy: expected an agent of dqn or sac, got one of ppo");
+    if (!config.start_policy.empty() && !config.learner().StartsFromPolicy()) {
+      const std::vector<std::string> able =
+          AlgorithmsThat([](const AgentConfig& settings) { return settings.StartsFromPolicy(); });
+      throw BadInput(Concat("start_policy: expected an agent of ", Join(able, " or "),
+                            ", got one of ", config.algorithm));
     }
     if (!config.reward.expression.empty()) (void)OwnReward(config.reward.expression);
     CheckTimestep(config.plant, config.randomization, "plant");

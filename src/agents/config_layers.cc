@@ -21,7 +21,7 @@ const NamedAgent& FindAgent(const std::string& name, const std::string& where) {
                         "\"", DidYouMean(name, names)));
 }
 
-/// A text setting that other settings depend on: its value in the last layer that sets it, and the
+/// A setting that other settings depend on: its value in the last layer that sets it, and the
 /// place of that value for messages.
 struct EarlySetting {
   std::string value, where;
@@ -30,8 +30,8 @@ struct EarlySetting {
 EarlySetting FindEarly(std::string_view section, std::string_view key, const toml::table& file,
                        const std::string& file_name, const std::vector<FlagValue>& flags) {
   EarlySetting setting;
-  if (const auto* node = file[section][key].as_string()) {
-    setting = {node->get(), Concat(PlaceOf(*node, file_name), ": ", key)};
+  if (const toml::node* node = file[section][key].node()) {
+    setting = {TextOf(*node).value_or(""), Concat(PlaceOf(*node, file_name), ": ", key)};
   }
   for (const auto& [name, text, where] : flags) {
     if (name == key) setting = {text, where.empty() ? FlagOf(name) : where};
@@ -103,26 +103,14 @@ void ApplyToForeign(const Options& options, const ChosenAgent& agent) {
 void FitToForeign(const Options& options, bool decay_given, Config& config) {
   const ForeignTask task = ForeignTask::Parse(config.environment, "environment");
   if (!decay_given) options.Set("learning_rate_steps", options.Get("steps")->text(), "steps");
-  if (task.choices.empty()) {
-    if (config.algorithm == "ppo") config.ppo.actions = "continuous";
-    return;
-  }
-  if (config.algorithm == "sac") {
-    throw BadInput(Concat("agent: expected an agent of dqn or ppo, because the actions of ",
-                          task.name, " are discrete, got ", config.agent, ", an agent of sac"));
-  }
-  const auto count = static_cast<int64_t>(task.choices.size());
-  config.dqn.levels = config.ppo.levels = count;
-  config.ppo.actions = "levels";
-}
-
-/// The place of the setting `mirror` for messages; empty if neither file nor flags set it.
-std::string PlaceOfMirror(const toml::table& file, const std::string& file_name,
-                          const std::vector<FlagValue>& flags) {
-  std::string place = FindEarly("agent", "mirror", file, file_name, flags).where;
-  const auto* node = file["agent"]["mirror"].node();
-  if (place.empty() && node != nullptr) place = Concat(PlaceOf(*node, file_name), ": mirror");
-  return place;
+  const auto choices = static_cast<int64_t>(task.choices.size());
+  if (config.learner().FitToActions(choices)) return;
+  const std::vector<std::string> able =
+      AlgorithmsThat([&](AgentConfig& settings) { return settings.FitToActions(choices); });
+  throw BadInput(Concat("agent: expected an agent of ", Join(able, " or "),
+                        ", because the actions of ", task.name, " are ",
+                        choices > 0 ? "discrete" : "continuous", ", got ", config.agent,
+                        ", an agent of ", config.algorithm));
 }
 
 /// Turns `mirror` off for a reward that is not symmetric. Throws BadInput if the user set it, at
@@ -192,7 +180,7 @@ Config ParseConfig(std::string_view text, const std::string& where,
   const bool foreign = !FindEarly("task", "environment", table, where, flags).value.empty();
   Config config(agent.algorithm);
   config.agent = agent.name;
-  const Options options = KnownOptions(config);
+  const Options options = KnownOptions(config);  // its messages name the agent
 
   if (foreign) {
     ApplyToForeign(options, agent);
@@ -201,14 +189,14 @@ Config ParseConfig(std::string_view text, const std::string& where,
   }
   ApplyTable(options, table, where, false);
   SetFlags(options, flags);
-  config.agent = agent.name;
+  config.agent = agent.name;  // whatever its own file says
   if (foreign) {
     const EarlySetting decay = FindEarly("agent", "learning_rate_steps", table, where, flags);
-    const bool decay_in_file = table["agent"]["learning_rate_steps"].is_number();
-    FitToForeign(options, decay_in_file || !decay.where.empty(), config);
+    FitToForeign(options, !decay.where.empty(), config);
   }
   CheckSettings(config, where);
-  FitToReward(options, PlaceOfMirror(table, where, flags), config);
+  // Last, because only the reward of a checked configuration can be evaluated.
+  FitToReward(options, FindEarly("agent", "mirror", table, where, flags).where, config);
   return config;
 }
 

@@ -112,19 +112,25 @@ std::optional<std::string> TextOf(const toml::node& node) {
 
 std::vector<std::string> TakeUnknown(const Options& options, toml::table& table) {
   std::vector<std::string> unknown;
-  for (auto& [section, node] : table) {
-    auto* settings = node.as_table();
-    if (settings == nullptr) continue;
-    std::vector<std::string> keys;
+  toml::table known;
+  for (const auto& [section, node] : table) {
+    const auto* settings = node.as_table();
+    if (settings == nullptr) {
+      unknown.emplace_back(section.str());
+      continue;
+    }
+    toml::table known_settings;
     for (const auto& [key, value] : *settings) {
       const Option* option = options.Get(key.str());
-      if (option == nullptr || option->section != section.str()) keys.emplace_back(key.str());
+      if (option != nullptr && option->section == section.str()) {
+        known_settings.insert(key, value);
+      } else {
+        unknown.push_back(Concat(section.str(), ".", key.str()));
+      }
     }
-    for (const std::string& key : keys) {
-      settings->erase(key);
-      unknown.push_back(Concat(section.str(), ".", key));
-    }
+    if (!known_settings.empty()) known.insert(section, known_settings);
   }
+  table = std::move(known);
   return unknown;
 }
 

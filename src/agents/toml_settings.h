@@ -22,8 +22,8 @@ std::string PlaceOf(const toml::node& node, const std::string& where);
 /// A TOML value as text for Option::Set; nothing for a type that no setting has.
 std::optional<std::string> TextOf(const toml::node& node);
 
-/// Removes the settings in the sections of a table that are no options. Returns their names, such
-/// as task.model.
+/// Removes everything from a table that is not an option in its section. Returns the names, such as
+/// task.model.
 std::vector<std::string> TakeUnknown(const Options& options, toml::table& table);
 
 /// Sets the options in the sections of a table; if `flat`, also options outside of sections.

@@ -16,6 +16,9 @@ struct Overloaded : Ts... {
 template <class... Ts>
 Overloaded(Ts...) -> Overloaded<Ts...>;  // clang 14 needs it spelled out
 
+/// Whether a TOML string cannot contain the character.
+bool IsControl(char c) { return (c >= 0 && c < ' ' && c != '\t') || c == '\x7f'; }
+
 /// Quotes a text as a TOML basic string.
 std::string Quote(std::string_view text) {
   std::string quoted = "\"";
@@ -173,7 +176,7 @@ void Option::Set(std::string_view text, const std::string& where) const {
                        return true;
                      },
                      [&](std::string* value) {
-                       if (text.find_first_of("\n\r") != std::string_view::npos) return false;
+                       if (std::ranges::any_of(text, IsControl)) return false;
                        if (!choices.empty() && std::ranges::find(choices, text) == choices.end()) {
                          return false;
                        }

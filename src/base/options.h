@@ -24,7 +24,7 @@ struct Range {
 };
 inline constexpr Range kPositive{1e-9, 1e9};
 inline constexpr Range kNotNegative{0, 1e12};
-inline constexpr Range kUnit{0, 1};  // a share or probability
+inline constexpr Range kZeroToOne{0, 1};  // a share or probability
 
 /// The flag of a setting or an alias, such as `--eval-every` for `eval_every`.
 std::string FlagOf(std::string name);
@@ -50,7 +50,8 @@ struct Option {
   std::vector<std::string> choices = {};  // allowed values of a text; empty: any
   double step = 0;                        // a number must be a multiple of it; 0: any number
   std::string usual = {};  // default in words, shown in place of the value; may be empty
-  std::shared_ptr<const void> owner = {};  // of `target`, if these settings are of a copy
+  // Keeps the copy alive that `target` points into; null: the caller keeps the struct.
+  std::shared_ptr<const void> owner = {};
 
   /// Whether another value makes a different run, which cannot resume this one.
   bool identity() const { return decides == Decides::kTraining || decides == Decides::kSeed; }
@@ -85,6 +86,7 @@ class Options {
   /// Begins a section; the settings that are added next belong to it.
   void Section(std::string_view section) { section_ = section; }
 
+  // Each Add returns a reference that is valid until the next one.
   /// Adds a switch or a text.
   template <typename T>
   requires std::same_as<T, bool> || std::same_as<T, std::string> Option& Add(
@@ -110,7 +112,7 @@ class Options {
   /// `help` becomes "set … and …".
   void Alias(std::string_view name, std::vector<std::string> members, std::string_view help = "");
 
-  /// Keeps the struct alive that these settings point into, as long as a copy of them exists.
+  /// Keeps the struct alive that the settings added so far point into, as long as they exist.
   void Keep(const std::shared_ptr<const void>& owner) {
     for (Option& option : options_) option.owner = owner;
   }
@@ -160,7 +162,8 @@ Options OptionsOf(Config& config) {
   return options;
 }
 
-/// The settings of a struct that cannot change, as pointers into a copy, which they keep alive.
+/// The settings of a const struct, for reading: they point into a copy, which they keep alive. Set
+/// changes only the copy.
 template <typename Config>
 Options OptionsOf(const Config& config) {
   const auto copy = std::make_shared<Config>(config);

@@ -22,7 +22,7 @@ struct Sample {
     o.Section("one");
     o.Add(&fast, "fast", "be fast");
     o.Add(&count, "count", {1, 10}, "pieces", "how many");
-    o.Add(&rate, "the_rate", kUnit, "", "share");
+    o.Add(&rate, "the_rate", kZeroToOne, "", "share");
     o.Section("two");
     o.Add(&name, "name", "a name");
     o.Add(&widths, "widths", {1, 100}, "layers");
@@ -47,6 +47,25 @@ class OptionsTest : public ::testing::Test {
   Sample sample_;
   Options options_;
 };
+
+TEST_F(OptionsTest, SettingsOfAConstStructAreThoseOfACopy) {
+  const Sample& constant = sample_;
+  {
+    const Options options = OptionsOf(constant);
+    options.Set("count", "8", "here");
+    EXPECT_EQ(options.Get("count")->text(), "8");
+  }
+  EXPECT_EQ(sample_.count, 3);
+  const Option kept = *OptionsOf(constant).Get("count");  // outlives its Options
+  EXPECT_EQ(kept.text(), "3");
+}
+
+TEST_F(OptionsTest, ATextHasNoControlCharacters) {
+  for (const char* text : {"a\nb", "a\rb", "a\x1b[0m", "\x7f"}) {
+    EXPECT_NE(ErrorOf("name", text), "no error");
+  }
+  EXPECT_EQ(ErrorOf("name", "a\tb °"), "no error");
+}
 
 TEST_F(OptionsTest, DescribeChangesNothing) {
   sample_.count = 7;

@@ -136,13 +136,13 @@ PolicyInfo ParsePolicyInfo(const std::map<std::string, std::string>& metadata,
   info.config = reader.Text("config");
   info.seed = reader.Counter("seed");
   info.step = reader.Counter("step");
-  info.success_rate = reader.Number("success_rate", kUnit);
+  info.success_rate = reader.Number("success_rate", kZeroToOne);
   info.mean_return = reader.Number("mean_return", kReturn);
   info.task = reader.Name("task");
   info.plant = reader.Json("plant", ParsePlant).value_or(info.plant);
   info.control_period = reader.Number("control_period", kSeconds);
   info.observation = reader.Json("observation", ParseObservation);
-  info.gamma = reader.Number("gamma", kUnit);
+  info.gamma = reader.Number("gamma", kZeroToOne);
   info.reward_scale = reader.Number("reward_scale", kPositive);
   return info;
 }

@@ -192,7 +192,7 @@ class TomlTest(ProgramTest):
             with self.subTest(line=line):
                 self.refuse_toml(f"[network]\n{line}\n", "s.toml:2:", "hidden",
                                  "expected a list of integers")
-        self.refuse_toml("[train]\nagent = 3\n", "s.toml:2:", "agent", "expected a text")
+        self.refuse_toml("[train]\nagent = 3\n", "s.toml:2:", "agent", "expected an agent", '"3"')
 
     def test_out_of_range(self):
         self.refuse_toml("[agent]\ngamma = 0.9\ntau = 2\n", "s.toml:3:", "tau", "[0, 1]", "2")

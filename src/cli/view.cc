@@ -19,6 +19,7 @@
 #include "mujoco/engines.h"
 #include "os/file.h"
 #include "os/streams.h"
+#include "pendulum/observation.h"
 
 namespace upswing {
 

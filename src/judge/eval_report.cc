@@ -10,6 +10,7 @@
 #include "base/format.h"
 #include "base/json.h"
 #include "base/text.h"
+#include "pendulum/observation.h"
 #include "pendulum/upright_modes.h"
 #include "runs/find_policy.h"
 

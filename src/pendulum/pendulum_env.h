@@ -11,8 +11,6 @@
 #include "base/env.h"
 #include "base/rng.h"
 #include "pendulum/disturbance.h"
-#include "pendulum/observation.h"
-#include "pendulum/own_reward.h"
 #include "pendulum/physics.h"
 #include "pendulum/randomization.h"
 #include "pendulum/stage.h"

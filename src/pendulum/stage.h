@@ -65,7 +65,8 @@ struct ControlStep {
   }
 };
 
-/// A part of the task. The hooks are in the order of their calls. Each does nothing by default.
+/// A part of the task. The hooks are in the order of their calls; each calls all stages in the
+/// order of the list. Each does nothing by default.
 class Stage {
  public:
   virtual ~Stage() = default;

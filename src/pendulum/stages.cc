@@ -255,6 +255,7 @@ std::vector<std::unique_ptr<Stage>> MakeStages(const PendulumEnvConfig& config) 
   const bool perceives =
       sensors || config.assumed_plant || config.identified_from || config.memory > 0;
 
+  // The order matters: a stage may read what an earlier one wrote in the same hook.
   std::vector<std::unique_ptr<Stage>> stages;
   // First: motors and sensors follow the episode's disturbance, which it draws.
   if (config.randomization.any()) stages.push_back(std::make_unique<RandomConditions>(config));

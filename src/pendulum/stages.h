@@ -104,7 +104,8 @@ class Perception : public Stage {
   void State(const Archive& archive, Episodes& episodes) override;
 
  private:
-  /// The measurement of the present state. `torque` (N·m) acted in the last control period; 0 at the start.
+  /// The measurement of the present state. `torque` (N·m) acted in the last control period; 0 at
+  /// the start.
   Measurement Measure(int env, const Episodes& episodes, double torque);
   /// The plant that gives energy and height.
   const Plant& ObservedPlant(int env, const Episodes& episodes) const;

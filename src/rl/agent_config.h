@@ -35,6 +35,12 @@ struct AgentConfig {
   /// begins with a setting's name.
   virtual void Check(int64_t num_envs) const = 0;
 
+  /// Adapts the settings to an environment with this number of discrete actions; 0: its actions are
+  /// continuous. Returns false if the algorithm has no such agents.
+  virtual bool FitToActions(int64_t choices) = 0;
+  /// Whether an agent can start from the weights of a policy.
+  virtual bool StartsFromPolicy() const { return true; }
+
   virtual AgentSize Size(const EnvSpec& spec) const = 0;
 
   /// The algorithm in words, such as `double, dueling network 64-64 with heads of 32`.

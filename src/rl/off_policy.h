@@ -27,7 +27,7 @@ class OffPolicyAgent : public Agent {
   double importance_exponent() const;
 
  protected:
-  /// The settings, which the derived agent holds.
+  /// The settings. The derived agent holds them, so the constructor of this class must not call it.
   virtual const OffPolicyConfig& off_policy() const = 0;
 
   /// Throws BadInput if the config mirrors minibatches but the task has no mirror symmetry.

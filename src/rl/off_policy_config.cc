@@ -8,7 +8,7 @@
 namespace upswing {
 
 void OffPolicyConfig::Describe(Options& o) {
-  o.Add(&gamma, "gamma", kUnit, "", "discount factor per control step");
+  o.Add(&gamma, "gamma", kZeroToOne, "", "discount factor per control step");
   o.Add(&n_step, "n_step", {1, 100}, "steps", "length of the n-step returns in the targets");
   o.Add(&reward_scale, "reward_scale", kPositive, "",
         "factor on the reward that the agent learns from");
@@ -16,13 +16,13 @@ void OffPolicyConfig::Describe(Options& o) {
   o.Add(&replay, "replay", {1, 10000000}, "transitions", "capacity of the replay memory");
   o.Add(&prioritized, "prioritized",
         "prioritised replay: draw transitions by their last absolute TD error");
-  o.Add(&priority_exponent, "priority_exponent", kUnit, "",
+  o.Add(&priority_exponent, "priority_exponent", kZeroToOne, "",
         "exponent alpha of prioritised replay; 0: uniform");
-  o.Add(&importance_exponent, "importance_exponent", kUnit, "",
+  o.Add(&importance_exponent, "importance_exponent", kZeroToOne, "",
         "initial exponent beta of prioritised replay; rises to 1 over learning_rate_steps");
   o.Add(&mirror, "mirror",
         "mirror a random half of each minibatch; DQN also evaluates targets at mirrored states");
-  o.Add(&reward_centering, "reward_centering", kUnit, "",
+  o.Add(&reward_centering, "reward_centering", kZeroToOne, "",
         "share of the mean TD error that each update removes by shifting all values, for gamma "
         "near 0.99; 0: off");
   o.Add(&learning_starts, "learning_starts", kNotNegative, "steps",

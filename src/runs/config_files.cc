@@ -21,6 +21,7 @@ namespace fs = std::filesystem;
 /// The path in a setting PATH or PATH#CHECKSUM.
 std::string PathOfStart(const std::string& setting) {
   const size_t mark = setting.rfind('#');
+  if (mark == std::string::npos) return setting;
   constexpr size_t kDigits = 16;
   return setting.size() - mark == 1 + kDigits ? setting.substr(0, mark) : setting;
 }
@@ -28,9 +29,10 @@ std::string PathOfStart(const std::string& setting) {
 /// The first names, as many as fit into a readable line: `a, b and 3 more`.
 std::string FirstOf(std::vector<std::string> names) {
   constexpr size_t kMostNames = 6;
-  const size_t more = names.size() - std::min(names.size(), kMostNames);
-  names.resize(names.size() - more);
-  return Concat(Join(names, ", "), more > 0 ? Concat(" and ", more, " more") : "");
+  if (names.size() <= kMostNames) return Join(names, ", ");
+  const size_t more = names.size() - kMostNames;
+  names.resize(kMostNames);
+  return Concat(Join(names, ", "), " and ", more, " more");
 }
 
 }  // namespace

@@ -40,8 +40,9 @@ HIGHWAY = DEPS / f"highway-{pinned('highway')}"  # the version of NumPy that it 
 MUPARSER = DEPS / f"muparser-{pinned('muparser')}"
 
 # Vectors of 128 bits, exceptions, and features of all browsers with those.
-TARGET = ["-target", "wasm32-wasi", "-mcpu=generic+simd128+exception_handling+bulk_memory"
-          "+nontrapping_fptoint+sign_ext", "-fwasm-exceptions", "-fvisibility=hidden", "-DNDEBUG"]
+MACHINE = ["-target", "wasm32-wasi", "-mcpu=generic+simd128+exception_handling+bulk_memory"
+           "+nontrapping_fptoint+sign_ext"]
+TARGET = [*MACHINE, "-fwasm-exceptions", "-fvisibility=hidden", "-DNDEBUG"]
 MEMORY = 512 << 20  # bytes at most; see learner.cc
 STACK = 1 << 20
 
@@ -106,11 +107,13 @@ def versions():
         return ".".join(match[1] for match in found if match)
     json = [f"NLOHMANN_JSON_VERSION_{part}" for part in ("MAJOR", "MINOR", "PATCH")]
     toml = [f"TOML_LIB_{part}" for part in ("MAJOR", "MINOR", "PATCH")]
+    eigen = [f"EIGEN_{part}_VERSION" for part in ("WORLD", "MAJOR", "MINOR")]
     abi = Path("/usr/include/nlohmann/detail/abi_macros.hpp")
     found = {"zig": pinned("zig"), "highway of numpy": pinned("highway"), "muparser": pinned("muparser"),
              "nlohmann-json": of("nlohmann/detail/abi_macros.hpp" if abi.exists()
                                  else "nlohmann/json.hpp", *json),
-             "toml++": of("toml++/impl/version.h", *toml)}
+             "toml++": of("toml++/impl/version.h", *toml),
+             "eigen": of("eigen3/Eigen/src/Core/util/Macros.h", *eigen)}
     return ", ".join(f"{name} {version}" for name, version in found.items())
 
 
@@ -165,7 +168,7 @@ def compile_one(source, flags):
     target = WORK / f"{name}.o"
     program = "c++" if source.suffix in (".cc", ".cpp") else "cc"
     if source.suffix == ".s":
-        run(program, *TARGET[:3], "-c", relative, "-o", target)
+        run(program, *MACHINE, "-c", relative, "-o", target)
         return target
     # The same paths in the module on any machine, such as in failed assertions.
     maps = [f"-ffile-prefix-map={folder}={name}" for folder, name in
@@ -197,9 +200,9 @@ def jobs():
     headers = WORK / "include"
     headers.mkdir(parents=True, exist_ok=True)
     for name in ("nlohmann", "toml++", "eigen3/Eigen", "eigen3/unsupported"):
-        link = headers / Path(name).name
-        if not link.is_symlink():
-            link.symlink_to(Path("/usr/include") / name)
+        folder = headers / Path(name).name
+        if not folder.is_symlink():
+            folder.symlink_to(Path("/usr/include") / name)
     agents = generated("named_agents.cc", named_agents())
     tag = generated("exception_tag.s", EXCEPTION_TAG)
     # Zig leaves some headers out of the C++ library. Sources that mention them still compile, but

@@ -188,7 +188,7 @@ void AddRun(CommandLine& line) {
   own.Add(&a.seconds, "seconds", {0.1, 86400}, "s", "time in which the controller drives");
   own.Add(&a.passive_torque, "passive_torque", {0, 1000}, "N·m",
           "largest torque of the joint without the controller's motor");
-  own.Add(&a.compensation, "compensation", kUnit, "",
+  own.Add(&a.compensation, "compensation", kZeroToOne, "",
           "share of both joints' estimated dry friction that the motors compensate; needs a twin");
   own.Add(&a.sensors.velocity_share, "velocity_share", {0.001, 1}, "",
           "without a twin: share of the newest difference in the low-passed velocities");

@@ -12,9 +12,10 @@ namespace upswing::machine {
 
 void FakeConfig::Describe(Options& o) {
   o.Section("line");
-  o.Add(&line.loss, "loss", kUnit, "", "share of the frames that are lost, in each direction");
-  o.Add(&line.duplicate, "duplicate", kUnit, "", "share of the frames that arrive twice");
-  o.Add(&line.reorder, "reorder", kUnit, "", "share of the frames that arrive after the next one");
+  o.Add(&line.loss, "loss", kZeroToOne, "", "share of the frames that are lost, in each direction");
+  o.Add(&line.duplicate, "duplicate", kZeroToOne, "", "share of the frames that arrive twice");
+  o.Add(&line.reorder, "reorder", kZeroToOne, "",
+        "share of the frames that arrive after the next one");
   o.Add(&line.delay, "delay", {0, 1}, "s", "delay of each frame");
   o.Add(&line.jitter, "jitter", {0, 1}, "s", "largest additional random delay");
   o.Section("machine");

@@ -25,12 +25,14 @@
 namespace upswing::machine {
 namespace {
 
-/// An excitation: its length, the lean of the links (rad) and the energy (1: upright) that it aims
-/// at, and the windows (s) in which a model predicts its motion.
-struct Excitement {
-  double seconds, lean, energy, window;
+/// The plan of an excitation.
+struct ExcitationPlan {
+  double seconds;  // length, s
+  double lean;     // of the links, that it aims at, rad
+  double energy;   // that it aims at; 1: upright
+  double window;   // length of the windows in which a model predicts its motion, s
 };
-constexpr Excitement kSmallMotion{4, 0.8, 0.2, 0.3}, kLargeMotion{6, 2, 0.6, 0.5};
+constexpr ExcitationPlan kSmallMotion{4, 0.8, 0.2, 0.3}, kLargeMotion{6, 2, 0.6, 0.5};
 constexpr double kLimitShare = 0.6;  // share of the user's limits that an excitation aims at
 
 constexpr double kLargestError = 0.1;    // of a fit, rad
@@ -45,9 +47,16 @@ struct Candidate {
   double compensation = 0;  // share of dry friction that motors compensate under it
 };
 
-/// The candidates for a plant, the best first. The last two need milliseconds for a decision. They
-/// plan with dry friction, because noise makes its compensation shake a light link. Damping of the
-/// joint without a motor stands for its friction in the linear model of the regulator.
+/// The controller that is to be tried.
+struct Choice {
+  MachinePolicy policy;  // null: none
+  PolicyArguments arguments;
+  double compensation = 0;  // share of dry friction that motors compensate under it
+};
+
+/// The candidates for a plant, the best first. mpc needs milliseconds for a decision. The last two
+/// plan with dry friction instead of compensating it: under noise, compensation shakes a light
+/// link.
 std::vector<Candidate> CandidatesFor(const Plant& plant) {
   constexpr double kUsualCompensation = 0.95;
   ControllerConfig usual;
@@ -60,31 +69,33 @@ std::vector<Candidate> CandidatesFor(const Plant& plant) {
   ControllerConfig slow = usual;
   slow.tvlqr = {.seconds = 6, .reserve = 0.1};
 
-  ControllerConfig ahead = stiff;
-  ahead.mpc.seconds = 0.3;
-  ahead.mpc.angle_range = 9;
+  ControllerConfig quick = stiff;
+  quick.mpc.seconds = 0.3;
+  quick.mpc.angle_range = 9;
 
-  ControllerConfig rubbing = usual;
-  rubbing.mpc.seconds = 1;
-  rubbing.plant.coulomb1 = plant.coulomb1;
-  rubbing.plant.coulomb2 = plant.coulomb2;
+  ControllerConfig with_friction = usual;
+  with_friction.mpc.seconds = 1;
+  with_friction.plant.coulomb1 = plant.coulomb1;
+  with_friction.plant.coulomb2 = plant.coulomb2;
 
-  ControllerConfig damped = rubbing;
+  // In the regulator's linear model, damping stands for the friction of the joint without a motor.
+  ControllerConfig with_damping = with_friction;
   constexpr double kDamping = 2;  // for dry friction, s/rad
   if (plant.actuated_joint == 1) {
-    damped.plant.damping2 += kDamping * plant.coulomb2;
+    with_damping.plant.damping2 += kDamping * plant.coulomb2;
   } else {
-    damped.plant.damping1 += kDamping * plant.coulomb1;
+    with_damping.plant.damping1 += kDamping * plant.coulomb1;
   }
   return {{"tvlqr", usual, kUsualCompensation},
           {"tvlqr", stiff, kUsualCompensation},
           {"tvlqr", slow, kUsualCompensation},
-          {"mpc", ahead, kUsualCompensation},
-          {"mpc", rubbing, 0},
-          {"mpc", damped, 0}};
+          {"mpc", quick, kUsualCompensation},
+          {"mpc", with_friction, 0},
+          {"mpc", with_damping, 0}};
 }
 
-/// The arguments that design a candidate for a twin's plant, as a user gives them.
+/// The arguments that turn the defaults into the candidate, as a user gives them. GetMachinePolicy
+/// designs on the twin's plant without dry friction, so changes of the plant are relative to that.
 PolicyArguments ArgumentsOf(const Candidate& candidate, const Plant& plant) {
   const ControllerConfig usual;
   const Plant usual_plant = WithoutDryFriction(plant);
@@ -177,7 +188,7 @@ class LearningSession {
 
   /// Moves the links with growing torques. `has_twin`: whether the twin can estimate the state and
   /// its energy.
-  void Excite(const Excitement& e, bool has_twin) {
+  void Excite(const ExcitationPlan& e, bool has_twin) {
     const double energy = std::min(e.energy, kLimitShare * c_.limits.energy);
     // Links that swing to this lean have this energy.
     const double lean =
@@ -347,12 +358,14 @@ class LearningSession {
 
   /// Designs a controller and tries it. Returns whether the machine balanced.
   bool Try() {
-    const auto policy = Choose();
+    const Choice choice = Choose();
     ExpectBudget();
     ++result_.tries;
-    say_(fmt::format("try {}: {}", result_.tries, policy->name));
-    const RunOutcome run =
-        Run(TryRules(result_.compensation), Estimator(twin_, 1 / c_.hz), ControllerOf(policy));
+    result_.controller = choice.arguments;
+    result_.compensation = choice.compensation;
+    say_(fmt::format("try {}: {}", result_.tries, choice.policy->name));
+    const RunOutcome run = Run(TryRules(choice.compensation), Estimator(twin_, 1 / c_.hz),
+                               ControllerOf(choice.policy));
     result_.balanced = run.summary.upright;
     say_(fmt::format("  balanced {:.1f} s; used {:.1f} s of motion, {:.1f} s of computing",
                      result_.balanced, result_.motion, result_.computing));
@@ -367,9 +380,9 @@ class LearningSession {
   }
 
   /// The first controller that balances all machines drawn from the posterior, or most of them.
-  MachinePolicy Choose() {
+  Choice Choose() {
     ExpectBudget();
-    MachinePolicy best;
+    Choice best;
     Compute([&] {
       int most = -1;
       for (const Candidate& candidate : CandidatesFor(twin_.plant)) {
@@ -381,16 +394,14 @@ class LearningSession {
                            kDraws));
           if (held <= most) continue;
           most = held;
-          best = policy;
-          result_.controller = arguments;
-          result_.compensation = candidate.compensation;
+          best = {policy, arguments, candidate.compensation};
         } catch (const Error& error) {
           say_(fmt::format("design: {}", error.what()));
         }
         if (most == kDraws) break;
       }
     });
-    if (best == nullptr) throw Ended{"no controller exists for the twin"};
+    if (best.policy == nullptr) throw Ended{"no controller exists for the twin"};
     return best;
   }
 

@@ -83,8 +83,8 @@ std::string DelayText(const std::vector<Response>& responses, const Response& be
   return low < high ? fmt::format("{} ({} to {})", rows, low, high) : rows;
 }
 
-/// Reports a gain that no motor has; false if the gain is plausible.
-bool CheckTorqueGain(const Response& best, const Reporter& report) {
+/// Reports a gain that no motor has. Returns whether it does.
+bool ReportsImplausibleGain(const Response& best, const Reporter& report) {
   const double gain = best.pairs.gain();
   if (gain > 1.0 / 3 && gain < 3) return false;
   const char* meaning = "suspect the unit or a gear";
@@ -148,8 +148,8 @@ void ReportResponse(const Reporter& report, Severity severity, const std::string
           {"correlation", response.pairs.correlation()}});
 }
 
-/// Reports a command or a measurement that never changes. Returns whether one does, or the command
-/// is too short, so that there is no response to judge.
+/// Reports a command or a measurement that never changes. Returns whether there is no response to
+/// judge: one of them never changes, or the command is too short.
 bool LacksResponse(Pieces pieces, int joint, const Response& best, const Reporter& report) {
   const double least = 1e-9 * best.pairs.n;
   if (!(best.pairs.Sxx() > least)) {
@@ -173,7 +173,7 @@ bool LacksResponse(Pieces pieces, int joint, const Response& best, const Reporte
 
 /// Reports columns that are swapped between the joints, or between commands and measurements.
 /// Returns whether they are.
-bool CheckSwappedTorques(Pieces pieces, int joint, const Response& best, const Reporter& report) {
+bool ReportsSwappedTorques(Pieces pieces, int joint, const Response& best, const Reporter& report) {
   const double r = best.pairs.correlation();
   if (r < kClear) {
     const Response other = BestOf(ResponsesOf(pieces, 1 - joint, joint));
@@ -202,9 +202,9 @@ bool CheckSwappedTorques(Pieces pieces, int joint, const Response& best, const R
 }
 
 /// Reports a measurement that does not follow the command, unless the joint is only pushed by hand.
-/// Returns whether there is none that follows.
-bool CheckFollows(Pieces pieces, int joint, const std::vector<Response>& responses,
-                  const Response& best, const Reporter& report) {
+/// Returns whether it does not follow.
+bool DoesNotFollow(Pieces pieces, int joint, const std::vector<Response>& responses,
+                   const Response& best, const Reporter& report) {
   const double r = best.pairs.correlation();
   if (r >= kFollows) return false;
   if (!HasCommand(pieces, joint)) return true;
@@ -224,9 +224,9 @@ void CheckTorque(Pieces pieces, int joint, const Reporter& report) {
   const std::vector<Response> responses = ResponsesOf(pieces, joint, joint);
   const Response best = BestOf(responses);
   if (LacksResponse(pieces, joint, best, report)) return;
-  if (CheckSwappedTorques(pieces, joint, best, report)) return;
-  if (CheckFollows(pieces, joint, responses, best, report)) return;
-  if (CheckTorqueGain(best, report)) return;
+  if (ReportsSwappedTorques(pieces, joint, best, report)) return;
+  if (DoesNotFollow(pieces, joint, responses, best, report)) return;
+  if (ReportsImplausibleGain(best, report)) return;
   const double r = best.pairs.correlation(), gain = best.pairs.gain();
   constexpr double kProportional = 0.95, kLow = 0.6, kHigh = 1.6;  // correlation, gains
   const bool is_odd = r > kProportional && (gain < kLow || gain > kHigh);
@@ -278,7 +278,7 @@ bool ActsWithoutCommand(Pieces pieces, int joint) {
 }
 
 std::vector<MachineLog> WithoutRotors(Pieces pieces) {
-  constexpr double kIdle = 0.2, kFollows = 0.5;  // share of the rows, correlation
+  constexpr double kIdle = 0.2, kFollowsAcceleration = 0.5;  // share of the rows, correlation
   std::vector<MachineLog> logs(pieces.begin(), pieces.end());
   if (logs.front().commanded.empty() || logs.front().measured.empty()) return logs;
   const double cycle = UsualCycle(pieces);
@@ -289,7 +289,7 @@ std::vector<MachineLog> WithoutRotors(Pieces pieces) {
   for (const int joint : {0, 1}) {
     if (!HasCommand(pieces, joint)) continue;
     const Pairs idle = IdlePairs(pieces, joint, span);
-    if (idle.n < kIdle * rows || idle.correlation() > -kFollows) continue;
+    if (idle.n < kIdle * rows || idle.correlation() > -kFollowsAcceleration) continue;
     for (MachineLog& log : logs) {
       for (int k = span; k + span < log.rows(); ++k) {
         log.measured[k][joint] -= idle.gain() * AccelerationAt(log, k, joint, span);

@@ -21,8 +21,9 @@ struct FitConfig {
   WindowRules windows = {1, 0.5};  // seconds, hop
   int iterations = 40;
   double tolerance = 1e-5;  // least relative decrease of the cost in an iteration
-  // Adapts the first guess to a new session, that of all logs. Its covariance gives the prior.
-  // Values without a covariance have a wide one. The result's covariance is of this session.
+  // true: all logs are one new session of the known machine `first`, whose covariance is the prior;
+  // values without a covariance have a wide one. The result's covariance is of this session.
+  // false: identifies the machine.
   bool adapts = false;
 };
 

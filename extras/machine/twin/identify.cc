@@ -216,10 +216,11 @@ Identification Identify(std::span<const MachineLog> logs, const Twin& first,
                         const IdentifyConfig& config, ThreadPool* pool, const Progress& progress) {
   for (const MachineLog& log : logs) ExpectCommands(log);
   const std::vector<Structure> structures = Structures(HasCommands(logs), config.one_body);
-  FitCounter counter(1.0 + config.folds * static_cast<double>(structures.size()), progress);
+  const int folds = config.folds >= 2 ? config.folds : 0;
+  FitCounter counter(1.0 + folds * static_cast<double>(structures.size()), progress);
   Identification result;
   result.chosen = static_cast<int>(structures.size()) - 1;
-  if (config.folds >= 2) {
+  if (folds > 0) {
     CrossValidation validation(logs, first, config, pool, counter);
     for (const Structure& structure : structures) {
       const LeftOut left_out = validation.LeaveOut(structure);

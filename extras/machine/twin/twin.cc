@@ -115,7 +115,7 @@ void LoopTiming::Describe(Options& o) {
   o.Section("loop");
   o.Add(&period, "period", {1e-4, 1}, "s", "median time between two cycles");
   o.Add(&jitter, "jitter", {0, 0.1}, "s", "standard deviation of this time");
-  o.Add(&late_share, "late_share", kUnit, "", "share of the cycles that are late");
+  o.Add(&late_share, "late_share", kZeroToOne, "", "share of the cycles that are late");
   o.Add(&late, "late", {0, 1}, "s", "largest lateness of these");
 }
 

@@ -18,19 +18,24 @@ void DqnConfig::Describe(Options& o) {
   o.Add(&dueling, "dueling", "dueling network: Q = V + A - mean(A)");
   o.Add(&levels, "levels", {2, 1001}, "", "number of evenly spaced torque levels");
   off_policy.Describe(o);
-  o.Add(&tau, "tau", kUnit, "", "Polyak factor of the target network, per update");
+  o.Add(&tau, "tau", kZeroToOne, "", "Polyak factor of the target network, per update");
   o.Add(&target_period, "target_period", {0, 1e9}, "updates",
         "copy the target network every N updates; 0: Polyak averaging");
   o.Add(&policy_tau, "policy_tau", {1e-9, 1}, "",
         "Polyak factor of the policy that is evaluated and saved, per update; decays with the "
         "learning rate; 1: no averaging");
-  o.Add(&epsilon_start, "epsilon_start", kUnit, "", "initial probability of a random action");
-  o.Add(&epsilon_end, "epsilon_end", kUnit, "", "lowest probability of a random action");
-  o.Add(&epsilon_decay, "epsilon_decay", kUnit, "",
+  o.Add(&epsilon_start, "epsilon_start", kZeroToOne, "", "initial probability of a random action");
+  o.Add(&epsilon_end, "epsilon_end", kZeroToOne, "", "lowest probability of a random action");
+  o.Add(&epsilon_decay, "epsilon_decay", kZeroToOne, "",
         "factor on the probability of a random action after each episode");
 }
 
 void DqnConfig::Check(int64_t /*num_envs*/) const { off_policy.Check(); }
+
+bool DqnConfig::FitToActions(int64_t choices) {
+  if (choices > 0) levels = choices;
+  return true;  // continuous actions become evenly spaced levels
+}
 
 AgentSize DqnConfig::Size(const EnvSpec& spec) const {
   const int D = spec.obs_size;

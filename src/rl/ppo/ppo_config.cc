@@ -44,8 +44,8 @@ void PpoConfig::Describe(Options& o) {
               "kind of actions; continuous: normally distributed torques; levels: fixed torques");
   o.Add(&levels, "levels", {2, 1001}, "",
         "number of evenly spaced torque levels, with actions = levels");
-  o.Add(&gamma, "gamma", kUnit, "", "discount factor per control step");
-  o.Add(&lambda, "lambda", kUnit, "", "decay factor of generalised advantage estimation");
+  o.Add(&gamma, "gamma", kZeroToOne, "", "discount factor per control step");
+  o.Add(&lambda, "lambda", kZeroToOne, "", "decay factor of generalised advantage estimation");
   o.Add(&reward_scale, "reward_scale", kPositive, "",
         "factor on the reward that the agent learns from");
   o.Add(&horizon, "horizon", {1, 1000000}, "steps",
@@ -89,6 +89,12 @@ void PpoConfig::Check(int64_t num_envs) const {
   if (discrete() && initial_std != usual.initial_std) {
     throw BadInput(Concat("initial_std: expected none with actions = levels, got ", initial_std));
   }
+}
+
+bool PpoConfig::FitToActions(int64_t choices) {
+  actions = choices > 0 ? "levels" : "continuous";
+  if (choices > 0) levels = choices;
+  return true;
 }
 
 AgentSize PpoConfig::Size(const EnvSpec& spec) const {

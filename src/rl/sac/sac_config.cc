@@ -21,7 +21,7 @@ void SacConfig::Describe(Options& o) {
         "critic updates per update of actor and temperature");
   o.Add(&actor_rate, "actor_rate", {0, 1000}, "",
         "ratio of the actor's learning rate to the critics'");
-  o.Add(&tau, "tau", kUnit, "", "Polyak factor of the target critics, per update");
+  o.Add(&tau, "tau", kZeroToOne, "", "Polyak factor of the target critics, per update");
   o.Add(&policy_tau, "policy_tau", {1e-9, 1}, "",
         "Polyak factor of the policy that is evaluated and saved, per actor update; decays with "
         "the learning rate; 1: no averaging");
@@ -37,6 +37,8 @@ void SacConfig::Describe(Options& o) {
 }
 
 void SacConfig::Check(int64_t /*num_envs*/) const { off_policy.Check(); }
+
+bool SacConfig::FitToActions(int64_t choices) { return choices == 0; }
 
 AgentSize SacConfig::Size(const EnvSpec& spec) const {
   const int D = spec.obs_size, A = spec.action_size();

@@ -26,6 +26,7 @@ struct SacConfig : AgentConfig {
 
   void Describe(Options& options) override;
   void Check(int64_t num_envs) const override;
+  bool FitToActions(int64_t choices) override;
   AgentSize Size(const EnvSpec& spec) const override;
   std::string Text() const override;
   std::vector<std::string> Warnings(int64_t steps, int64_t num_envs) const override;
