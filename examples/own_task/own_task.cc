@@ -2,6 +2,7 @@
 //
 //     own_task [sac|ppo] [SETTING=VALUE …]      such as own_task sac hidden=32,32 seed=2
 #include <cstdio>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -9,8 +10,8 @@
 #include "base/options.h"
 #include "base/thread_pool.h"
 #include "pendulum_v1.h"
-#include "rl/ppo/ppo_config.h"
-#include "rl/sac/sac_config.h"
+#include "rl/ppo/ppo.h"
+#include "rl/sac/sac.h"
 #include "rl/train/evaluate.h"
 #include "rl/train/trainer.h"
 
@@ -43,10 +44,10 @@ int main(int argc, char** argv) try {
   train.eval_every = 2000;
   SacConfig sac;
   sac.hidden = {64, 64};
-  sac.batch = 100;
-  sac.learning_starts = 500;
-  sac.updates_per_step = 1;
-  sac.learning_rate_steps = 20000;
+  sac.off_policy.batch = 100;
+  sac.off_policy.learning_starts = 500;
+  sac.off_policy.updates_per_step = 1;
+  sac.off_policy.learning_rate_steps = 20000;
   sac.actor_period = 1;
   sac.tau = 0.01;
   PpoConfig ppo;
@@ -68,7 +69,12 @@ int main(int argc, char** argv) try {
 
   ThreadPool pool(int(train.threads == 0 ? 1 : train.threads));
   PendulumV1 env(int(train.envs), uint64_t(train.seed));
-  const auto agent = learner.Make(env.spec(), uint64_t(train.seed), pool);
+  std::unique_ptr<Agent> agent;
+  if (algorithm == "ppo") {
+    agent = std::make_unique<Ppo>(ppo, env.spec(), uint64_t(train.seed), pool);
+  } else {
+    agent = std::make_unique<Sac>(sac, env.spec(), uint64_t(train.seed), pool);
+  }
   Printer printer;
   RodEvaluator evaluator(int(train.eval_episodes));
   Trainer trainer(train, *agent, env, evaluator);

@@ -302,7 +302,7 @@ class HeaderTest(ProgramTest):
         self.assertRegex(done.stderr, "upright from 2.8[0-9] s to the end")
         self.assertEqual((done.returncode, self.self_test()), (0, 0))
         whole = self.header()
-        for right, wrong in (("sinf(q2)", "cosf(q2)"), ("e.h2 = c[6]", "e.h2 = -c[6]"),
+        for right, wrong in (("sinf(q2)", "cosf(q2)"), ("e.h2 = p[POLICY_D2]", "e.h2 = -p[POLICY_D2]"),
                              ("h / 6.0f", "h / 5.0f"), ("off[i] = d[i] - sign", "off[i] = d[i] + sign")):
             self.assertEqual(whole.count(right), 1, right)
             self.write("policy.h", whole.replace(right, wrong))

@@ -228,8 +228,8 @@ class PageTest(ProgramTest):
                 self.refuse(["export", "run", "--page", name], f"{name}/agents.json",
                             "expected a list of agents")
 
-    def test_the_command_of_a_policy_of_another_version(self):
-        """Settings that its file lacks have their defaults; others than this version's are left out."""
+    def test_only_a_policy_of_this_version_has_a_command(self):
+        """Settings that its file lacks have their defaults; unknown ones are left out."""
         self.succeed(*small(out="run"))
         metadata, tensors = read_tensors(self.folder / "run/policy.safetensors")
         config = metadata["config"]
@@ -240,13 +240,16 @@ class PageTest(ProgramTest):
                             ("top", "title = 1\n" + config)):
             self.assertNotEqual(other, config)
             write_tensors(self.folder / f"{name}.safetensors", metadata | {"config": other}, tensors)
-        names = [f"{name}.safetensors" for name in ("lacks", "setting", "section", "top")]
-        for name in names:
-            self.succeed("export", name, "--page", "page", "--id", name.split(".")[0])
+        for name in ("lacks", "setting", "section", "top"):
+            self.succeed("export", f"{name}.safetensors", "--page", "page", "--id", name)
         self.succeed("export", "run", "--page", "page")
         entries = json.loads((self.folder / "page/agents.json").read_text())["agents"]
         commands = {entry["command"] for entry in entries}
         self.assertEqual((len(entries), len(commands)), (5, 1), commands)
+        write_tensors(self.folder / "old.safetensors", metadata | {"upswing_version": "0.4.0"}, tensors)
+        self.succeed("export", "old.safetensors", "--page", "old", "--id", "old")
+        entry, = json.loads((self.folder / "old/agents.json").read_text())["agents"]
+        self.assertNotIn("command", entry)
 
 
 class ShippedTest(ProgramTest):

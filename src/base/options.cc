@@ -16,13 +16,16 @@ struct Overloaded : Ts... {
 template <class... Ts>
 Overloaded(Ts...) -> Overloaded<Ts...>;  // clang 14 needs it spelled out
 
-/// Whether a TOML string cannot contain the character.
-bool IsControl(char c) { return (c >= 0 && c < ' ' && c != '\t') || c == '\x7f'; }
-
-/// Quotes a text as a TOML basic string.
+/// Quotes a text as a TOML basic string, which has control characters only as \u001B.
 std::string Quote(std::string_view text) {
+  constexpr std::string_view kDigits = "0123456789ABCDEF";
   std::string quoted = "\"";
   for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < ' ' || byte == 0x7F) {
+      quoted += Concat("\\u00", kDigits.substr(byte / 16, 1), kDigits.substr(byte % 16, 1));
+      continue;
+    }
     if (c == '"' || c == '\\') quoted += '\\';
     quoted += c;
   }
@@ -176,7 +179,7 @@ void Option::Set(std::string_view text, const std::string& where) const {
                        return true;
                      },
                      [&](std::string* value) {
-                       if (std::ranges::any_of(text, IsControl)) return false;
+                       if (text.find_first_of("\n\r") != std::string_view::npos) return false;
                        if (!choices.empty() && std::ranges::find(choices, text) == choices.end()) {
                          return false;
                        }

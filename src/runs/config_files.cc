@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "agents/named_agents.h"
 #include "base/checksum.h"
 #include "base/error.h"
 #include "base/text.h"
@@ -97,11 +96,10 @@ std::string SettingsMark(const Config& config) {
 
 std::optional<std::string> TrainCommand(const PolicyInfo& info, const std::string& where) {
   constexpr const char* kWhere = "metadata \"config\"";
-  const auto agents = EmbeddedAgents();
-  if (std::ranges::find(agents, info.agent, &NamedAgent::name) == agents.end()) return std::nullopt;
+  if (info.upswing_version != UPSWING_VERSION) return std::nullopt;
   try {
     const Config config = ReadRecord(info.config, kWhere).config;
-    const Config named = BuildConfig("", {{"agent", info.agent}});
+    const Config named = BuildConfig("", {{"agent", info.agent, "metadata \"agent\""}});
     std::string command =
         Concat("./upswing train --agent ", info.agent, " --seed ", config.train.seed);
     for (const auto& [option, usual] : Differences(OptionsOf(config), OptionsOf(named))) {

@@ -39,9 +39,8 @@ std::string SettingsMark(const Config& config);
 /// The shell command that trains a policy like this: its agent, its seed, and a flag per setting
 /// that differs from the named agent's.
 ///
-/// For a policy of another version, the command leaves out settings that this version lacks.
-/// Nothing if this version lacks the agent, or if a setting's text does not fit on a command line.
-/// Throws BadInput that begins with `where`.
+/// Nothing if another version trained the policy, or if a setting's text does not fit on a command
+/// line. Throws BadInput that begins with `where`.
 std::optional<std::string> TrainCommand(const PolicyInfo& info, const std::string& where);
 
 }  // namespace upswing
