@@ -18,6 +18,7 @@ void AddGrade(CommandLine& line);
 void AddMap(CommandLine& line);
 void AddPlot(CommandLine& line);
 void AddView(CommandLine& line);
+void AddPlantCommand(CommandLine& line);
 void AddInfo(CommandLine& line);
 void AddCompare(CommandLine& line);
 void AddStudy(CommandLine& line);

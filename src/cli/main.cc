@@ -12,6 +12,7 @@ constexpr Command kCommands[] = {
     {"map", AddMap},
     {"plot", AddPlot},
     {"view", AddView},
+    {"plant", AddPlantCommand},
     {"info", AddInfo},
     {"compare", AddCompare},
     {"study", AddStudy},

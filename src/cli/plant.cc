@@ -1,0 +1,174 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "base/text.h"
+#include "cli/commands.h"
+#include "cli/python_child.h"
+#include "cli/say.h"
+#include "cli/signals.h"
+#include "judge/rollout.h"
+#include "os/file.h"
+#include "os/streams.h"
+#include "runs/plant_file.h"
+
+namespace upswing {
+
+/// The program in Python that reads models: the text of python/upswing/_plant.py.
+const char* PlantProgram();
+
+namespace {
+
+// What a plant file cannot hold and --drop leaves out, as python/upswing/_plant.py names it.
+constexpr std::array kDroppable{
+    "stiffness", "nonlinear-damping", "limits", "frictionloss", "contacts",  "equality", "tendons",
+    "fluid",     "gravcomp",          "tilt",   "offset",       "actuators", "includes"};
+
+/// Largest difference (rad) that counts as none. Both programs take the same Runge-Kutta steps, so
+/// only rounding differs, by about 1e-16 of each angle and step. Chaotic motions multiply that by
+/// up to 1e5 in a second. A parameter that is wrong by 1e-5 of its value moves the joints by more.
+constexpr double kTolerance = 1e-6;
+
+struct PlantArguments {
+  std::string model, out;
+  std::vector<std::string> drop;
+  double motor = 0;                      // 0: not given
+  double torque_limit = 0, length2 = 0;  // N·m, m; 0: not given
+  bool convert_friction = false;
+};
+
+/// The instructions of the Python program. Throws BadInput.
+nlohmann::json JobOf(const PlantArguments& a) {
+  for (const std::string& name : a.drop) {
+    if (std::ranges::find(kDroppable, name) != kDroppable.end()) continue;
+    throw BadInput(Concat("--drop: expected one of ", Join(kDroppable, ", "), ", got \"",
+                          Printable(name), "\""));
+  }
+  const auto given = [](double value) {
+    return value > 0 ? nlohmann::json(value) : nlohmann::json();
+  };
+  return {{"file", a.model},
+          {"drop", a.drop},
+          {"motor", static_cast<int>(a.motor)},
+          {"torque_limit", given(a.torque_limit)},
+          {"length2", given(a.length2)},
+          {"convert_friction", a.convert_friction}};
+}
+
+/// Largest difference (rad) between the motions of a plant in this program and those of the model.
+/// `read` has the start states, torques and angles.
+double LargestDifference(const Plant& plant, const nlohmann::json& read) {
+  double largest = 0;
+  for (size_t n = 0; n < read["starts"].size(); ++n) {
+    const auto start = read["starts"][n].get<std::array<double, 4>>();
+    const auto angles = read["angles"][n].get<std::vector<std::array<double, 2>>>();
+    RolloutConfig config;
+    config.env.plants = {plant};
+    config.start = PendulumState{start[0], start[1], start[2], start[3]};
+    config.schedule = read["torques"][n].get<std::vector<double>>();
+    config.seconds = static_cast<double>(config.schedule.size()) * kControlPeriod;
+    const Rollout rollout = RunRollout(config);
+    for (size_t k = 0; k < angles.size(); ++k) {
+      const PendulumState& s = rollout.rows.at(k).state;
+      largest = std::max({largest, std::abs(s.q1 - angles[k][0]), std::abs(s.q2 - angles[k][1])});
+    }
+  }
+  return largest;
+}
+
+/// What the Python program read, or nothing if it failed; `code` is then the exit code.
+std::optional<nlohmann::json> ReadModel(const PlantArguments& a, int& code) {
+  InstallSignalHandlers("");
+  PythonChild reader("plant", PlantProgram(),
+                     JobOf(a).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  const std::optional<std::string> line = reader.Next();
+  code = reader.Finish();
+  if (StopSignal() != 0) code = 128 + StopSignal();
+  if (code != 0) return std::nullopt;
+  nlohmann::json read = line ? nlohmann::json::parse(*line, nullptr, false) : nlohmann::json();
+  if (!read.is_object()) {
+    throw Failure("plant: Python read nothing: expected UPSWING_PYTHON to name a Python");
+  }
+  return read;
+}
+
+int RunPlant(const PlantArguments& a) {
+  CheckWritable("--out", a.out);
+  int code = 0;
+  const std::optional<nlohmann::json> read = ReadModel(a, code);
+  if (!read) return code;
+
+  const auto toml = (*read)["toml"].get<std::string>();
+  const Plant plant = ParsePlantFile(toml, Concat("plant of ", Printable(a.model))).plant;
+  const size_t motions = (*read)["starts"].size();
+  const double difference = LargestDifference(plant, *read);
+  const std::string check = fmt::format(
+      "{} random motions of 1 s differ from MuJoCo's by at most {:.2g} rad", motions, difference);
+  if (!(difference <= kTolerance)) {
+    throw Failure(Concat(Printable(a.model), ": ", check, ", expected at most ", kTolerance,
+                         ": the model has something that a plant file cannot hold"));
+  }
+  const std::string text = Concat("# Plant of ", Printable(a.model),
+                                  ", read by `upswing plant`.\n# ", check, ".\n", toml);
+  if (IsStandardStream(a.out)) {
+    WriteOutput(a.out, text);
+    return 0;
+  }
+  WriteFileAtomically(a.out, text);  // replaces a link: its target may be of another folder
+  fmt::print("{}: {}\n", Printable(a.out), check);
+  for (const auto& remark : (*read)["remarks"]) {
+    fmt::print("  {}\n", Printable(remark.get<std::string>()));
+  }
+  return 0;
+}
+
+}  // namespace
+
+void AddPlantCommand(CommandLine& line) {
+  PlantArguments& a = line.Runs(RunPlant);
+  line.Text("model", a.model, "FILE.xml|FILE.urdf",
+            "MJCF or URDF file of a double pendulum, with its includes and meshes in its folder");
+  line.Require("model");
+  line.Text("--out", a.out, "FILE", "plant file (TOML) to write; -: standard output");
+  line.Require("--out");
+  line.Repeated("--drop", a.drop, "NAME",
+                Concat("property to leave out, because a plant file cannot hold it (repeatable): ",
+                       Join(kDroppable, ", ")));
+  line.Flag(
+      "--convert-friction", a.convert_friction,
+      "write MuJoCo's frictionloss c as the dry friction c·2/π·atan(100 w), which is c at speed");
+  Options own;
+  Option& motor = own.Add(&a.motor, "motor", {1, 2}, "",
+                          "joint whose motor the plant has; the other joint's motor is left out");
+  motor.step = 1;
+  motor.usual = "the only motor";
+  own.Add(&a.torque_limit, "torque_limit", {0.001, 1000}, "N·m", "largest torque of the motor")
+      .usual = "as in the file";
+  own.Add(&a.length2, "length2", {0.01, 10}, "m",
+          "length of link 2, which only the task's heights need")
+      .usual = "the distance to its farthest site, else to the end of its farthest shape";
+  line.Arguments(own);
+  line.Notes(
+      "The command refuses (exit code 2) what a plant file cannot hold, with its value: a cart, a\n"
+      "free base, a third joint, two motors, servos, springs, joint limits that a swing-up "
+      "reaches,\n"
+      "shapes that touch, MuJoCo's frictionloss, tendons, fluids, a tilted plane. It then moves\n"
+      "MuJoCo's model and the plant from 200 random states under random torques for 1 s, in the\n"
+      "same Runge-Kutta steps of 0.005 s. If an angle differs by more than 1e-6 rad, it writes\n"
+      "nothing and ends with exit code 1.\n\n"
+      "Python reads the file, with MuJoCo: `python3`, or the one that UPSWING_PYTHON names.\n");
+  line.Examples(
+      "  ./upswing plant acrobot.xml --out acrobot.toml\n"
+      "  ./upswing plant robot.urdf --out robot.toml --drop limits --convert-friction\n"
+      "  ./upswing plant arm.xml --out arm.toml --motor 2 --torque-limit 3 --drop contacts\n"
+      "  ./upswing eval tvlqr --plant acrobot.toml --made-for acrobot.toml\n");
+}
+
+}  // namespace upswing
