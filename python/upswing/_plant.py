@@ -78,12 +78,13 @@ def parse(path: Path, where: str) -> ET.Element:
         text = read_bytes(path, MOST_BYTES, where).decode("utf-8-sig")
         if "<!DOCTYPE" in text or "<!ENTITY" in text:
             raise Refusal(f"{where}expected no DOCTYPE and no ENTITY")
-        parser = ET.XMLPullParser(("start", "end"))
+        parser: Any = ET.XMLPullParser(("start", "end"))
         parser.feed(text)
         parser.close()
     except (UnicodeDecodeError, ET.ParseError, ValueError, LookupError) as error:
         raise Refusal(f"{where}expected XML in UTF-8: {printable(str(error))}") from error
-    depth, root = 0, None
+    depth = 0
+    root: ET.Element | None = None
     for event, element in parser.read_events():
         root = element if root is None else root
         depth += 1 if event == "start" else -1
@@ -387,7 +388,7 @@ class Pendulum:
             return False
         sign = (1, self.sign2)[k]
         ends = [self.zero[k] + sign * (end - self.model.qpos0[k]) for end in self.model.jnt_range[k]]
-        return min(ends) > -TURNS or max(ends) < TURNS
+        return bool(min(ends) > -TURNS or max(ends) < TURNS)
 
     def _limit(self, k: int) -> str:
         low, high = self.model.jnt_range[k]
@@ -454,7 +455,9 @@ class Motor:
 
     def _actuators(self, document: Document) -> dict[int, int]:
         """The motor of each joint that has one."""
-        model, motors, others = self.model, {}, []
+        model = self.model
+        motors: dict[int, int] = {}
+        others: list[str] = []
         for i in range(model.nactuator):
             name = printable(model.actuator(i).name) or f"actuator {i}"
             if not self._is_motor(i):

@@ -157,12 +157,11 @@ void AddPlantCommand(CommandLine& line) {
   line.Arguments(own);
   line.Notes(
       "The command refuses (exit code 2) what a plant file cannot hold, with its value: a cart, a\n"
-      "free base, a third joint, two motors, servos, springs, joint limits that a swing-up "
-      "reaches,\n"
-      "shapes that touch, MuJoCo's frictionloss, tendons, fluids, a tilted plane. It then moves\n"
-      "MuJoCo's model and the plant from 200 random states under random torques for 1 s, in the\n"
-      "same Runge-Kutta steps of 0.005 s. If an angle differs by more than 1e-6 rad, it writes\n"
-      "nothing and ends with exit code 1.\n\n"
+      "free base, a third joint, two motors, servos, springs, joint limits that a swing-up\n"
+      "reaches. It also refuses shapes that touch, MuJoCo's frictionloss, tendons, fluids and a\n"
+      "tilted plane. It then moves MuJoCo's model and the plant from 200 random states under\n"
+      "random torques for 1 s, in the same Runge-Kutta steps of 0.005 s. If an angle differs by\n"
+      "more than 1e-6 rad, it writes nothing and ends with exit code 1.\n\n"
       "Python reads the file, with MuJoCo: `python3`, or the one that UPSWING_PYTHON names.\n");
   line.Examples(
       "  ./upswing plant acrobot.xml --out acrobot.toml\n"
