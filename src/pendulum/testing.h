@@ -2,7 +2,7 @@
 
 #include <cmath>
 #include <numbers>
-#include <variant>
+#include <span>
 
 #include "base/error.h"
 #include "base/options.h"

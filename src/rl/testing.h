@@ -10,6 +10,7 @@
 #include "base/safetensors.h"
 #include "base/testing.h"
 #include "rl/agent.h"
+#include "rl/off_policy_config.h"
 #include "rl/toy_env_testing.h"
 
 /// Helpers for tests of agents.
@@ -20,6 +21,18 @@ inline double Metric(const Metrics& metrics, const std::string& name) {
   const auto found = std::ranges::find(metrics, name, &Metrics::value_type::first);
   EXPECT_NE(found, metrics.end()) << name;
   return found == metrics.end() ? std::numeric_limits<double>::quiet_NaN() : found->second;
+}
+
+/// Makes an agent with a replay memory small and fast enough for tests, with plain one-step
+/// targets.
+inline void MakeSmall(OffPolicyConfig& off_policy) {
+  off_policy.batch = 16;
+  off_policy.replay = 1000;
+  off_policy.learning_starts = 32;
+  off_policy.updates_per_step = 0.5;
+  off_policy.n_step = 1;
+  off_policy.reward_scale = 1;
+  off_policy.reward_centering = 0;
 }
 
 /// Trains on an environment for `steps` steps of all environments.

@@ -18,13 +18,7 @@ namespace {
 SacConfig SmallSac() {
   SacConfig config;
   config.hidden = {16, 16};
-  config.off_policy.batch = 16;
-  config.off_policy.replay = 1000;
-  config.off_policy.learning_starts = 32;
-  config.off_policy.updates_per_step = 0.5;
-  config.off_policy.n_step = 1;
-  config.off_policy.reward_scale = 1;
-  config.off_policy.reward_centering = 0;
+  MakeSmall(config.off_policy);
   config.off_policy.learning_rate = config.off_policy.learning_rate_end = 3e-3;
   return config;
 }
