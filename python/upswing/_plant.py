@@ -16,7 +16,7 @@ import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 os.environ["MUJOCO_GL"] = "disable"  # nothing is drawn
 try:
@@ -31,8 +31,7 @@ except ImportError as missing:
 MOST_BYTES, MOST_MESH_BYTES = 1 << 20, 1 << 24  # of an XML file, of all meshes
 MOST_INCLUDES, MOST_ELEMENTS, MOST_DEPTH = 20, 5000, 100
 
-MOTIONS, PERIODS, STEPS, STEP = 200, 50, 4, 0.005  # compared motions; control periods of STEPS steps [s]
-SLOPE = 100  # of the plant's dry friction c·atan(100 w), s/rad
+MOTIONS, PERIODS = 200, 50  # compared motions; control periods of each
 TURNS = 4 * math.pi  # rad; a joint limit that is further away does not count
 ALIGNED = 1e-4  # rad, largest angle between directions that count as parallel
 ZERO = 1e-12  # a length [m] for 0, which a plant file would read as half of the link
@@ -47,6 +46,14 @@ FOLDERS = ("meshdir", "assetdir", "texturedir", "strippath")  # attributes of `c
 
 class Refusal(Exception):
     """The file is no plant; the message says why."""
+
+
+class Physics(NamedTuple):
+    """How the program moves a plant."""
+
+    timestep: float  # s
+    steps: int  # Runge-Kutta steps in a control period
+    friction_slope: float  # k in the dry friction c·atan(k w), s/rad
 
 
 def printable(text: str) -> str:
@@ -594,16 +601,16 @@ def parameters_of(p: Pendulum, motor: Motor, coulomb: Any, length2: float | None
     ]
 
 
-def move(p: Pendulum, motor: Motor, starts: Any, torques: Any, coulomb: Any) -> Any:
+def move(p: Pendulum, motor: Motor, physics: Physics, starts: Any, torques: Any, coulomb: Any) -> Any:
     """Angles q (motions, periods + 1, 2) of the model from states of the plant (motions, 4), under torques
-    (motions, periods) [N·m] that are held for a control period each, with dry friction c·atan(100 w)."""
+    (motions, periods) [N·m] that are held for a control period each, with dry friction c (2) [N·m]."""
     model, data = p.model, mujoco.MjData(p.model)
     signs, zero = np.array([1, p.sign2]), np.array(p.zero)
-    model.opt.timestep, model.opt.integrator = STEP, mujoco.mjtIntegrator.mjINT_RK4
+    model.opt.timestep, model.opt.integrator = physics.timestep, mujoco.mjtIntegrator.mjINT_RK4
     angles = np.empty((*torques.shape[:1], torques.shape[1] + 1, 2))
 
     def friction(_: Any, data: mujoco.MjData) -> None:
-        data.qfrc_passive[:2] -= coulomb * np.arctan(SLOPE * data.qvel[:2])
+        data.qfrc_passive[:2] -= coulomb * np.arctan(physics.friction_slope * data.qvel[:2])
 
     if any(coulomb):
         mujoco.set_mjcb_passive(friction)
@@ -614,7 +621,7 @@ def move(p: Pendulum, motor: Motor, starts: Any, torques: Any, coulomb: Any) -> 
         angles[n, 0] = start[:2]
         for t, torque in enumerate(torques[n]):
             motor.drive(data, torque)
-            mujoco.mj_step(model, data, STEPS)
+            mujoco.mj_step(model, data, physics.steps)
             angles[n, t + 1] = zero + signs * (data.qpos[:2] - model.qpos0)
     mujoco.set_mjcb_passive(None)
     return angles
@@ -679,16 +686,18 @@ def read_plant(job: dict[str, Any]) -> dict[str, Any]:
     p.measure()
     motor = Motor(p, document, job)
     remarks = remarks_of(p, motor, left_out + motor.left_out)
+    physics = Physics(**job["physics"])
     starts, torques = random_motions(p, motor)
-    angles = move(p, motor, starts, torques, coulomb)
+    angles = move(p, motor, physics, starts, torques, coulomb)
     if converted:
         p.model.dof_frictionloss[:] = frictionloss
-        other = np.abs(move(p, motor, starts, torques, np.zeros(2)) - angles)
-        remarks.append(f"frictionloss c became c·2/π·atan({SLOPE} w), which is c at speed and weaker below about "
+        other = np.abs(move(p, motor, physics, starts, torques, np.zeros(2)) - angles)
+        remarks.append(f"frictionloss c became c·2/π·atan({physics.friction_slope:g} w), which is c at speed and "
+                       "weaker below about "
                        f"0.1 rad/s; over the {MOTIONS} motions this law moves the joints by {np.median(other[:, -1]):.2g} "
                        f"rad (median) and {other.max():.2g} rad (largest) from MuJoCo's")
     if not np.all(np.isfinite(angles)):
-        raise Refusal(f"MuJoCo's motion diverges in Runge-Kutta steps of {STEP} s")
+        raise Refusal(f"MuJoCo's motion diverges in Runge-Kutta steps of {physics.timestep:g} s")
     parameters = parameters_of(p, motor, coulomb, job["length2"])
     return {"toml": toml_of(p, parameters, remarks), "remarks": remarks, "starts": starts.tolist(),
             "torques": torques.tolist(), "angles": angles.tolist()}

@@ -59,7 +59,11 @@ nlohmann::json JobOf(const PlantArguments& a) {
           {"motor", static_cast<int>(a.motor)},
           {"torque_limit", given(a.torque_limit)},
           {"length2", given(a.length2)},
-          {"convert_friction", a.convert_friction}};
+          {"convert_friction", a.convert_friction},
+          {"physics",
+           {{"timestep", kPhysicsTimestep},
+            {"steps", kPhysicsSteps},
+            {"friction_slope", kFrictionSlope}}}};
 }
 
 /// Largest difference (rad) between the motions of a plant in this program and those of the model.
