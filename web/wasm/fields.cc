@@ -24,14 +24,9 @@ std::string LineOf(const char* name) {
 }  // namespace
 
 void PlantFields::Visit(FieldVisitor& field) {
-  field("mass1", plant.mass1);
-  field("mass2", plant.mass2);
-  field("length1", plant.length1);
-  field("length2", plant.length2);
-  field("damping1", plant.damping1);
-  field("damping2", plant.damping2);
-  field("gravity", plant.gravity);
-  field("torque_limit", plant.torque_limit);
+  for (const PlantParameter& parameter : std::span(kPlantParameters).first(kMainParameters)) {
+    field(parameter.name, plant.*parameter.value);
+  }
 }
 
 void StateFields::Visit(FieldVisitor& field) {

@@ -29,7 +29,7 @@ class FieldVisitor {
 };
 
 struct PlantFields {
-  Plant plant;
+  Plant plant;  // its first kMainParameters
   void Visit(FieldVisitor& field);
 };
 
