@@ -132,7 +132,7 @@ CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
   const CSamples samples = DrawSamples(policy, layers);
   const int outputs = layers.back().out();
   const int memory = loaded.memory();
-  const bool squashed = policy.rule() == ActionRule::kSquashedGaussian;
+  const bool squashed = policy.rule().bound == &kSquash;
   CHeader header;
   header.prefix = prefix;
   CParts parts;

@@ -209,7 +209,7 @@ std::string AddActor(OnnxModel& model, const ExportedPolicy& policy) {
     const std::string whole = model.AddConstant("limit", limit, {A});
     return model.AddNode(UnitActionName(policy), "Div", {ActionName(policy), whole});
   }
-  const bool squashed = policy.rule() == ActionRule::kSquashedGaussian;
+  const bool squashed = policy.rule().bound == &kSquash;
   const char* bound = squashed ? "tanh(mean)" : "the mean, cut off at -1 and 1";
   model.AddOutput(
       "mean", A,
@@ -286,11 +286,11 @@ std::string OnnxModelOf(const LoadedPolicy& loaded) {
   OnnxModel model(Concat("Upswing, ", loaded.task, ": ", loaded.policy->description()));
   model.AddInput(kInput, policy.obs_size(),
                  "as the task's environment gives it; order and units: metadata `observation`");
-  if (policy.rule() == ActionRule::kLevels) {
-    AddQNetwork(model, policy);
-  } else {
+  if (policy.rule().is_actor()) {
     const std::string action = AddActor(model, policy);
     if (!policy.critic.empty()) AddCritic(model, policy, action);
+  } else {
+    AddQNetwork(model, policy);
   }
   model.AddOutput(ActionName(policy), policy.action_size(),
                   policy.is_foreign() ? "of the environment's action space"

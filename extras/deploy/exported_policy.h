@@ -42,10 +42,10 @@ struct ExportedPolicy {
   double limit = 0;                       // largest torque, N·m, or largest number of an action
   ExportedTask task;
 
-  ActionRule rule() const { return policy->parts().rule; }
+  const ActionRuleFacts& rule() const { return policy->parts().facts(); }
   /// The torques that the policy chooses from; empty: any within the limit.
   const std::vector<double>& torques() const { return policy->parts().torques; }
-  bool is_discrete() const { return !torques().empty(); }
+  bool is_discrete() const { return rule().chooses_torque(); }
   /// Whether the critic takes the action, in units of its limit, after the observation.
   bool critic_takes_action() const { return !critic.empty() && critic.front().in() > obs_size(); }
   int obs_size() const { return policy->obs_size(); }

@@ -96,12 +96,12 @@ Training::Training(Config config, const Host& host)
 void Training::StartFrom(const Policy& policy, const std::string& where) {
   const auto* network = dynamic_cast<const NetworkPolicy*>(&policy);
   const std::string got =
-      network ? Concat(NameOf(network->parts().rule), " ", network->parts().shape.Text())
+      network ? Concat(network->parts().facts().name, " ", network->parts().shape.Text())
               : policy.kind();
   if (network && agent_->StartFrom(network->parts())) return;
   const std::unique_ptr<NetworkPolicy> own = agent_->ExportPolicy({});
   throw BadInput(Concat(where, ": expected a policy with the network of the agent, ",
-                        NameOf(own->parts().rule), " ", own->parts().shape.Text(), ", got ", got));
+                        own->parts().facts().name, " ", own->parts().shape.Text(), ", got ", got));
 }
 
 std::unique_ptr<Policy> Training::policy() const {

@@ -34,17 +34,24 @@ struct Gaussian {
 /// Φ(x), the distribution function of a standard normal.
 inline double NormalCdf(double x) { return std::erfc(-x / std::numbers::sqrt2) / 2; }
 
-/// Probabilities (n + 2) of the actions of a policy that is squashed or clipped to ±1. The first
-/// and the last are the probabilities of clipping to -1 and to 1. The others belong to n equal
-/// intervals between -1 and 1.
-inline void ActionProbabilities(const Gaussian<double>& policy, bool squashed,
+/// A map of the unbounded action u to the action a within ±1.
+struct ActionBound {
+  double (*bounded)(double u);
+  double (*unbounded)(double a);  // its inverse: the u from which on the action is at least a
+};
+extern const ActionBound kSquash;  // a = tanh(u)
+extern const ActionBound kClip;    // a = u, cut off at ±1
+
+/// Probabilities (n + 2) of the actions of a policy with this bound. The first and the last are the
+/// probabilities of clipping to -1 and to 1. The others belong to n equal intervals between -1 and
+/// 1.
+inline void ActionProbabilities(const Gaussian<double>& policy, const ActionBound& bound,
                                 std::span<double> probabilities) {
   const size_t pieces = probabilities.size() - 2;
   double below = 0;
   for (size_t i = 0; i <= pieces; ++i) {
     const double end = 2 * static_cast<double>(i) / static_cast<double>(pieces) - 1;
-    const double u = squashed ? std::atanh(end) : end;
-    const double up_to = NormalCdf((u - policy.mean) / policy.std);
+    const double up_to = NormalCdf((bound.unbounded(end) - policy.mean) / policy.std);
     probabilities[i] = up_to - below;
     below = up_to;
   }

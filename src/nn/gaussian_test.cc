@@ -28,27 +28,27 @@ TEST(Gaussian, ActionProbabilitiesAreScipys) {
   EXPECT_NEAR(NormalCdf(-8) / 6.22096057427174e-16, 1, 1e-12);
   EXPECT_NEAR(NormalCdf(1), 0.841344746068543, 1e-15);
   struct Case {
-    bool squashed;
+    const ActionBound* bound;
     double mean, log_std;
     std::array<double, 6> probabilities;
   };
   // scipy.stats.norm 1.17.1: probability of clipping to -1, of four quarters of the range, and of
   // clipping to 1.
   const std::array<Case, 6> cases{{
-      {true, 0.3, -1, {0, 0.0104814094487, 0.19691609333, 0.543616575317, 0.248985921904, 0}},
-      {true, 2, 1, {0, 0.174164009485, 0.0567747146974, 0.0658425962209, 0.703218679596, 0}},
-      {true, -6, -4, {0, 1, 0, 0, 0, 0}},
-      {false,
+      {&kSquash, 0.3, -1, {0, 0.0104814094487, 0.19691609333, 0.543616575317, 0.248985921904, 0}},
+      {&kSquash, 2, 1, {0, 0.174164009485, 0.0567747146974, 0.0658425962209, 0.703218679596, 0}},
+      {&kSquash, -6, -4, {0, 1, 0, 0, 0, 0}},
+      {&kClip,
        0.3,
        -1,
        {0.000204841514538, 0.014624255795, 0.19256840547, 0.499263515063, 0.26480548101,
         0.0285335011478}},
-      {false,
+      {&kClip,
        1.4,
        -0.5,
        {3.79594162286e-05, 0.000828454869687, 0.00962732148171, 0.0584307373584, 0.185866588422,
         0.745208938452}},
-      {false,
+      {&kClip,
        -0.2,
        1,
        {0.384262978983, 0.0717974387523, 0.0732656535016, 0.0722835450572, 0.0689486866999,
@@ -56,7 +56,7 @@ TEST(Gaussian, ActionProbabilitiesAreScipys) {
   }};
   for (const Case& c : cases) {
     std::array<double, 6> got{};
-    ActionProbabilities(Gaussian<double>::From(c.mean, c.log_std), c.squashed, got);
+    ActionProbabilities(Gaussian<double>::From(c.mean, c.log_std), *c.bound, got);
     for (size_t i = 0; i < got.size(); ++i) {
       EXPECT_NEAR(got.at(i), c.probabilities.at(i), 1e-11) << c.mean << " " << i;
     }

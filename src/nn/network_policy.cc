@@ -35,17 +35,17 @@ void ForBlocks(int rows, const F& f) {
 /// Throws BadInput unless the sizes of the parts fit each other. Each network checks its own sizes.
 NetworkPolicyParts Checked(NetworkPolicyParts parts) {
   const auto A = parts.action_limit.size(), Q = parts.torques.size();
-  const bool levels = parts.rule == ActionRule::kLevels;
+  const ActionRuleFacts& rule = parts.facts();
   size_t outputs = 2 * A;
   bool fits = A > 0 && Q == 0;
-  if (parts.chooses_torque()) {
-    const size_t limits = levels ? 0 : 1;
+  if (rule.chooses_torque()) {
+    const size_t limits = rule.is_actor() ? 1 : 0;
     outputs = Q;
     fits = A == limits && Q > 0;
   }
   if (!fits) {
-    throw BadInput(Concat("policy: expected torques or limits for a ", NameOf(parts.rule), ", got ",
-                          Q, " torques and ", A, " limits"));
+    throw BadInput(Concat("policy: expected torques or limits for a ", rule.name, ", got ", Q,
+                          " torques and ", A, " limits"));
   }
   if (static_cast<size_t>(parts.shape.outputs) != outputs) {
     throw BadInput(Concat("policy: expected a network of ", outputs,
@@ -54,7 +54,7 @@ NetworkPolicyParts Checked(NetworkPolicyParts parts) {
   }
   const int D = parts.shape.inputs, with_action = D + parts.action_size();
   const int inputs = parts.critic.inputs;
-  const bool critic_fits = !levels && (inputs == D || inputs == with_action);
+  const bool critic_fits = rule.is_actor() && (inputs == D || inputs == with_action);
   if (inputs != 0 && !(critic_fits && parts.critic.outputs == 1)) {
     throw BadInput(Concat("policy: expected a critic of ", D, " or ", with_action,
                           " inputs and one output, or of Q-values none, got ", inputs, " and ",
@@ -106,12 +106,11 @@ NetworkPolicy::NetworkPolicy(NetworkPolicyParts parts, PolicyInfo info)
 
 std::string NetworkPolicy::description() const {
   const NetworkShape& shape = parts_.shape;
-  std::string what = "mean action of a Gaussian policy ";
-  if (parts_.rule == ActionRule::kCategorical) what = "likeliest action of a categorical policy ";
-  if (parts_.rule == ActionRule::kLevels) {
-    what = Concat("greedy policy of a ", shape.dueling() ? "dueling" : "plain", " Q-network ");
-  }
-  return Concat(what, shape.Text(), shape.layer_norm ? ", layer normalisation" : "",
+  const ActionRuleFacts& rule = parts_.facts();
+  const char* head = "";
+  if (!is_actor()) head = shape.dueling() ? " dueling" : " plain";
+  return Concat(rule.choice, head, ' ', rule.distribution, ' ', shape.Text(),
+                shape.layer_norm ? ", layer normalisation" : "",
                 critic_ ? ", critic " + parts_.critic.Text() : "");
 }
 
@@ -149,7 +148,7 @@ void NetworkPolicy::Act(Matrix<const float> obs, Matrix<double> action, Memory& 
 }
 
 void NetworkPolicy::Choose(std::span<const float> outputs, std::span<double> action) const {
-  if (parts_.chooses_torque()) {
+  if (parts_.facts().chooses_torque()) {
     action[0] = parts_.torques[ArgMax(outputs)];
     return;
   }
@@ -157,8 +156,7 @@ void NetworkPolicy::Choose(std::span<const float> outputs, std::span<double> act
 }
 
 double NetworkPolicy::Bounded(double u, size_t k) const {
-  const bool squashed = parts_.rule == ActionRule::kSquashedGaussian;
-  return parts_.action_limit[k] * (squashed ? std::tanh(u) : std::clamp(u, -1.0, 1.0));
+  return parts_.action_limit[k] * parts_.facts().bound->bounded(u);
 }
 
 int NetworkPolicy::num_values() const {
@@ -205,7 +203,7 @@ void NetworkPolicy::Spread(Matrix<const float> obs, Matrix<double> low, Matrix<d
 
 void NetworkPolicy::Spread(std::span<const float> outputs, std::span<double> low,
                            std::span<double> high) const {
-  if (parts_.rule == ActionRule::kCategorical) {
+  if (parts_.facts().chooses_torque()) {
     low[0] = CategoricalQuantile(parts_.torques, outputs, kLowTail);
     high[0] = CategoricalQuantile(parts_.torques, outputs, 1 - kLowTail);
     return;

@@ -9,41 +9,27 @@
 #include "base/matrix.h"
 #include "base/policy.h"
 #include "base/tensors.h"
+#include "nn/action_rule.h"
 #include "nn/network.h"
 
 namespace upswing {
-
-/// Rule by which the outputs of a network choose an action. NameOf gives its name in files.
-enum class ActionRule {
-  kLevels,            // a Q-value per torque: the torque of the largest
-  kSquashedGaussian,  // (μ, ln σ) per component: limit · tanh(μ)
-  kClippedGaussian,   // (μ, ln σ) per component: limit · clamp(μ, -1, 1)
-  kCategorical,       // a logit per torque: the torque of the largest
-};
-
-/// Name of the rule, such as "levels" or "squashed-gaussian".
-std::string NameOf(ActionRule rule);
 
 /// Parts of a network policy. D: observation size, A: action size, Q: number of torques.
 struct NetworkPolicyParts {
   ActionRule rule = ActionRule::kLevels;
   NetworkShape shape = {};                // D inputs, 2 A or Q outputs
   AlignedVector<float> parameters = {};   // parameters of the network
-  std::vector<double> torques = {};       // (Q) N·m; empty for Gaussians
-  std::vector<double> action_limit = {};  // (A) N·m; empty for kLevels, where A = 1
+  std::vector<double> torques = {};       // (Q) N·m; if the rule chooses a torque, else empty
+  std::vector<double> action_limit = {};  // (A) N·m; empty for Q-values, where A = 1
   // Network that estimates the value of an observation; only for rules whose outputs are not
   // values. It has D inputs, or D + A inputs: the observation, then the action in units of its
   // limit. No inputs: there is no critic.
   NetworkShape critic = {};
   AlignedVector<float> critic_parameters = {};
 
-  /// Whether each action is one of `torques`.
-  bool chooses_torque() const {
-    return rule == ActionRule::kLevels || rule == ActionRule::kCategorical;
-  }
-  int action_size() const {
-    return rule == ActionRule::kLevels ? 1 : static_cast<int>(action_limit.size());
-  }
+  /// The properties of the rule.
+  const ActionRuleFacts& facts() const { return FactsOf(rule); }
+  int action_size() const { return facts().is_actor() ? static_cast<int>(action_limit.size()) : 1; }
 };
 
 /// Result of the checks on loading a policy.
@@ -63,7 +49,7 @@ class NetworkPolicy : public Policy {
   NetworkPolicy(NetworkPolicyParts parts, PolicyInfo info);
 
   const NetworkPolicyParts& parts() const { return parts_; }
-  bool is_actor() const { return parts_.rule != ActionRule::kLevels; }
+  bool is_actor() const { return parts_.facts().is_actor(); }
 
   std::string kind() const override { return is_actor() ? "actor" : "q-network"; }
   std::string description() const override;

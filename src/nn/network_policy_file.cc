@@ -1,7 +1,6 @@
 // Files of network policies (docs/reference/policy-format.md): the format, the parameters, and
 // sample inputs and outputs that every load recomputes.
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "base/argmax.h"
@@ -20,8 +19,6 @@ using nlohmann::json;
 
 constexpr std::string_view kFormat = "upswing-policy";
 constexpr std::string_view kFormatVersion = "1";
-constexpr std::array<std::string_view, 4> kRuleNames{"levels", "squashed-gaussian",
-                                                     "clipped-gaussian", "categorical"};
 constexpr const char* kCriticPrefix = "critic.";
 constexpr int kSamples = 16;      // number of stored samples
 constexpr int kMostSamples = 64;  // limit for files of other programs
@@ -35,21 +32,21 @@ constexpr double kTolerance = 1e-5;
 // ---- Shapes.
 
 /// The shape as metadata text.
-std::string ShapeToJson(const NetworkShape& shape, ActionRule rule) {
+std::string ShapeToJson(const NetworkShape& shape, const ActionRuleFacts& rule) {
   json j{{"inputs", shape.inputs}, {"hidden", shape.hidden}, {"layer_norm", shape.layer_norm}};
-  if (rule == ActionRule::kLevels) {
+  if (rule.is_actor()) {
+    j["activation"] = shape.activation == Activation::kTanh ? "tanh" : "relu";
+  } else {
     j["actions"] = shape.outputs;
     j["dueling"] = shape.dueling();
     j["head"] = shape.streams;
-  } else {
-    j["activation"] = shape.activation == Activation::kTanh ? "tanh" : "relu";
   }
   return j.dump();
 }
 
-/// Reads a shape from a file's metadata. For kLevels, the file gives the number of outputs;
+/// Reads a shape from a file's metadata. For Q-values, the file gives the number of outputs;
 /// otherwise `outputs` does. Throws BadInput.
-NetworkShape ShapeFromJson(const Tensors& file, const std::string& key, ActionRule rule,
+NetworkShape ShapeFromJson(const Tensors& file, const std::string& key, const ActionRuleFacts& rule,
                            int outputs) {
   constexpr int64_t kMax = NetworkShape::kMaxWidth;
   try {
@@ -62,7 +59,7 @@ NetworkShape ShapeFromJson(const Tensors& file, const std::string& key, ActionRu
       shape.hidden.push_back(JsonInteger(width).value_or(0));
     }
     shape.layer_norm = JsonBool(j, "layer_norm");
-    if (rule == ActionRule::kLevels) {
+    if (!rule.is_actor()) {
       shape.outputs = static_cast<int>(JsonInteger(j, "actions", 1, kMax));
       shape.streams = JsonInteger(j, "head", 0, kMax);
       if (JsonBool(j, "dueling") == shape.dueling()) return shape;
@@ -152,15 +149,15 @@ AlignedVector<float> ReadParameters(const Tensors& file, const std::string& pref
 struct SampleNames {
   std::string output, action;
 };
-SampleNames NamesFor(ActionRule rule) {
-  if (rule == ActionRule::kLevels) return {"sample.q", "sample.torque"};
-  return {"sample.output", "sample.action"};
+SampleNames NamesFor(const ActionRuleFacts& rule) {
+  if (rule.is_actor()) return {"sample.output", "sample.action"};
+  return {"sample.q", "sample.torque"};
 }
 
 /// The shape of the sample actions in a file.
 std::vector<int64_t> ActionShape(const NetworkPolicyParts& parts, int samples) {
-  if (parts.rule == ActionRule::kLevels) return {samples};
-  return {samples, parts.action_size()};
+  if (parts.facts().is_actor()) return {samples, parts.action_size()};
+  return {samples};
 }
 
 /// Results of a policy for n samples: outputs (n × O), actions (n × A) and, for an actor with a
@@ -221,11 +218,12 @@ bool MayChoose(std::span<const double> torques, double torque, std::span<const f
 ActionRule RuleOf(const Tensors& file) {
   file.ExpectMetadata("format", kFormat);
   file.ExpectMetadata("format_version", kFormatVersion);
-  const std::string& output = file.Metadata("output");
-  const auto name = std::ranges::find(kRuleNames, output);
-  if (name != kRuleNames.end()) return static_cast<ActionRule>(name - kRuleNames.begin());
-  throw BadInput(Concat(file.where(), ": output: expected one of ", Join(kRuleNames, ", "),
-                        ", got \"", output, "\""));
+  const std::string& name = file.Metadata("output");
+  try {
+    return ActionRuleCalled(name);
+  } catch (const Error& error) {
+    throw BadInput(Concat(file.where(), ": output: ", error.what()));
+  }
 }
 
 /// Reads the networks, torques and limits of a policy file. Throws BadInput, about a network's
@@ -233,24 +231,25 @@ ActionRule RuleOf(const Tensors& file) {
 NetworkPolicyParts ReadParts(const Tensors& file) {
   NetworkPolicyParts parts;
   parts.rule = RuleOf(file);
+  const ActionRuleFacts& rule = parts.facts();
   int outputs = 0;
-  if (parts.rule != ActionRule::kLevels) {
+  if (rule.is_actor()) {
     parts.action_limit = ReadVector(file, "action_limit");
     if (!std::ranges::all_of(parts.action_limit, [](double limit) { return limit > 0; })) {
       throw BadInput(Concat(file.where(), ": tensor \"action_limit\": expected numbers above 0"));
     }
-    if (parts.rule == ActionRule::kCategorical) parts.torques = ReadVector(file, "torques");
+    if (rule.chooses_torque()) parts.torques = ReadVector(file, "torques");
     outputs = static_cast<int>(parts.torques.empty() ? 2 * parts.action_limit.size()
                                                      : parts.torques.size());
   }
-  parts.shape = ShapeFromJson(file, "network", parts.rule, outputs);
-  if (parts.rule == ActionRule::kLevels) {
+  parts.shape = ShapeFromJson(file, "network", rule, outputs);
+  if (!rule.is_actor()) {
     parts.torques = ReadFinite<double>(file, "torques", {parts.shape.outputs});
   }
   const Network network(parts.shape);
   ExpectParameters(file, "", network);
-  if (parts.rule != ActionRule::kLevels && file.metadata.contains("critic")) {
-    parts.critic = ShapeFromJson(file, "critic", parts.rule, 1);
+  if (rule.is_actor() && file.metadata.contains("critic")) {
+    parts.critic = ShapeFromJson(file, "critic", rule, 1);
     const Network critic(parts.critic);
     ExpectParameters(file, kCriticPrefix, critic);
     parts.critic_parameters = ReadParameters(file, kCriticPrefix, critic);
@@ -260,10 +259,6 @@ NetworkPolicyParts ReadParts(const Tensors& file) {
 }
 
 }  // namespace
-
-std::string NameOf(ActionRule rule) {
-  return std::string(kRuleNames.at(static_cast<size_t>(rule)));
-}
 
 Tensors NetworkPolicy::ToTensors() const {
   Rng rng(0, "policy self-check");
@@ -275,17 +270,17 @@ Tensors NetworkPolicy::ToTensors() const {
   file.metadata = PolicyMetadata(info_);
   file.metadata["format"] = kFormat;
   file.metadata["format_version"] = kFormatVersion;
-  file.metadata["output"] = NameOf(parts_.rule);
-  file.metadata["network"] = ShapeToJson(parts_.shape, parts_.rule);
+  file.metadata["output"] = std::string(parts_.facts().name);
+  file.metadata["network"] = ShapeToJson(parts_.shape, parts_.facts());
   AddParameters(file, "", network_, parts_.parameters);
   if (is_actor()) file.AddCopy<double>("action_limit", parts_.action_limit);
   if (!parts_.torques.empty()) file.AddCopy<double>("torques", parts_.torques);
-  const auto [output_name, action_name] = NamesFor(parts_.rule);
+  const auto [output_name, action_name] = NamesFor(parts_.facts());
   file.AddCopy<float>("sample.obs", obs, {kSamples, obs_size()});
   file.AddCopy<float>(output_name, results.outputs, {kSamples, num_outputs()});
   file.AddCopy<double>(action_name, results.actions, ActionShape(parts_, kSamples));
   if (!critic_) return file;
-  file.metadata["critic"] = ShapeToJson(parts_.critic, parts_.rule);
+  file.metadata["critic"] = ShapeToJson(parts_.critic, parts_.facts());
   AddParameters(file, kCriticPrefix, *critic_, parts_.critic_parameters);
   file.AddCopy<float>("sample.value", results.values, {kSamples, 1});
   return file;
@@ -304,7 +299,7 @@ NetworkPolicy NetworkPolicy::From(const Tensors& file) {
 }
 
 void NetworkPolicy::CheckSamples(const Tensors& file) {
-  const auto [output_name, action_name] = NamesFor(parts_.rule);
+  const auto [output_name, action_name] = NamesFor(parts_.facts());
   const int D = obs_size(), A = action_size();
   const auto numbers = static_cast<int64_t>(file.Count<double>(action_name));
   const auto samples = static_cast<int>(std::min<int64_t>(numbers / A, kMostSamples + 1));
@@ -326,7 +321,7 @@ void NetworkPolicy::CheckSamples(const Tensors& file) {
     const auto near = [&](double limit) {
       return std::abs(stored[i] - got) <= limit * std::max(self_check_.tolerance, 1e-9);
     };
-    if (parts_.chooses_torque()
+    if (parts_.facts().chooses_torque()
             ? MayChoose(parts_.torques, stored[i], row, 2 * self_check_.tolerance)
             : near(parts_.action_limit[i % A])) {
       continue;

@@ -5,7 +5,7 @@ import { Fields } from './fields';
 
 /// Description of a policy file by the core (web/wasm/api.cc).
 interface About {
-  kind: 'q' | 'squashed-gaussian' | 'clipped-gaussian' | 'categorical' | 'computed';
+  kind: Decision['kind'];
   text: string;
   inputs: number;
   columns: number; // of a decision's row
@@ -126,14 +126,13 @@ export class CoreController implements Controller {
         };
       case 'computed':
         return { kind, limit, torque, value };
-      default: {
+      case 'gaussian': {
         const { low, high, mean, log_std } = GAUSSIAN_FIELDS.object(rest);
-        const squashed = Number(kind === 'squashed-gaussian');
         const probabilities = (pieces: number) =>
           core().numbers(pieces + 2, (at) =>
-            core().exports.gaussian_probabilities(mean, log_std, squashed, at, pieces + 2),
+            core().exports.gaussian_probabilities(this.policy, mean, log_std, at, pieces + 2),
           );
-        return { kind: 'gaussian', limit, low, high, probabilities, torque, value };
+        return { kind, limit, low, high, probabilities, torque, value };
       }
     }
   }

@@ -21,9 +21,9 @@ interface Exports {
   memory_close(memory: number): void;
   policy_decide(policy: number, memory: number, observation: number, row: number): number;
   gaussian_probabilities(
+    policy: number,
     mean: number,
     logStd: number,
-    squashed: number,
     to: number,
     count: number,
   ): void;

@@ -57,7 +57,7 @@ struct Controller {
         learned(dynamic_cast<const NetworkPolicy*>(&*loaded.policy)),
         memory(loaded.policy->Start(1)) {}
 
-  bool gaussian() const { return learned != nullptr && !learned->parts().chooses_torque(); }
+  bool gaussian() const { return learned != nullptr && !learned->parts().facts().chooses_torque(); }
   /// The discrete torques (A, N·m); empty if torques are continuous.
   std::span<const double> torques() const {
     if (learned != nullptr) return learned->parts().torques;
@@ -83,9 +83,18 @@ struct Controller {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
-std::string KindOf(const Controller& c) {
+/// The kind of a controller's decisions (web/src/decision.ts).
+const char* KindOf(const Controller& c) {
   if (c.computed()) return "computed";
-  return c.learned->is_actor() ? NameOf(c.learned->parts().rule) : "q";
+  switch (c.learned->parts().facts().outputs) {
+    case OutputMeaning::kQValues:
+      return "q";
+    case OutputMeaning::kLogits:
+      return "categorical";
+    case OutputMeaning::kGaussian:
+      break;
+  }
+  return "gaussian";
 }
 
 json About(const Controller& c, const std::map<std::string, std::string>& metadata) {
@@ -240,10 +249,12 @@ int PolicyDecide(Controller* controller, Policy::Memory* episode, const float* o
   });
 }
 
-/// Probabilities of a Gaussian's actions; see nn/gaussian.h.
+/// Probabilities of the actions of a Gaussian policy; see nn/gaussian.h.
 UPSWING_EXPORT(gaussian_probabilities)
-void GaussianProbabilities(double mean, double log_std, int squashed, double* to, size_t count) {
-  ActionProbabilities(Gaussian<double>::From(mean, log_std), squashed != 0, {to, count});
+void GaussianProbabilities(const Controller* c, double mean, double log_std, double* to,
+                           size_t count) {
+  ActionProbabilities(Gaussian<double>::From(mean, log_std), *c->learned->parts().facts().bound,
+                      {to, count});
 }
 
 /// Writes the memory of `steps` steps into an observation (D). `before` is the previous
