@@ -91,6 +91,62 @@ std::vector<RunErrors> ErrorsOf(std::span<const MachineLog> logs,
   return errors;
 }
 
+/// The runs (indices of logs) of each session, by the session's name.
+using RunsOfSessions = std::map<std::string, std::vector<double>>;
+
+RunsOfSessions RunsBySession(std::span<const MachineLog> logs) {
+  RunsOfSessions sessions;
+  for (size_t i = 0; i < logs.size(); ++i) {
+    sessions[SessionOf(logs[i].name)].push_back(static_cast<double>(i));
+  }
+  return sessions;
+}
+
+/// The errors of all predictors over one horizon, driven by one kind of torques.
+struct HorizonErrors {
+  double seconds;                 // length of the windows
+  bool reported;                  // driven by reported torques
+  std::vector<RunErrors> errors;  // (number of predictors)
+
+  /// Number of windows of a run. It is the same for all predictors.
+  int WindowsOfRun(double run) const {
+    return static_cast<int>(errors.front()[static_cast<size_t>(run)].size());
+  }
+};
+
+/// The row of a session's runs; of all runs if the name is empty.
+ErrorRow RowOfRuns(const std::string& session, const Strata& strata, const HorizonErrors& horizon) {
+  ErrorRow row{session, horizon.seconds, horizon.reported, 0, 0, {}, {}};
+  for (const auto& runs : strata) {
+    row.runs += static_cast<int>(runs.size());
+    for (const double run : runs) row.windows += horizon.WindowsOfRun(run);
+  }
+  for (const RunErrors& own : horizon.errors) {
+    row.errors.push_back(
+        OverRuns(strata, [&](const auto& chosen) { return MedianOf(own, chosen); }));
+  }
+  const RunErrors &first = horizon.errors.front(), &last = horizon.errors.back();
+  row.improvement = OverRuns(strata, [&](const auto& chosen) {
+    return 1 - MedianOf(first, chosen) / MedianOf(last, chosen);
+  });
+  return row;
+}
+
+/// A row for each session with windows, then one for all runs if there are two sessions or more.
+std::vector<ErrorRow> RowsOfSessions(const RunsOfSessions& sessions, const HorizonErrors& horizon) {
+  std::vector<ErrorRow> rows;
+  Strata all;
+  for (auto [session, runs] : sessions) {
+    // Runs without windows have no error.
+    std::erase_if(runs, [&](double run) { return horizon.WindowsOfRun(run) == 0; });
+    if (runs.empty()) continue;
+    rows.push_back(RowOfRuns(session, {runs}, horizon));
+    all.push_back(runs);
+  }
+  if (all.size() > 1) rows.push_back(RowOfRuns("", all, horizon));
+  return rows;
+}
+
 /// The median errors over the length of the windows.
 Panel ErrorsPanel(std::span<const MachineLog> logs, std::span<const Predictor> predictors,
                   ThreadPool* pool) {
@@ -166,42 +222,13 @@ std::vector<double> WindowErrors(const MachineLog& log, const Twin& twin, double
 std::vector<ErrorRow> CompareErrors(std::span<const MachineLog> logs,
                                     std::span<const Predictor> predictors,
                                     std::span<const double> seconds, ThreadPool* pool) {
-  std::map<std::string, std::vector<double>> sessions;  // indices of logs
-  for (size_t i = 0; i < logs.size(); ++i) {
-    sessions[SessionOf(logs[i].name)].push_back(static_cast<double>(i));
-  }
+  const RunsOfSessions sessions = RunsBySession(logs);
   std::vector<ErrorRow> rows;
   for (const bool reported : {false, true}) {
     for (const double length : seconds) {
-      const std::vector<RunErrors> errors = ErrorsOf(logs, predictors, length, reported, pool);
-      // Runs without windows have no error.
-      const auto windows_of = [&](double run) {
-        return static_cast<int>(errors.front()[static_cast<size_t>(run)].size());
-      };
-      const auto add = [&](const std::string& session, const Strata& strata) {
-        if (strata.empty()) return;
-        ErrorRow row{session, length, reported, 0, 0, {}, {}};
-        for (const auto& runs : strata) {
-          row.runs += static_cast<int>(runs.size());
-          for (const double run : runs) row.windows += windows_of(run);
-        }
-        for (const RunErrors& own : errors) {
-          row.errors.push_back(
-              OverRuns(strata, [&](const auto& chosen) { return MedianOf(own, chosen); }));
-        }
-        row.improvement = OverRuns(strata, [&](const auto& chosen) {
-          return 1 - MedianOf(errors.front(), chosen) / MedianOf(errors.back(), chosen);
-        });
-        rows.push_back(row);
-      };
-      Strata all;
-      for (auto [session, runs] : sessions) {
-        std::erase_if(runs, [&](double run) { return windows_of(run) == 0; });
-        if (runs.empty()) continue;
-        add(session, {runs});
-        all.push_back(runs);
-      }
-      if (all.size() > 1) add("", all);
+      const HorizonErrors horizon{length, reported,
+                                  ErrorsOf(logs, predictors, length, reported, pool)};
+      std::ranges::move(RowsOfSessions(sessions, horizon), std::back_inserter(rows));
     }
   }
   return rows;
