@@ -47,44 +47,61 @@ std::string CommandOf(const LearnArguments& a, const LearnResult& r) {
                     a.config.hz);
 }
 
-int RunLearn(const LearnArguments& a) {
+/// The settings of the session. Throws BadInput for missing or wrong arguments.
+LearnConfig LearnConfigOf(const LearnArguments& a) {
   if (a.link.empty()) throw BadInput("machine learn: expected --link, got none");
   if (a.out.empty()) throw BadInput("machine learn: expected --out FOLDER, got none");
   LearnConfig config = a.config;
   config.seed = static_cast<uint64_t>(a.seed);
   config.actuated_joint = static_cast<int>(*ParseRobot(a.robot));
   config.Check();
-  const LinkAddress address = ParseLink(a.link, /*listens=*/false);
+  return config;
+}
+
+/// Opens the link to a machine, or to a twin that hangs at rest in simulated time.
+std::unique_ptr<MachineLink> OpenLink(const std::string& link, uint64_t seed) {
+  const LinkAddress address = ParseLink(link, /*listens=*/false);
   if (address.transport == LinkAddress::Transport::kTwin) {
-    g_learned =
-        std::make_unique<TwinLink>(ReadTwin(address.place, "--link"), PendulumState(), config.seed);
-  } else {
-    g_learned = std::make_unique<ChannelLink>(Channel::Connect(address));
+    return std::make_unique<TwinLink>(ReadTwin(address.place, "--link"), PendulumState(), seed);
   }
-  CheckFree(a.out);
-  NewFolder folder(a.out);
-  GuardMotors([] { g_learned->SwitchOffAtOnce(); });
-  ThreadPool pool(ResolveThreads(a.threads));
-  std::string report;
+  return std::make_unique<ChannelLink>(Channel::Connect(address));
+}
+
+/// Learns on g_learned until a signal stops it. Prints each step, and appends it to `report`. If
+/// there was no run, removes its log, so that the command can be repeated.
+LearnResult LearnAndReport(const LearnConfig& config, const std::filesystem::path& out,
+                           ThreadPool& pool, std::string& report) {
   const auto say = [&](const std::string& line) {
     fmt::print(stderr, "{}\n", Printable(line));
     report += line + "\n";
   };
-  LearnResult r;
   try {
-    r = Learn(config, *g_learned, a.out, &pool, say, [] { return StopSignal() != 0; });
-  } catch (const Error&) {  // there was no run, so that the command can be repeated
+    return Learn(config, *g_learned, out, &pool, say, [] { return StopSignal() != 0; });
+  } catch (const Error&) {
     std::error_code error;
-    std::filesystem::remove(std::filesystem::path(a.out) / "log-01.csv", error);
+    std::filesystem::remove(out / "log-01.csv", error);
     throw;
   }
-  folder.Keep();
-  const std::string used = fmt::format("{:.1f} s of motion, {:.1f} s of computing, {}", r.motion,
-                                       r.computing, Counted(r.tries, "attempt"));
-  report += r.reason.empty() ? "balanced: " : fmt::format("not balanced, {}: ", r.reason);
-  report += used + "\n";
-  if (r.tries > 0) report += CommandOf(a, r) + "\n";
-  WriteNamedFile(std::filesystem::path(a.out) / "report.txt", report);
+}
+
+/// The times and attempts that a session used.
+std::string UsedText(const LearnResult& r) {
+  return fmt::format("{:.1f} s of motion, {:.1f} s of computing, {}", r.motion, r.computing,
+                     Counted(r.tries, "attempt"));
+}
+
+/// Writes the file report.txt: `steps`, the result, and the command that runs the controller again.
+void WriteReport(const LearnArguments& a, const LearnResult& r, const std::string& steps) {
+  std::string text = steps;
+  text += r.reason.empty() ? "balanced: " : fmt::format("not balanced, {}: ", r.reason);
+  text += UsedText(r) + "\n";
+  if (r.tries > 0) text += CommandOf(a, r) + "\n";
+  WriteNamedFile(std::filesystem::path(a.out) / "report.txt", text);
+}
+
+/// Prints the result and returns the exit code. Throws Failure if the machine did not balance.
+int SayResult(const LearnArguments& a, const LearnResult& r) {
+  const std::string used = UsedText(r);
   if (StopSignal() != 0) {
     fmt::print(stderr, "stopped: {}; written {}\n", used, Printable(a.out));
     return 128 + StopSignal();
@@ -93,6 +110,20 @@ int RunLearn(const LearnArguments& a) {
   fmt::print("balanced for {:.1f} s: {}\n{}\nwritten {}\n", r.balanced, used, CommandOf(a, r),
              Printable(a.out));
   return 0;
+}
+
+int RunLearn(const LearnArguments& a) {
+  const LearnConfig config = LearnConfigOf(a);
+  g_learned = OpenLink(a.link, config.seed);
+  CheckFree(a.out);
+  NewFolder folder(a.out);
+  GuardMotors([] { g_learned->SwitchOffAtOnce(); });
+  ThreadPool pool(ResolveThreads(a.threads));
+  std::string steps;
+  const LearnResult result = LearnAndReport(config, a.out, pool, steps);
+  folder.Keep();
+  WriteReport(a, result, steps);
+  return SayResult(a, result);
 }
 
 }  // namespace
