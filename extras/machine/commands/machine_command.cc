@@ -305,44 +305,63 @@ void WarnOfTwin(const Twin& twin, std::span<const ErrorRow> rows) {
                   FormatNumber(last->seconds), last->errors[0].value, last->errors[1].value));
 }
 
-/// Fits a twin to logs: from --plant, or with a prior twin as its adaptation.
-void FitTwin(const MachineArguments& a, bool& is_faulty) {
-  const bool adapts = a.plant.empty() && !a.twin.empty();
-  const char* command = adapts ? "adapt" : "identify";
+/// Whether the command is adapt, whose first guess is a prior twin; else identify, with --plant.
+bool Adapts(const MachineArguments& a) { return a.plant.empty() && !a.twin.empty(); }
+
+void CheckFitArguments(const MachineArguments& a) {
+  const bool adapts = Adapts(a);
   if (!adapts && a.plant.empty()) {
     throw BadInput("machine identify: expected --plant FILE with masses and lengths, got none");
   }
   if (a.out.empty()) {
-    throw BadInput(fmt::format("machine {}: expected --out FILE, got none", command));
+    throw BadInput(
+        fmt::format("machine {}: expected --out FILE, got none", adapts ? "adapt" : "identify"));
   }
   if (a.folds == 1) throw BadInput("--folds: expected 0, or 2 or more, got 1");
   CheckWritable("--out", a.out);
-  const Twin first = adapts ? ReadTwin(a.twin, "machine adapt") : ReadTwin(a.plant, "--plant");
-  const std::vector<Twin> others = ReadOthers(a);
-  const std::vector<MachineLog> logs = ReadAndWarn(a, is_faulty);
+}
+
+/// Reads the twin or plant that the fit begins with.
+Twin ReadFirst(const MachineArguments& a) {
+  return Adapts(a) ? ReadTwin(a.twin, "machine adapt") : ReadTwin(a.plant, "--plant");
+}
+
+/// Fits a twin to the logs and shows the progress. The twin's name is that of --out.
+Identification FitShowingProgress(const MachineArguments& a, std::span<const MachineLog> logs,
+                                  const Twin& first, ThreadPool& pool) {
   IdentifyConfig config;
-  config.folds = adapts ? 0 : static_cast<int>(a.folds);
+  config.folds = Adapts(a) ? 0 : static_cast<int>(a.folds);
   config.one_body = a.one_body;
-  config.fit.adapts = adapts;
+  config.fit.adapts = Adapts(a);
   config.fit.windows.seconds = a.seconds;
   config.fit.windows.hop = a.seconds / 2;
+  EpisodeProgress progress(a.as_json, "fits");
+  Identification found = Identify(logs, first, config, &pool, std::ref(progress));
+  found.fit.twin.name = std::filesystem::path(a.out).stem().string();
+  return found;
+}
+
+/// The predictor of a fit. After a cross-validation it predicts runs that its twins have not seen.
+Predictor PredictorOfFit(const Identification& found, std::span<const MachineLog> logs) {
+  if (found.left_out.empty()) return PredictorOf("same runs", found.fit.twin, logs);
+  return {"left-out runs", found.left_out};
+}
+
+/// Fits a twin to logs, writes it, and compares its predictions with those of the first guess.
+void FitTwin(const MachineArguments& a, bool& is_faulty) {
+  CheckFitArguments(a);
+  const Twin first = ReadFirst(a);
+  const std::vector<Twin> others = ReadOthers(a);
+  const std::vector<MachineLog> logs = ReadAndWarn(a, is_faulty);
   ThreadPool pool(ResolveThreads(a.threads));
-  Identification found;
-  {
-    EpisodeProgress progress(a.as_json, "fits");
-    found = Identify(logs, first, config, &pool, std::ref(progress));
-  }
-  Twin& twin = found.fit.twin;
-  twin.name = std::filesystem::path(a.out).stem().string();
-  WriteNamedFile(a.out, TwinText(twin));
-  // Errors on runs that a twin has not seen, if there was a cross-validation.
-  std::vector<Predictor> predictors{found.left_out.empty()
-                                        ? PredictorOf("same runs", twin, logs)
-                                        : Predictor{"left-out runs", found.left_out}};
-  predictors.push_back(PredictorOf(first.name, first, logs));
+  const Identification found = FitShowingProgress(a, logs, first, pool);
+  WriteNamedFile(a.out, TwinText(found.fit.twin));
+
+  std::vector<Predictor> predictors{PredictorOfFit(found, logs),
+                                    PredictorOf(first.name, first, logs)};
   AddOthers(others, a, logs, predictors);
   const auto rows = CompareErrors(logs, predictors, kHorizons, &pool);
-  WarnOfTwin(twin, rows);
+  WarnOfTwin(found.fit.twin, rows);
   if (is_faulty) {
     SayError(Concat(Printable(a.out), ": not to be trusted, because its logs have faults"));
   }
