@@ -68,7 +68,7 @@ Joints ControlLoop::ControllerTorque() {
   return torque;
 }
 
-bool ControlLoop::Cycle() {
+ControlLoop::CycleStart ControlLoop::WaitForDeadline() {
   const double deadline = static_cast<double>(cycle_) * period_;
   link_.WaitUntil(deadline);
   const double now = link_.Now(), late = now - deadline;
@@ -78,40 +78,59 @@ bool ControlLoop::Cycle() {
   const auto missed = static_cast<int64_t>(std::max(0.0, late / period_));
   summary_.missed += missed;
   cycle_ += missed;
+  return {.deadline = deadline, .now = now, .late = late};
+}
 
-  // After a pause of this process the torques of the cycle before are too old to be sent.
+void ControlLoop::DropOldTorque(double now) {
   if (enabled_ && !supervisor_.CheckAge(now - last_reading_ - period_)) {
     torque_ = {};
     enabled_ = false;
   }
-  // A late cycle waits for its answer, too.
-  const double until = std::max(deadline, now - period_ / 4) + kAnswerShare * period_;
-  const auto reading = link_.Exchange(torque_, enabled_, until);
-  estimator_.Update(now, torque_, reading ? &*reading : nullptr);
-  const CycleFacts facts = FactsOf(now, reading);
-  const LoopState state = supervisor_.Step(facts);
+}
 
+std::optional<LinkReading> ControlLoop::Exchange(const CycleStart& start) {
+  // A late cycle waits for its answer, too.
+  const double until = std::max(start.deadline, start.now - period_ / 4) + kAnswerShare * period_;
+  return link_.Exchange(torque_, enabled_, until);
+}
+
+Joints ControlLoop::RunController(const CycleFacts& facts) {
+  if (running_cycle_ == 0) running_cycle_ = cycle_;
+  summary_.driven = static_cast<double>(cycle_ - running_cycle_) * period_;
+  if (!Inverted(facts.state)) upright_since_ = -1;
+  if (Inverted(facts.state) && upright_since_ < 0) upright_since_ = facts.time;
+  summary_.upright = upright_since_ < 0 ? 0 : facts.time - upright_since_;
+  const Stopwatch watch;
+  const Joints wanted = ControllerTorque();
+  summary_.longest_act = std::max(summary_.longest_act, watch.seconds());
+  return wanted;
+}
+
+void ControlLoop::LogReading(const LinkReading& reading, const PendulumState& state, double late) {
+  const LoopRow row{.time = reading.time,
+                    .angle = reading.angle,
+                    .velocity = {state.w1, state.w2},
+                    .torque = torque_,
+                    .measured = reading.torque,
+                    .state = static_cast<int>(supervisor_.state()),
+                    .late = late};
+  log_.Add(row, link_.simulated());
+}
+
+bool ControlLoop::Cycle() {
+  const CycleStart start = WaitForDeadline();
+  DropOldTorque(start.now);
+  const std::optional<LinkReading> reading = Exchange(start);
+  estimator_.Update(start.now, torque_, reading ? &*reading : nullptr);
+  const CycleFacts facts = FactsOf(start.now, reading);
+  const LoopState state = supervisor_.Step(facts);
   Joints wanted{};
-  if (state == LoopState::kRunning) {
-    if (running_cycle_ == 0) running_cycle_ = cycle_;
-    summary_.driven = static_cast<double>(cycle_ - running_cycle_) * period_;
-    if (!Inverted(facts.state)) upright_since_ = -1;
-    if (Inverted(facts.state) && upright_since_ < 0) upright_since_ = now;
-    summary_.upright = upright_since_ < 0 ? 0 : now - upright_since_;
-    const Stopwatch watch;
-    wanted = ControllerTorque();
-    summary_.longest_act = std::max(summary_.longest_act, watch.seconds());
-  }
+  if (state == LoopState::kRunning) wanted = RunController(facts);
   torque_ = supervisor_.Torque(wanted, facts);
   const LoopState after = supervisor_.state();
   enabled_ = state != LoopState::kIdle && after != LoopState::kFault;
   if (MayDrive(after)) ++summary_.moving;
-  if (reading) {
-    const LoopRow row{reading->time, reading->angle,  {facts.state.w1, facts.state.w2},
-                      torque_,       reading->torque, static_cast<int>(after),
-                      late};
-    log_.Add(row, link_.simulated());
-  }
+  if (reading) LogReading(*reading, facts.state, start.late);
   ++cycle_;
   return !supervisor_.ended();
 }

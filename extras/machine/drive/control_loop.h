@@ -63,8 +63,24 @@ class ControlLoop {
   const LoopSummary& summary() const { return summary_; }
 
  private:
+  /// The times of a cycle by the link's clock.
+  struct CycleStart {
+    double deadline;  // s
+    double now;       // begin, s
+    double late;      // begin after the deadline, s
+  };
+  /// Waits for the deadline and counts the missed cycles.
+  CycleStart WaitForDeadline();
+  /// After a pause of this process, the torques of the cycle before are too old to be sent. Then
+  /// drops them and switches the motors off.
+  void DropOldTorque(double now);
+  /// Sends the torques of the cycle before, and gets the reading that answers them.
+  std::optional<LinkReading> Exchange(const CycleStart& start);
   CycleFacts FactsOf(double now, const std::optional<LinkReading>& reading);
+  /// Measures the controller's time and success, and returns its torques (N·m).
+  Joints RunController(const CycleFacts& facts);
   Joints ControllerTorque();
+  void LogReading(const LinkReading& reading, const PendulumState& state, double late);
 
   LoopConfig config_;
   MachineLink& link_;
