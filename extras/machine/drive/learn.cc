@@ -111,7 +111,20 @@ PolicyArguments ArgumentsOf(const Candidate& candidate, const Plant& plant) {
   return arguments;
 }
 
-double ProcessorSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+/// Adds the processor time (s) of its lifetime to a total, also if an exception ends it.
+class ProcessorTimer {
+ public:
+  explicit ProcessorTimer(double& total) : total_(total) {}
+  ~ProcessorTimer() { total_ += Seconds() - begin_; }
+  ProcessorTimer(const ProcessorTimer&) = delete;
+  ProcessorTimer& operator=(const ProcessorTimer&) = delete;
+
+ private:
+  static double Seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+  double& total_;
+  double begin_ = Seconds();
+};
 
 /// A session of learning.
 class LearningSession {
@@ -174,16 +187,15 @@ class LearningSession {
         range, c_.limits.torque)};
   }
 
-  /// Runs work that computes, and counts its processor time.
+  /// Runs work that computes, and counts its processor time. An error of it ends the session.
   template <typename Work>
   void Compute(const Work& work) {
-    const double begin = ProcessorSeconds();
+    const ProcessorTimer timer(result_.computing);
     try {
       work();
     } catch (const Error& error) {
       throw Ended{error.what()};
     }
-    result_.computing += ProcessorSeconds() - begin;
   }
 
   /// Moves the links with growing torques. `has_twin`: whether the twin can estimate the state and

@@ -177,6 +177,20 @@ TEST(Learn, NoticesAWrongSignOfTheMotors) {
   EXPECT_EQ(result.tries, 0);
 }
 
+TEST(Learn, CountsTheComputingOfAFitThatFails) {
+  const TempFolder folder;
+  WatchedLink link(StrangeTwin());
+  const LearnConfig config = ConfigFor(2);
+  const auto fail_after_the_fit = [](const std::string& line) {
+    if (line.starts_with("  error")) throw Failure("no twin");
+  };
+  const LearnResult result =
+      Learn(config, link, folder.path(), nullptr, fail_after_the_fit, [] { return false; });
+  EXPECT_EQ(result.reason, "no twin");
+  EXPECT_EQ(result.tries, 0);
+  EXPECT_GT(result.computing, 0);
+}
+
 TEST(Learn, StopsWhenAsked) {
   const TempFolder folder;
   WatchedLink link(StrangeTwin());
