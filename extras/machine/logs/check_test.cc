@@ -40,6 +40,14 @@ MachineLog GoodLog() {
 /// The findings about a log.
 Findings Check(const MachineLog& log) { return CheckLog("log.csv", std::span(&log, 1)).findings; }
 
+/// A number of a finding by its name; -1 if it has none.
+double NumberOf(const Finding& finding, const std::string& name) {
+  for (const auto& [key, value] : finding.numbers) {
+    if (key == name) return value;
+  }
+  return -1;
+}
+
 /// Checks a good log after a change. Expects a single fault or warning, with this text, and returns
 /// it.
 Finding OnlyFinding(const std::function<void(MachineLog&)>& change, const std::string& text,
@@ -74,16 +82,10 @@ TEST(MachineCheck, AGoodLogHasOnlyNotes) {
   for (const Finding& f : found) EXPECT_EQ(f.severity, Severity::kNote) << f.text;
   ASSERT_EQ(found.size(), 5U);  // the clock, two velocities, two torques
   EXPECT_EQ(found[0].text, "500 Hz, cycles of 2 ms (usual), 2 ms (99%), 2 ms (longest)");
-  const auto number = [&](size_t i, const std::string& name) {
-    for (const auto& [key, value] : found[i].numbers) {
-      if (key == name) return value;
-    }
-    return -1.0;
-  };
-  EXPECT_EQ(number(3, "delay_rows"), 2);
-  EXPECT_EQ(number(3, "lag"), 0);
-  EXPECT_NEAR(number(3, "gain"), 0.95, 0.001);
-  EXPECT_NEAR(number(4, "correlation"), 1, 0.001);
+  EXPECT_EQ(NumberOf(found[3], "delay_rows"), 2);
+  EXPECT_EQ(NumberOf(found[3], "lag"), 0);
+  EXPECT_NEAR(NumberOf(found[3], "gain"), 0.95, 0.001);
+  EXPECT_NEAR(NumberOf(found[4], "correlation"), 1, 0.001);
 }
 
 TEST(MachineCheck, DelayLagAndGainOfTheTorque) {
@@ -192,6 +194,11 @@ TEST(MachineCheck, SwappedColumns) {
     ASSERT_EQ(found.size(), 2U);
     for (const Finding& f : found) {
       EXPECT_NE(f.text.find("suspect swapped columns"), std::string::npos) << f.text;
+      if (values != &MachineLog::measured) continue;
+      // The numbers are of the response to the other joint's command.
+      EXPECT_EQ(NumberOf(f, "delay_rows"), 2);
+      EXPECT_NEAR(NumberOf(f, "gain"), 0.95, 0.001);
+      EXPECT_NEAR(NumberOf(f, "correlation"), 1, 0.001);
     }
   }
 }
@@ -226,6 +233,9 @@ TEST(MachineCheck, AmperesCommandsWithinOneAndSwappedTorques) {
   ASSERT_EQ(found.size(), 2U);
   for (const Finding& f : found) {
     EXPECT_EQ(f.text, "commanded follows measured after 2 rows: suspect swapped columns");
+    EXPECT_EQ(NumberOf(f, "delay_rows"), 2);
+    EXPECT_NEAR(NumberOf(f, "gain"), 0.95, 0.001);
+    EXPECT_NEAR(NumberOf(f, "correlation"), 1, 0.001);
   }
 }
 

@@ -171,8 +171,8 @@ bool LacksResponse(Pieces pieces, int joint, const Response& best, const Reporte
   return true;
 }
 
-/// Reports columns that are swapped between the joints, or between commands and measurements.
-/// Returns whether they are.
+/// Reports columns that are swapped between the joints, or between commands and measurements. The
+/// numbers are of the response with the columns swapped back. Returns whether they are swapped.
 bool ReportsSwappedTorques(Pieces pieces, int joint, const Response& best, const Reporter& report) {
   const double r = best.pairs.correlation();
   if (r < kClear) {
@@ -183,7 +183,7 @@ bool ReportsSwappedTorques(Pieces pieces, int joint, const Response& best, const
                      fmt::format("measured torque follows the command of joint {}: suspect swapped "
                                  "columns",
                                  number),
-                     best);
+                     other);
       return true;
     }
   }
@@ -196,7 +196,7 @@ bool ReportsSwappedTorques(Pieces pieces, int joint, const Response& best, const
     ReportResponse(report, Severity::kFault,
                    fmt::format("commanded follows measured after {}: suspect swapped columns",
                                Counted(back.rows, "row")),
-                   best);
+                   back);
   }
   return is_swapped;
 }
