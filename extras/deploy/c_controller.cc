@@ -235,6 +235,34 @@ const CController& CControllerCalled(const std::string& name) {
                         " or a learned policy for C, got ", what));
 }
 
+/// Adds what the header says of a controller: its file, origin, limits and plant.
+void DescribeController(const LoadedPolicy& loaded, const Plant& plant, const char* file,
+                        CParts& parts) {
+  parts.task = PendulumTask(plant.actuated_joint, 0);
+  parts.task.file = file;
+  parts.origin =
+      Concat("It is ", CommentText(loaded.name), ": ", CommentText(loaded.policy->description()));
+  parts.limit = plant.torque_limit;
+  parts.period = kControlPeriod;
+  parts.plant_use = "of which it knows all";
+  parts.plant = plant;
+}
+
+/// Adds the samples of the self-test and their tolerance. `simulates`: whether the controller looks
+/// ahead, so that the samples include a step of its simulation.
+void AddSelfTest(const LoadedPolicy& loaded, const Plant& plant, bool simulates, CParts& parts) {
+  const double tolerance = kTorqueShare * plant.torque_limit;
+  std::vector<float> states, torques;
+  DrawSamples(loaded, tolerance, states, torques);
+  parts.samples = {{"sample_states", "q1, q2, w1, w2", states}, {"sample_torques", "N m", torques}};
+  if (simulates) {
+    parts.samples.push_back(
+        {"sample_steps", "deviations a control period later", StepsFrom(states, torques, plant)});
+  }
+  parts.macros.emplace_back("SAMPLES", Concat(kLawSamples));
+  parts.macros.emplace_back("TORQUE_TOLERANCE", CLiteral(static_cast<float>(tolerance)));
+}
+
 }  // namespace
 
 std::vector<std::string> ControllersInC() { return NamesOf(kControllersInC); }
@@ -242,33 +270,15 @@ std::vector<std::string> ControllersInC() { return NamesOf(kControllersInC); }
 CHeader ControllerHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
   const CController& controller = CControllerCalled(loaded.policy->kind());
   const ControllerConfig config = ConfigOf(loaded);
-  const double limit = config.plant.torque_limit;
-  const double tolerance = kTorqueShare * limit;
+  CParts parts;
+  DescribeController(loaded, config.plant, controller.file, parts);
+  controller.add(loaded, config, parts);
+  AddSelfTest(loaded, config.plant, controller.simulates, parts);
   CHeader header;
   header.prefix = prefix;
   header.state_bytes = controller.state_bytes;
   // The deviation; a simulating controller also copies it, and needs five arrays for a step.
   header.stack_bytes = 4 * sizeof(float) * (controller.simulates ? 7 : 1);
-  CParts parts;
-  parts.task = PendulumTask(config.plant.actuated_joint, 0);
-  parts.task.file = controller.file;
-  parts.origin =
-      Concat("It is ", CommentText(loaded.name), ": ", CommentText(loaded.policy->description()));
-  parts.limit = limit;
-  parts.period = kControlPeriod;
-  parts.plant_use = "of which it knows all";
-  parts.plant = config.plant;
-  controller.add(loaded, config, parts);
-
-  std::vector<float> states, torques;
-  DrawSamples(loaded, tolerance, states, torques);
-  parts.samples = {{"sample_states", "q1, q2, w1, w2", states}, {"sample_torques", "N m", torques}};
-  if (controller.simulates) {
-    parts.samples.push_back({"sample_steps", "deviations a control period later",
-                             StepsFrom(states, torques, config.plant)});
-  }
-  parts.macros.emplace_back("SAMPLES", Concat(kLawSamples));
-  parts.macros.emplace_back("TORQUE_TOLERANCE", CLiteral(static_cast<float>(tolerance)));
   WriteHeader(parts, header);
   return header;
 }

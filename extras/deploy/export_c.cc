@@ -122,6 +122,111 @@ void AddLayers(const std::vector<LayerView>& layers, const std::string& prefix, 
       prefix, "_layers[", layers.size(), "] = {\n", rows, "};\n");
 }
 
+/// The sizes of a network and the work of a call.
+struct NetworkSizes {
+  size_t layers = 0;         // number of layers
+  size_t multiply_adds = 0;  // of a call
+  int widest = 0;            // outputs of the widest layer
+  int outputs = 0;           // of the last layer
+  int tanhs = 0;             // calls of tanh, with that of a squashed action
+};
+
+NetworkSizes SizesOf(const ExportedPolicy& policy, const std::vector<LayerView>& layers) {
+  NetworkSizes sizes;
+  sizes.layers = layers.size();
+  sizes.outputs = layers.back().out();
+  if (policy.rule().bound == &kSquash) ++sizes.tanhs;
+  for (const LayerView& layer : layers) {
+    sizes.multiply_adds += layer.W.size();
+    sizes.widest = std::max(sizes.widest, layer.out());
+    if (layer.activation == Activation::kTanh) sizes.tanhs += layer.out();
+  }
+  return sizes;
+}
+
+/// The header before WriteHeader: its prefix, and the sizes in RAM.
+CHeader EmptyHeader(const ExportedPolicy& policy, const NetworkSizes& sizes,
+                    const std::string& prefix) {
+  constexpr size_t kFloat = 4;  // bytes
+  const int memory = policy.loaded->memory();
+  CHeader header;
+  header.prefix = prefix;
+  header.state_bytes = kFloat;  // the last torque
+  if (memory > 0) header.state_bytes += kFloat * static_cast<size_t>(3 + kMemorySize * memory);
+  header.stack_bytes =
+      kFloat * static_cast<size_t>(policy.obs_size() + sizes.outputs + 2 * sizes.widest);
+  header.multiply_adds = sizes.multiply_adds;
+  return header;
+}
+
+/// The work of a call, as text that ends a sentence.
+std::string WorkOf(const ExportedPolicy& policy, const NetworkSizes& sizes) {
+  std::string work = Concat(sizes.multiply_adds, " multiply-adds");
+  if (!policy.is_foreign()) {
+    work += Concat(", ", policy.task.state.size(), " sines and cosines");
+  }
+  if (sizes.tanhs > 0) work += Concat(", ", sizes.tanhs, " of tanh");
+  return work + '.';
+}
+
+/// Adds what the header says of the policy: its task, origin, limits and work.
+void AddDescription(const ExportedPolicy& policy, const NetworkSizes& sizes, CParts& parts) {
+  const Policy& learned = *policy.loaded->policy;
+  parts.task = policy.task;
+  parts.origin = Concat("It is the ", CommentText(Replaced(learned.description(), "→", "-")), "; ",
+                        OriginOf(learned.info()));
+  parts.limit = policy.limit;
+  parts.period = *learned.info().control_period;
+  parts.work = WorkOf(policy, sizes);
+}
+
+/// Adds the tables with which extras/deploy/c/network.c computes.
+void AddTables(const ExportedPolicy& policy, const std::vector<LayerView>& layers,
+               const std::string& prefix, CParts& parts) {
+  if (!policy.is_foreign()) AddPlant(policy.loaded->plant, parts);
+  if (policy.is_discrete()) {
+    parts.constants.push_back(
+        {"torques", policy.is_foreign() ? "" : "N m", Floats(policy.torques())});
+  }
+  AddLayers(layers, prefix, parts);
+}
+
+/// A comment that lists the components of the observation.
+std::string ObservationComment(const ExportedPolicy& policy) {
+  std::string text = "/* of the observation:\n";
+  int index = 0;
+  for (const auto& [name, meaning] : policy.task.observation) {
+    text += Concat("     ", index++, ": ", name, ": ", meaning, '\n');
+  }
+  return text + "*/";
+}
+
+/// The rule by which extras/deploy/c/network.c turns outputs into a torque.
+const char* RuleLiteral(const ExportedPolicy& policy) {
+  if (policy.is_discrete()) return "'l' /* the largest output's torque */";
+  if (policy.rule().bound == &kSquash) return "'s' /* the mean, squashed */";
+  return "'c' /* the mean, clipped */";
+}
+
+void AddMacros(const ExportedPolicy& policy, const NetworkSizes& sizes, const CSamples& samples,
+               CParts& parts) {
+  parts.macros = {{"OBSERVATION_SIZE", Concat(policy.obs_size(), ' ', ObservationComment(policy))},
+                  {"OUTPUT_SIZE", Concat(sizes.outputs, " /* of the network */")},
+                  {"MULTIPLY_ADDS", Concat(sizes.multiply_adds, "L /* of a call */")},
+                  {"LAYERS", Concat(sizes.layers)},
+                  {"WIDEST_LAYER", Concat(sizes.widest)},
+                  {"RULE", RuleLiteral(policy)},
+                  {"STATE_SIZE", Concat(policy.state_size())},
+                  {"SAMPLES", Concat(samples.torques.size())},
+                  {"OUTPUT_TOLERANCE", CLiteral(samples.output_tolerance)},
+                  {"TORQUE_TOLERANCE", CLiteral(samples.torque_tolerance)}};
+  const int memory = policy.loaded->memory();
+  if (memory > 0) {
+    parts.macros.emplace_back("MEMORY_SIZE",
+                              Concat(kMemorySize * memory, " /* for ", memory, " past steps */"));
+  }
+}
+
 CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
   const ExportedPolicy policy = ViewForExport(loaded);
   if (policy.action_size() != 1) {
@@ -130,67 +235,15 @@ CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
   }
   const std::vector<LayerView> layers = LayersOf(policy);
   const CSamples samples = DrawSamples(policy, layers);
-  const int outputs = layers.back().out();
-  const int memory = loaded.memory();
-  const bool squashed = policy.rule().bound == &kSquash;
-  CHeader header;
-  header.prefix = prefix;
+  const NetworkSizes sizes = SizesOf(policy, layers);
   CParts parts;
-  parts.task = policy.task;
-  if (!policy.is_foreign()) AddPlant(loaded.plant, parts);
-  if (policy.is_discrete()) {
-    parts.constants.push_back(
-        {"torques", policy.is_foreign() ? "" : "N m", Floats(policy.torques())});
-  }
-  AddLayers(layers, prefix, parts);
-
-  constexpr size_t kFloat = 4;
-  header.state_bytes = kFloat;  // the last torque
-  if (memory > 0) header.state_bytes += kFloat * static_cast<size_t>(3 + kMemorySize * memory);
-  int widest = 0;
-  int tanhs = squashed ? 1 : 0;
-  for (const LayerView& layer : layers) {
-    header.multiply_adds += layer.W.size();
-    widest = std::max(widest, layer.out());
-    if (layer.activation == Activation::kTanh) tanhs += layer.out();
-  }
-  header.stack_bytes = kFloat * static_cast<size_t>(policy.obs_size() + outputs + 2 * widest);
-
-  parts.origin = Concat("It is the ", CommentText(Replaced(loaded.policy->description(), "→", "-")),
-                        "; ", OriginOf(loaded.policy->info()));
-  parts.limit = policy.limit;
-  parts.period = *loaded.policy->info().control_period;
-  parts.work = Concat(header.multiply_adds, " multiply-adds");
-  if (!policy.is_foreign()) {
-    parts.work += Concat(", ", parts.task.state.size(), " sines and cosines");
-  }
-  if (tanhs > 0) parts.work += Concat(", ", tanhs, " of tanh");
-  parts.work += '.';
-  std::string observation = "/* of the observation:\n";
-  int index = 0;
-  for (const auto& [name, meaning] : policy.task.observation) {
-    observation += Concat("     ", index++, ": ", name, ": ", meaning, '\n');
-  }
-  const char* rule = "'c' /* the mean, clipped */";
-  if (squashed) rule = "'s' /* the mean, squashed */";
-  if (policy.is_discrete()) rule = "'l' /* the largest output's torque */";
-  parts.macros = {{"OBSERVATION_SIZE", Concat(policy.obs_size(), ' ', observation, "*/")},
-                  {"OUTPUT_SIZE", Concat(outputs, " /* of the network */")},
-                  {"MULTIPLY_ADDS", Concat(header.multiply_adds, "L /* of a call */")},
-                  {"LAYERS", Concat(layers.size())},
-                  {"WIDEST_LAYER", Concat(widest)},
-                  {"RULE", rule},
-                  {"STATE_SIZE", Concat(policy.state_size())},
-                  {"SAMPLES", Concat(samples.torques.size())},
-                  {"OUTPUT_TOLERANCE", CLiteral(samples.output_tolerance)},
-                  {"TORQUE_TOLERANCE", CLiteral(samples.torque_tolerance)}};
-  if (memory > 0) {
-    parts.macros.emplace_back("MEMORY_SIZE",
-                              Concat(kMemorySize * memory, " /* for ", memory, " past steps */"));
-  }
+  AddDescription(policy, sizes, parts);
+  AddTables(policy, layers, prefix, parts);
+  AddMacros(policy, sizes, samples, parts);
   parts.samples = {{"sample_states", "", samples.states},
                    {"sample_outputs", "", samples.outputs},
                    {"sample_torques", policy.is_foreign() ? "" : "N m", samples.torques}};
+  CHeader header = EmptyHeader(policy, sizes, prefix);
   WriteHeader(parts, header);
   return header;
 }
