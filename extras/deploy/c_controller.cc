@@ -26,7 +26,7 @@ constexpr const char* kOnlyNearUpright = "; away from upright none of the simula
 /// The settings that the controller was made with.
 ControllerConfig ConfigOf(const LoadedPolicy& loaded) {
   ControllerConfig config;
-  config.plant = loaded.plant;
+  config.plant = {loaded.plant, loaded.control_period()};
   ApplyToml(OptionsOf(config), loaded.policy->info().config, loaded.name);
   return config;
 }
@@ -42,7 +42,7 @@ std::vector<double> Triangle(const Eigen::Matrix4d& P) {
 
 /// The first torque of an episode that begins in a state.
 double TorqueAt(const LoadedPolicy& loaded, const StateVector& x) {
-  const auto seen = Observe(loaded.plant, {x[0], x[1], x[2], x[3]});
+  const auto seen = Observe(loaded.plant, {x[0], x[1], x[2], x[3]}, loaded.scale);
   const std::vector<float> obs(seen.begin(), seen.end());
   double torque = 0;
   loaded.policy->Act({obs.data(), 1, static_cast<int>(obs.size())}, {&torque, 1, 1},
@@ -235,15 +235,15 @@ const CController& CControllerCalled(const std::string& name) {
                         " or a learned policy for C, got ", what));
 }
 
-/// Adds what the header says of a controller: its file, origin, limits and plant.
+/// Adds the description of a controller to the header: its file, origin, limits and plant.
 void DescribeController(const LoadedPolicy& loaded, const Plant& plant, const char* file,
                         CParts& parts) {
-  parts.task = PendulumTask(plant.actuated_joint, 0);
+  parts.task = PendulumTask(plant.actuated_joint, loaded.scale, 0);
   parts.task.file = file;
   parts.origin =
       Concat("It is ", CommentText(loaded.name), ": ", CommentText(loaded.policy->description()));
   parts.limit = plant.torque_limit;
-  parts.period = kControlPeriod;
+  parts.period = loaded.control_period();
   parts.plant_use = "of which it knows all";
   parts.plant = plant;
 }

@@ -83,11 +83,10 @@ std::vector<float> EnergyConstants(const Plant& plant) {
                            plant.length2 / length});
 }
 
-/// Adds the macros that the double pendulum's header needs.
-void AddPlant(const Plant& plant, CParts& parts) {
-  // extras/deploy/c/pendulum.c uses the same limits.
-  static_assert(kMaxVelocity1 == 10 && kMaxVelocity2 == 20);
-  static_assert(kMemoryVelocity == 1 && kMemoryTorque == 5 && kMemorySize == 3);
+/// Adds the constants and macros that the double pendulum's header needs.
+void AddPlant(const LoadedPolicy& loaded, CParts& parts) {
+  static_assert(kMemorySize == 3);  // extras/deploy/c/pendulum.c has the same
+  const Plant& plant = loaded.plant;
   parts.plant_use = "by which it computes energy and height";
   parts.plant = plant;
   parts.constants = {{"energy", "of the observed energy and height", EnergyConstants(plant)}};
@@ -169,7 +168,7 @@ std::string WorkOf(const ExportedPolicy& policy, const NetworkSizes& sizes) {
   return work + '.';
 }
 
-/// Adds what the header says of the policy: its task, origin, limits and work.
+/// Adds the description of the policy to the header: its task, origin, limits and work.
 void AddDescription(const ExportedPolicy& policy, const NetworkSizes& sizes, CParts& parts) {
   const Policy& learned = *policy.loaded->policy;
   parts.task = policy.task;
@@ -183,7 +182,7 @@ void AddDescription(const ExportedPolicy& policy, const NetworkSizes& sizes, CPa
 /// Adds the tables with which extras/deploy/c/network.c computes.
 void AddTables(const ExportedPolicy& policy, const std::vector<LayerView>& layers,
                const std::string& prefix, CParts& parts) {
-  if (!policy.is_foreign()) AddPlant(policy.loaded->plant, parts);
+  if (!policy.is_foreign()) AddPlant(*policy.loaded, parts);
   if (policy.is_discrete()) {
     parts.constants.push_back(
         {"torques", policy.is_foreign() ? "" : "N m", Floats(policy.torques())});
@@ -208,6 +207,22 @@ const char* RuleLiteral(const ExportedPolicy& policy) {
   return "'c' /* the mean, clipped */";
 }
 
+/// Adds the divisors of the double pendulum's observation, and the size of its memory.
+void AddObservationScales(const LoadedPolicy& loaded, CParts& parts) {
+  const ObservationInfo& observation = *loaded.policy->info().observation;
+  const auto add = [&](const char* name, double scale, const char* comment) {
+    parts.macros.emplace_back(name, CLiteral(static_cast<float>(scale)) + comment);
+  };
+  add("MAX_VELOCITY1", observation.max_velocity[0], " /* rad/s, divides w1 */");
+  add("MAX_VELOCITY2", observation.max_velocity[1], " /* rad/s, divides w2 */");
+  if (!observation.memory) return;
+  const int memory = loaded.memory();
+  add("MEMORY_VELOCITY", observation.memory->velocity, " /* rad/s, divides changes */");
+  add("MEMORY_TORQUE", observation.memory->torque, " /* N m, divides torques */");
+  parts.macros.emplace_back("MEMORY_SIZE",
+                            Concat(kMemorySize * memory, " /* for ", memory, " past steps */"));
+}
+
 void AddMacros(const ExportedPolicy& policy, const NetworkSizes& sizes, const CSamples& samples,
                CParts& parts) {
   parts.macros = {{"OBSERVATION_SIZE", Concat(policy.obs_size(), ' ', ObservationComment(policy))},
@@ -220,11 +235,7 @@ void AddMacros(const ExportedPolicy& policy, const NetworkSizes& sizes, const CS
                   {"SAMPLES", Concat(samples.torques.size())},
                   {"OUTPUT_TOLERANCE", CLiteral(samples.output_tolerance)},
                   {"TORQUE_TOLERANCE", CLiteral(samples.torque_tolerance)}};
-  const int memory = policy.loaded->memory();
-  if (memory > 0) {
-    parts.macros.emplace_back("MEMORY_SIZE",
-                              Concat(kMemorySize * memory, " /* for ", memory, " past steps */"));
-  }
+  if (!policy.is_foreign()) AddObservationScales(*policy.loaded, parts);
 }
 
 CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {

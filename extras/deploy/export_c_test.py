@@ -377,7 +377,7 @@ class HeaderTest(ProgramTest):
         self.succeed("export", AGENTS / "sac.safetensors", "--c", "policy.h")
         whole = self.header()
         for right, wrong in (("sinf(q1)", "cosf(q1)"), ("c12 = c1 * c2 - s1", "c12 = c1 * c2 + s1"),
-                             ("w1 / 10", "w1 / 11"), ("tanhf(outputs", "sinf(outputs"),
+                             ("w1 / POLICY_MAX_VELOCITY1", "w1 / 11.0f"), ("tanhf(outputs", "sinf(outputs"),
                              ("mean /= (float)size", "mean /= 2.0f * (float)size"),
                              ("POLICY_TORQUE_LIMIT 5.0f", "POLICY_TORQUE_LIMIT 4.9f")):
             self.assertEqual(whole.count(right), 1, right)

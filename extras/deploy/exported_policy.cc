@@ -14,27 +14,29 @@ namespace upswing::deploy {
 namespace {
 
 /// The inputs of the double pendulum's observation (Observe of pendulum/task.h).
-std::vector<NamedInput> PendulumInputs(int memory) {
+std::vector<NamedInput> PendulumInputs(const Scale& scale, int memory) {
   const auto over = [](double scale, const char* unit) {
     return Concat(" over ", FormatNumber(scale), ' ', unit);
   };
   std::vector<NamedInput> inputs{
       {"cos q1", "cosine of the angle of link 1, 0 hanging"},
       {"sin q1", "its sine"},
-      {"w1", "velocity of q1" + over(kMaxVelocity1, "rad/s")},
+      {"w1", "velocity of q1" + over(kMaxVelocity1 * scale.velocity(), "rad/s")},
       {"cos q2", "cosine of the angle of link 2 relative to link 1"},
       {"sin q2", "its sine"},
-      {"w2", "velocity of q2" + over(kMaxVelocity2, "rad/s")},
+      {"w2", "velocity of q2" + over(kMaxVelocity2 * scale.velocity(), "rad/s")},
       {"energy", "mechanical energy: 0 hanging at rest, 1 upright at rest"},
       {"height", "height of the tip over the pivot, over the length of both links"}};
   for (int step = 1; step <= memory; ++step) {
     const std::string past = Concat(step, step == 1 ? " step ago" : " steps ago");
-    inputs.push_back({"change of w1, " + past,
-                      "what w1 changed by in that step" + over(kMemoryVelocity, "rad/s")});
-    inputs.push_back({"change of w2, " + past,
-                      "what w2 changed by in that step" + over(kMemoryVelocity, "rad/s")});
     inputs.push_back(
-        {"torque, " + past, "the torque chosen for that step" + over(kMemoryTorque, "N m")});
+        {"change of w1, " + past,
+         "what w1 changed by in that step" + over(kMemoryVelocity * scale.velocity(), "rad/s")});
+    inputs.push_back(
+        {"change of w2, " + past,
+         "what w2 changed by in that step" + over(kMemoryVelocity * scale.velocity(), "rad/s")});
+    inputs.push_back({"torque, " + past, "the torque chosen for that step" +
+                                             over(kMemoryTorque * scale.torque, "N m")});
   }
   return inputs;
 }
@@ -57,7 +59,7 @@ double LargestSize(std::span<const double> values) {
   return largest;
 }
 
-ExportedTask PendulumTask(double actuated_joint, int memory) {
+ExportedTask PendulumTask(double actuated_joint, const Scale& scale, int memory) {
   return {"pendulum.c",
           "swings up and balances a double pendulum with one motor",
           Concat("at joint ", actuated_joint),
@@ -65,7 +67,7 @@ ExportedTask PendulumTask(double actuated_joint, int memory) {
            {"q2", "rad    angle of link 2 relative to link 1, 0 in line with it"},
            {"w1", "rad/s  velocity of q1"},
            {"w2", "rad/s  velocity of q2"}},
-          PendulumInputs(memory)};
+          PendulumInputs(scale, memory)};
 }
 
 std::vector<LayerView> ExportedPolicy::ActingLayers() const {
@@ -84,8 +86,9 @@ ExportedPolicy ViewForExport(const LoadedPolicy& loaded) {
   const std::string where = loaded.path;
   ExportedPolicy exported;
   exported.loaded = &loaded;
-  exported.task = loaded.is_foreign() ? ForeignTaskOf(loaded)
-                                      : PendulumTask(loaded.plant.actuated_joint, loaded.memory());
+  exported.task = loaded.is_foreign()
+                      ? ForeignTaskOf(loaded)
+                      : PendulumTask(loaded.plant.actuated_joint, loaded.scale, loaded.memory());
   exported.policy = dynamic_cast<const NetworkPolicy*>(loaded.policy.get());
   if (exported.policy == nullptr) {
     throw BadInput(Concat(loaded.name, ": expected a learned policy, got ",

@@ -31,8 +31,9 @@ struct ExportedTask {
   std::vector<NamedInput> observation;  // (D)
 };
 
-/// The double pendulum with a motor at this joint and observations with `memory` past steps.
-ExportedTask PendulumTask(double actuated_joint, int memory);
+/// The double pendulum with a motor at this joint and observations in units of `scale` with
+/// `memory` past steps.
+ExportedTask PendulumTask(double actuated_joint, const Scale& scale, int memory);
 
 struct ExportedPolicy {
   const LoadedPolicy* loaded = nullptr;

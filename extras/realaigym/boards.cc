@@ -19,8 +19,6 @@ std::string OtherPlant(const MachinePolicy& policy) {
 }
 
 ControllerMaker ControllersOf(const MachinePolicy& policy) {
-  constexpr int64_t kBoardHz = 500;
-  static_assert(kBoardTimestep * kBoardHz == 1);
   return [policy, motor = MotorOf(RobotOf(*policy))]() -> CycleController {
     return [loop = PerCycle(ControllerOf(policy), kBoardHz), motor,
             begin = -1.0](const CycleInput& in) mutable -> Joints {

@@ -16,7 +16,7 @@ namespace {
 class Recorder : public Policy {
  public:
   explicit Recorder(int memory) {
-    info_.observation = ObservationInfoOf(memory, true);
+    info_.observation = ObservationInfoOf({}, memory, true);
     obs_size_ = kObservationSize + kIdentifiedSize + memory * kMemorySize;
   }
   std::string kind() const override { return "recorder"; }
@@ -50,7 +50,7 @@ TEST(RealAIGym, PoliciesObserveAsInTraining) {
   const MachineLog log = NominalLog(std::make_shared<LoadedPolicy>(loaded));
   ASSERT_EQ(recorder->seen.size(), 500);
 
-  Identifier identifier(loaded.plant, 1);
+  Identifier identifier(loaded.plant, kControlPeriod, 1);
   for (size_t k = 0; k < 100; ++k) {
     const auto &q = log.angle, &velocity = log.velocity;
     const PendulumState measured{q[10 * k][0], q[10 * k][1], velocity[10 * k][0],

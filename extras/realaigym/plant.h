@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+
 #include "pendulum/equations.h"
 
 namespace upswing::machine {}
@@ -13,9 +15,11 @@ namespace upswing::realaigym {
 using namespace machine;
 
 inline constexpr double kBoardTimestep = 0.002;  // step of Runge-Kutta and of control, s
-inline constexpr double kBoardSeconds = 10;      // length of a simulation and of a hardware run, s
-inline constexpr double kBoardTorqueLimit = 6;   // of the motor, N·m
-inline constexpr double kBoardGearRatio = 6;     // of the motors
+inline constexpr int64_t kBoardHz = 500;
+static_assert(kBoardTimestep * kBoardHz == 1);
+inline constexpr double kBoardSeconds = 10;     // length of a simulation and of a hardware run, s
+inline constexpr double kBoardTorqueLimit = 6;  // of the motor, N·m
+inline constexpr double kBoardGearRatio = 6;    // of the motors
 
 /// A plant of the benchmark. The defaults are the board's plant: design C.1, model 1.1.
 struct BoardPlant {

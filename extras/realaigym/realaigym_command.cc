@@ -206,7 +206,7 @@ int RunScore(const ScoreArguments& a) {
   ThreadPool pool(ResolveThreads(a.threads));
   std::optional<Twin> twin;
   if (!a.twin.empty()) twin = ReadTwin(a.twin, "--twin");
-  const MachinePolicy policy = GetMachinePolicy(a.policy, a.robot, twin);
+  const MachinePolicy policy = GetMachinePolicy(a.policy, a.robot, twin, kBoardHz);
   const auto seed = static_cast<uint64_t>(a.seed);
   if (!a.csv.empty()) {
     WriteOutput(a.csv, BoardCsv(a.version2() ? NominalLog(policy) : UptimeLog(policy, seed)));

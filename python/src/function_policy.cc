@@ -17,7 +17,9 @@ namespace nb = nanobind;
 class FunctionPolicy final : public Policy {
  public:
   FunctionPolicy(nb::callable function, int memory)
-      : function_(std::move(function)), obs_size_(kObservationSize + memory * kMemorySize) {}
+      : function_(std::move(function)), obs_size_(kObservationSize + memory * kMemorySize) {
+    info_.control_period = kControlPeriod;
+  }
   FunctionPolicy(const FunctionPolicy&) = delete;
   FunctionPolicy& operator=(const FunctionPolicy&) = delete;
   ~FunctionPolicy() override {
@@ -79,8 +81,8 @@ class FunctionPolicy final : public Policy {
 LoadedPolicy MakeFunctionPolicy(nb::callable function, int memory) {
   const auto name = nb::cast<std::string>(
       nb::str(nb::getattr(nb::handle(function), "__name__", nb::str("a function in Python"))));
-  return {Printable(name), "", std::make_shared<FunctionPolicy>(std::move(function), memory),
-          kDoublePendulum, Plant()};
+  return {Printable(name), "",      std::make_shared<FunctionPolicy>(std::move(function), memory),
+          kDoublePendulum, Plant(), Scale()};
 }
 
 }  // namespace upswing

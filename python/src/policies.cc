@@ -116,17 +116,20 @@ std::shared_ptr<PolicyHandle> Load(const std::string& name, const SettingTexts& 
   return std::make_shared<PolicyHandle>(GetPolicy(arguments));
 }
 
-/// The controller of an earlier handle with these settings, name, plant and swing-up policy (the
-/// bytes of its file, or None). Reads no file, so that it is the same controller.
+/// The controller of an earlier handle with these settings, name, plant, control period (s) and
+/// swing-up policy (the bytes of its file, or None). Reads no file, so that it is the same
+/// controller.
 std::shared_ptr<PolicyHandle> Redesign(const std::string& controller, const SettingTexts& settings,
                                        const std::string& title,
                                        const std::map<std::string, double>& plant,
+                                       double control_period,
                                        const std::optional<nb::bytes>& swing_up) {
-  ControllerConfig config;
-  SetFlags(OptionsOf(config), FlagsOf(settings));
+  DesignPlant design(Plant(), control_period);
   std::vector<FlagValue> values;
   for (const auto& [name, value] : plant) values.push_back({name, FormatNumber(value), name});
-  SetFlags(OptionsOf(config.plant), values);
+  SetFlags(OptionsOf(design), values);
+  ControllerConfig config = ControllerConfig::For(design);
+  SetFlags(OptionsOf(config), FlagsOf(settings));
   if (swing_up) config.swing_up_policy = PolicyOf(*swing_up, config.swing_up).policy;
   const nb::gil_scoped_release unlocked;
   return std::make_shared<PolicyHandle>(DesignController(controller, config, title));
@@ -181,7 +184,7 @@ void BindPolicies(nb::module_& m) {
       },
       nb::arg("file"), nb::arg("name"));
   m.def("redesign", &Redesign, nb::arg("controller"), nb::arg("settings"), nb::arg("title"),
-        nb::arg("plant"), nb::arg("swing_up").none());
+        nb::arg("plant"), nb::arg("control_period"), nb::arg("swing_up").none());
   m.def("controllers", &ControllerNames);
   m.def(
       "function_policy",

@@ -159,7 +159,7 @@ class Evaluations(BadInputTest):
                 "threads: expected": {"threads": 1000},
                 'physics: expected one of mujoco, closed-form, got "x"': {"physics": "x"},
                 'mas: expected a setting, got "mas" (did you mean mass?)': {"mas": 1},
-                "mass2: expected a number in [0.01, 100]": {"mass2": "heavy"},
+                "mass2: expected a number in [0.001, 100000]": {"mass2": "heavy"},
                 "delay: expected a multiple of 0.02": {"delay": 0.01},
                 'model: expected a setting, got "model"': {"model": "own.xml"}}.items():
             self.refuse(what, upswing.evaluate, policy, **settings)

@@ -112,7 +112,8 @@ class Policy:
     def __reduce__(self) -> tuple[Any, ...]:
         if self._made_by:
             # The files that it was made from may have changed.
-            return _redesigned, (*self._made_by, self.name, self._handle.info()["plant"],
+            info = self._handle.info()
+            return _redesigned, (*self._made_by, self.name, info["plant"], info["control_period"],
                                  self._handle.swing_up_bytes())
         return _of_bytes, (self._handle.to_bytes(), self.name)
 
@@ -164,8 +165,8 @@ def _load(name: str, settings: list[tuple[str, str]], made_for: list[str]) -> Po
 
 
 def _redesigned(controller: str, settings: list[tuple[str, str]], title: str,
-                plant: dict[str, float], swing_up: bytes | None) -> Policy:
-    return Policy(_upswing.redesign(controller, settings, title, plant, swing_up),
+                plant: dict[str, float], control_period: float, swing_up: bytes | None) -> Policy:
+    return Policy(_upswing.redesign(controller, settings, title, plant, control_period, swing_up),
                   (controller, settings))
 
 

@@ -22,6 +22,13 @@ inline void DescribeThreads(Options& o, int64_t* threads) {
   o.Add(threads, "threads", {0, 256}, "", "number of threads; 0: one per processor, at most 8");
 }
 
+/// Argument "control_period": time between two decisions; 0 is the default.
+inline void DescribeControlPeriod(Options& o, double* period) {
+  o.Add(period, "control_period", {kShortestPeriod, kLongestPeriod}, "s",
+        "time between two decisions of a controller or two torques of a file; a policy has its own")
+      .usual = "the policy's; of a controller 0.02 for the size of the built-in plant";
+}
+
 /// Argument "goal": the name of a pose.
 inline void DescribeGoal(Options& o, std::string* goal) {
   o.AddChoice(goal, "goal", PoseNames(),

@@ -53,17 +53,27 @@ void Config::Describe(Options& o) {
 
 void Config::DescribeEnvironment(Options& o) {
   o.Section("task");
-  o.Add(&episode_seconds, "episode_seconds", {0.02, 1e6}, "s", "length of a training episode")
-      .step = kControlPeriod;
+  o.Add(&control_period, "control_period", {kShortestPeriod, kLongestPeriod}, "s",
+        "time for which the agent holds a torque");
+  constexpr Range kScale{1e-6, 1e6};
+  o.Add(&time_scale, "time_scale", kScale, "",
+        "natural time of the plant over that of the built-in plant; by it, times and velocities in "
+        "observations, reward and evaluations")
+      .usual = "the plant's own; 1 if it is about as large as the agent's plant";
+  o.Add(&torque_scale, "torque_scale", kScale, "",
+        "natural torque of the plant over that of the built-in plant; by it, torques in "
+        "observations "
+        "and reward")
+      .usual = "as time_scale";
+  o.Add(&episode_seconds, "episode_seconds", {0.001, 1e6}, "s", "length of a training episode");
   o.Add(&random_start_share, "random_start_share", kZeroToOne, "",
         "share of training episodes that start in a random state instead of hanging");
   o.Add(&random_start_velocity, "random_start_velocity", {0, 50}, "rad/s",
         "largest velocity of random start states");
-  Option& drive = o.Add(
+  o.Add(
       &random_start_drive, "random_start_drive", {0, 10}, "s",
       "time for which motors at both joints drive the links towards a random pose before a random "
       "start, in place of random angles and velocities; 0: none");
-  drive.step = kControlPeriod;
   o.Add(&memory, "memory", {0, kMostMemory}, "steps",
         "number of past steps whose torque and velocity changes the agent observes");
   o.Add(&identify, "identify",
@@ -103,6 +113,8 @@ EnvConfig Config::Environments() const {
   env.randomization = randomization;
   env.num_envs = static_cast<int>(train.envs);
   env.evaluations = static_cast<int>(train.eval_episodes);
+  env.control_period = control_period;
+  env.scale = scale();
   env.episode_seconds = episode_seconds;
   env.memory = static_cast<int>(memory);
   if (identify) env.identified_from = plant;

@@ -38,6 +38,7 @@ struct Config {
   TrainConfig train;
   std::string start_policy;  // PATH#CHECKSUM of the policy to start from (BuildConfig); or empty
   std::string environment;   // description of a foreign task's environment; empty: double pendulum
+  double control_period = kControlPeriod, time_scale = 1, torque_scale = 1;
   double episode_seconds = 4, random_start_share = 0.9, random_start_velocity = 5,
          random_start_drive = 0;
   int64_t memory = 0;
@@ -64,6 +65,8 @@ struct Config {
   /// Describes the settings of the double pendulum's environments.
   void DescribeEnvironment(Options& options);
 
+  /// Units of observations and of the built-in reward.
+  Scale scale() const { return {time_scale, torque_scale}; }
   /// The training environments of these settings, in the closed form. The caller must set the
   /// engine that `physics` names.
   EnvConfig Environments() const;

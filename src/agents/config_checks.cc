@@ -6,7 +6,9 @@
 #include "base/error.h"
 #include "base/format.h"
 #include "base/text.h"
+#include "pendulum/control_period.h"
 #include "pendulum/own_reward.h"
+#include "pendulum/pendulum_env.h"
 #include "pendulum/timestep.h"
 
 namespace upswing {
@@ -51,7 +53,12 @@ void CheckSettings(Config& config, const std::string& where) {
                             ", got one of ", config.algorithm));
     }
     if (!config.reward.expression.empty()) (void)OwnReward(config.reward.expression);
-    CheckTimestep(config.plant, config.randomization, "plant");
+    if (!config.is_foreign()) {
+      const PendulumEnvConfig env = config.Environments();
+      CheckPeriods(env);
+      ExpectWholePeriods("episode_seconds", env.episode_seconds, env.control_period);
+      (void)PhysicsStepsFor(config.plant, config.randomization, env.control_period, "plant");
+    }
   } catch (const Error& error) {
     throw BadInput(Concat(where, where.empty() ? "" : ": ", error.what()));
   }

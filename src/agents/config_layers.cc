@@ -8,6 +8,7 @@
 #include "agents/toml_settings.h"
 #include "base/error.h"
 #include "base/text.h"
+#include "pendulum/scale.h"
 
 namespace upswing {
 namespace {
@@ -113,6 +114,37 @@ void FitToForeign(const Options& options, bool decay_given, Config& config) {
                         ", an agent of ", config.algorithm));
 }
 
+/// A setting with a unit, and the power of the natural time in it.
+struct TimedSetting {
+  const char* name;
+  int power;
+};
+constexpr TimedSetting kTimedSettings[] = {
+    {"control_period", 1},           {"time_scale", 1},
+    {"episode_seconds", 1},          {"random_start_drive", 1},
+    {"random_start_velocity", -1},   {"delay", 1},
+    {"randomize_delay", 1},          {"sensor_latency", 1},
+    {"randomize_sensor_latency", 1}, {"velocity_window", 1},
+    {"velocity_filter", 1},
+};
+
+/// Multiplies the settings with units that only the named agent gives by the natural units of the
+/// plant over those of the agent's plant, `designed`. `is_given` tells which settings the user has
+/// given.
+void FitToPlant(const Options& options, const Plant& designed,
+                const std::function<bool(const Option&)>& is_given, const Config& config) {
+  const Scale ratio = CarryOver(designed, config.plant);
+  if (ratio == Scale()) return;
+  const auto multiply = [&](const char* name, double factor) {
+    const Option& option = *options.Get(name);
+    if (!is_given(option)) option.Set(FormatNumber(option.number() * factor), "plant");
+  };
+  for (const auto& [name, power] : kTimedSettings) {
+    multiply(name, power > 0 ? ratio.time : ratio.velocity());
+  }
+  multiply("torque_scale", ratio.torque);
+}
+
 /// Turns `mirror` off for a reward that is not symmetric. Throws BadInput if the user set it, at
 /// `place`.
 void FitToReward(const Options& options, const std::string& place, const Config& config) {
@@ -187,12 +219,18 @@ Config ParseConfig(std::string_view text, const std::string& where,
   } else {
     ApplyTable(options, agent.settings, agent.place, false);
   }
+  const Plant designed = config.plant;
   ApplyTable(options, table, where, false);
   SetFlags(options, flags);
   config.agent = agent.name;  // whatever its own file says
   if (foreign) {
     const EarlySetting decay = FindEarly("agent", "learning_rate_steps", table, where, flags);
     FitToForeign(options, !decay.where.empty(), config);
+  } else {
+    const auto is_given = [&](const Option& option) {
+      return !FindEarly(option.section, option.name, table, where, flags).where.empty();
+    };
+    FitToPlant(options, designed, is_given, config);
   }
   CheckSettings(config, where);
   // Last, because only the reward of a checked configuration can be evaluated.

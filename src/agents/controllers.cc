@@ -87,6 +87,23 @@ constexpr ControllerKind kControllers[] = {
 
 }  // namespace
 
+ControllerConfig ControllerConfig::For(const DesignPlant& plant) {
+  ControllerConfig config = ControllerConfig().In(TaskScaleOf(plant));
+  config.plant = plant;
+  return config;
+}
+
+ControllerConfig ControllerConfig::In(const Scale& ratio) const {
+  ControllerConfig config = *this;
+  config.lqr = lqr.In(ratio);
+  config.tvlqr = tvlqr.In(ratio);
+  config.mpc = mpc.In(ratio);
+  config.energy = energy.In(ratio);
+  config.pfl = pfl.In(ratio);
+  config.plant.control_period *= ratio.time;
+  return config;
+}
+
 void ControllerConfig::Describe(Options& o) {
   lqr.Describe(o);
   tvlqr.Describe(o);
@@ -136,9 +153,10 @@ std::string TitleOf(const std::string& name, const ControllerConfig& config,
     }
     return texts;
   };
-  const ControllerConfig usual;
+  const ControllerConfig usual = ControllerConfig::For(config.plant);
   std::vector<std::string> texts = changes(OptionsOf(config), OptionsOf(usual));
-  auto plant = changes(OptionsOf(config.plant), OptionsOf(named));
+  const Plant design = config.plant;
+  auto plant = changes(OptionsOf(design), OptionsOf(named));
   if (!plant_name.empty()) plant.insert(plant.begin(), plant_name);
   if (!plant.empty()) texts.push_back(Concat("for ", Join(plant, " and ")));
   return texts.empty() ? name : Concat(name, " (", Join(texts, ", "), ")");

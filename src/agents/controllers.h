@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "base/policy.h"
+#include "control/design_plant.h"
 #include "control/settings.h"
-#include "pendulum/plant.h"
 
 /// Controllers that are designed from the equations of motion. Commands that take a policy file
 /// also take the name of a controller.
@@ -15,7 +15,7 @@ namespace upswing {
 
 /// Settings of all controllers.
 struct ControllerConfig {
-  Plant plant;  // design plant
+  DesignPlant plant;
   LqrConfig lqr;
   SwingUpConfig tvlqr;
   MpcConfig mpc;
@@ -23,6 +23,12 @@ struct ControllerConfig {
   PartialFeedbackConfig pfl;
   std::string swing_up;                           // for `hybrid`: name of the policy that swings up
   std::shared_ptr<const Policy> swing_up_policy;  // the loaded swing_up policy; not a setting
+
+  /// The default settings for a plant: those of the built-in plant, in natural units.
+  static ControllerConfig For(const DesignPlant& plant);
+  /// These settings in natural units that are `ratio` times as large. Keeps the plant, but not its
+  /// control period.
+  ControllerConfig In(const Scale& ratio) const;
 
   /// Describes all settings except the plant, which has its own flags.
   void Describe(Options& options);

@@ -1,5 +1,8 @@
 #include "agents/loaded_policy.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "base/error.h"
 #include "base/text.h"
 #include "nn/network_policy.h"
@@ -28,13 +31,14 @@ void CheckObservation(const LoadedPolicy& loaded, const std::string& where) {
   }
   const auto& given = loaded.policy->info().observation;
   if (!given) throw BadInput(Concat(where, ": no metadata \"observation\""));
-  const ObservationInfo expected =
-      ObservationInfoOf(loaded.memory(), loaded.identifies(), loaded.seeks_any_pose());
+  const ObservationInfo expected = ObservationInfoOf(loaded.scale, loaded.memory(),
+                                                     loaded.identifies(), loaded.seeks_any_pose());
+  const auto same = [](double a, double b) { return std::abs(a - b) <= 1e-12 * std::abs(b); };
   const auto same_memory = [&] {
     if (!given->memory || !expected.memory) return !given->memory && !expected.memory;
     return given->memory->steps == expected.memory->steps &&
-           given->memory->velocity == expected.memory->velocity &&
-           given->memory->torque == expected.memory->torque;
+           same(given->memory->velocity, expected.memory->velocity) &&
+           same(given->memory->torque, expected.memory->torque);
   };
   if (given->goal.size() != expected.goal.size()) {
     throw BadInput(Concat(where, ": metadata \"observation\": goal: expected ", kGoalSize,
@@ -42,7 +46,8 @@ void CheckObservation(const LoadedPolicy& loaded, const std::string& where) {
   }
   const bool same_scale =
       !given->identified || given->identified->scale == expected.identified->scale;
-  if (given->max_velocity != expected.max_velocity || !same_scale || !same_memory()) {
+  const bool same_velocity = std::ranges::equal(given->max_velocity, expected.max_velocity, same);
+  if (!same_velocity || !same_scale || !same_memory()) {
     throw BadInput(
         Concat(where,
                ": metadata \"observation\": expected the names and scales of this version "
@@ -63,9 +68,9 @@ void CheckTask(const LoadedPolicy& loaded, const std::string& where) {
     throw BadInput(Concat(where, ": metadata \"task\": expected ", kDoublePendulum, ", got \"",
                           loaded.task, "\""));
   }
-  if (period != kControlPeriod) {
-    throw BadInput(Concat(where, ": metadata \"control_period\": expected ",
-                          FormatNumber(kControlPeriod), " s, the control period of the task, got ",
+  if (!period || *period < kShortestPeriod || *period > kLongestPeriod) {
+    throw BadInput(Concat(where, ": metadata \"control_period\": expected ", kShortestPeriod,
+                          " to ", kLongestPeriod, " s, got ",
                           period ? FormatNumber(*period) : "none"));
   }
   if (loaded.policy->action_size() != 1) {
@@ -107,11 +112,35 @@ LoadedPolicy ReadPolicy(const Tensors& file) {
   const auto policy = std::make_shared<const NetworkPolicy>(NetworkPolicy::From(file));
   const PolicyInfo& info = policy->info();
   const std::string task = info.task.empty() ? kDoublePendulum : info.task;
-  LoadedPolicy loaded{where, where, policy, task, Plant()};
+  LoadedPolicy loaded{where, where, policy, task, Plant(), {info.time_scale, info.torque_scale}};
   CheckTask(loaded, where);
   if (loaded.is_foreign()) return loaded;
   loaded.plant = TrainingPlant(info, where);
   return loaded;
+}
+
+std::optional<LoadedPolicy> ForOtherSize(const LoadedPolicy& loaded, const Plant& plant) {
+  const Scale ratio = CarryOver(loaded.plant, plant);
+  const auto* network = dynamic_cast<const NetworkPolicy*>(loaded.policy.get());
+  if (ratio == Scale() || (network == nullptr && !loaded.design_for)) return std::nullopt;
+  LoadedPolicy carried = loaded;
+  carried.plant = plant;
+  carried.carried_over = ratio;
+  carried.scale = loaded.scale * ratio;
+  if (network != nullptr) {
+    PolicyInfo info = network->info();
+    info.control_period = loaded.control_period() * ratio.time;
+    info.time_scale = carried.scale.time;
+    info.torque_scale = carried.scale.torque;
+    info.observation = ObservationInfoOf(carried.scale, loaded.memory(), loaded.identifies(),
+                                         loaded.seeks_any_pose());
+    carried.policy =
+        std::make_shared<const NetworkPolicy>(network->WithTorques(ratio.torque, std::move(info)));
+  } else {
+    carried.policy = loaded.design_for(plant);
+    carried.scale = TaskScaleOf(plant);
+  }
+  return carried;
 }
 
 void ExpectPendulum(const LoadedPolicy& loaded) {
@@ -146,7 +175,10 @@ PolicyInfo InfoOf(const Config& config) {
   info.control_period = spec.step_seconds;
   if (config.is_foreign()) return info;
   for (const auto& [name, value] : PlantValues(config.plant)) info.plant[name] = value;
-  info.observation = ObservationInfoOf(config.memory, config.identify, config.any_pose);
+  const Scale scale = config.scale();
+  info.time_scale = scale.time;
+  info.torque_scale = scale.torque;
+  info.observation = ObservationInfoOf(scale, config.memory, config.identify, config.any_pose);
   return info;
 }
 

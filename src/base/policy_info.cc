@@ -12,7 +12,7 @@ using nlohmann::json;
 
 constexpr Range kCounter{0, 9e15};     // integers that a double holds exactly
 constexpr Range kReturn{-1e60, 1e60};  // more than a sum of float32 rewards
-constexpr Range kSeconds{1e-6, 1e3};
+constexpr Range kSeconds{1e-6, 1e3}, kScale{1e-6, 1e6};
 constexpr size_t kMostInputs = 4096;
 constexpr size_t kLongestName = 64;
 constexpr int64_t kLongestMemory = 4096;  // steps; the network's inputs limit it further
@@ -142,6 +142,8 @@ PolicyInfo ParsePolicyInfo(const std::map<std::string, std::string>& metadata,
   info.plant = reader.Json("plant", ParsePlant).value_or(info.plant);
   info.control_period = reader.Number("control_period", kSeconds);
   info.observation = reader.Json("observation", ParseObservation);
+  info.time_scale = reader.Number("time_scale", kScale).value_or(1);
+  info.torque_scale = reader.Number("torque_scale", kScale).value_or(1);
   info.gamma = reader.Number("gamma", kZeroToOne);
   info.reward_scale = reader.Number("reward_scale", kPositive);
   return info;
@@ -166,6 +168,11 @@ std::map<std::string, std::string> PolicyMetadata(const PolicyInfo& info) {
   if (!info.plant.empty()) metadata["plant"] = json(info.plant).dump();
   number("control_period", info.control_period);
   if (info.observation) metadata["observation"] = ObservationText(*info.observation);
+  const auto scale = [&](const char* key, double value) {
+    if (value != 1) metadata[key] = FormatNumber(value);
+  };
+  scale("time_scale", info.time_scale);
+  scale("torque_scale", info.torque_scale);
   number("gamma", info.gamma);
   number("reward_scale", info.reward_scale);
   return metadata;

@@ -48,6 +48,8 @@ struct PolicyInfo {
   std::map<std::string, double> plant;   // parameters of the plant in training
   std::optional<double> control_period;  // s, for which a torque is held
   std::optional<ObservationInfo> observation;
+  // Natural units of the task, as multiples of those of the built-in double pendulum (Scale).
+  double time_scale = 1, torque_scale = 1;
 
   // A Q-value estimates the sum of gamma^k · reward_scale · reward.
   std::optional<double> gamma, reward_scale;

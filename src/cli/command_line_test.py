@@ -91,12 +91,12 @@ class HelpTest(ProgramTest):
         self.refuse(["train", "--agent", "quick", "--help"], "got \"quick\"")
 
     def test_ranges_and_units(self):
-        self.assertIn("[s] (0.02 to 1000000 in steps of 0.02; default 4)",
+        self.assertIn("[s] (0.001 to 1000000; default 4)",
                       self.help_of("--episode-seconds", "train"))
         self.assertIn("(1 to 1000000; default 100)", self.help_of("--episodes", "eval"))
         self.assertIn("(1 to 4096; default one per processor)", self.help_of("--jobs", "study"))
         self.assertRegex(self.help_of("--randomize", "train"), r"± this share.* \(0 to 0.99\)")
-        self.assertIn("(0.01 to 100)", self.help_of("--mass", "train"))
+        self.assertIn("(0.001 to 100000)", self.help_of("--mass", "train"))
 
     def test_lines_end_only_where_the_width_asks_for_it(self):
         for command in COMMANDS:
@@ -133,7 +133,7 @@ class NumberTest(ProgramTest):
              '--seed: expected an integer in [0, 9000000000000000], got "-1"'),
             (["map", "x", "--threads", "1.5"], '--threads: expected an integer in [0, 256]'),
             (["plot", "x", "--seconds", "nan"],
-             '--seconds: expected a multiple of 0.02 in [0.1, 1000], got "nan"'),
+             '--seconds: expected a number in [0.1, 1000], got "nan"'),
             (["train", "--hidden", "64,x"],
              '--hidden: expected a list of integers in [1, 4096], got "64,x"'),
             (["train", "--seeds", "3", "--jobs", "0"],
@@ -173,7 +173,7 @@ class NumberTest(ProgramTest):
 
     def test_seconds_are_whole_control_periods(self):
         self.refuse(["simulate", "--seconds", "0.03"],
-                    '--seconds: expected a multiple of 0.02 in [0, 100000], got "0.03"; '
+                    '--seconds: expected a multiple of 0.02, the control period, got "0.03"; '
                     "the nearest are 0.02 and 0.04")
         self.refuse(["train", "--episode-seconds", "0.05"], "the nearest are 0.04 and 0.06")
         self.assertEqual(len(self.succeed("simulate", "--seconds", "0.04").splitlines()), 1 + 3)

@@ -26,7 +26,40 @@ Options PlantFlags(Plant& plant) {
   return flags;
 }
 
+/// A number with four significant digits.
+std::string FormatShort(double number) { return fmt::format("{:.4g}", number); }
+
+/// Says how a policy is carried over to a plant of another size.
+void SayIfCarriedOver(const LoadedPolicy& loaded) {
+  if (loaded.carried_over == Scale()) return;
+  const std::string name = Printable(loaded.name);
+  const std::string period = FormatShort(loaded.control_period());
+  if (loaded.design_for) {
+    return SayError(
+        Concat(name, ": designed for the plant of --plant, with a decision every ", period, " s"));
+  }
+  SayError(Concat(name, ": carried over to a plant of another size, with times × ",
+                  FormatShort(loaded.carried_over.time), " and torques × ",
+                  FormatShort(loaded.carried_over.torque), ": a decision every ", period, " s"));
+}
+
 }  // namespace
+
+LoadedPolicy GetPolicyIn(const TrialArguments& trial, PolicyArguments a) {
+  UseIn(trial, a);
+  LoadedPolicy loaded = GetPolicy(a);
+  SayIfCarriedOver(loaded);
+  return loaded;
+}
+
+std::vector<LoadedPolicy> GetPoliciesIn(const TrialArguments& trial,
+                                        const std::vector<std::string>& names,
+                                        PolicyArguments controllers) {
+  UseIn(trial, controllers);
+  std::vector<LoadedPolicy> policies = GetPolicies(names, controllers);
+  for (const LoadedPolicy& loaded : policies) SayIfCarriedOver(loaded);
+  return policies;
+}
 
 void AddPolicy(CommandLine& line, PolicyArguments& a) {
   line.Text(
@@ -108,6 +141,7 @@ void AddTrialOptions(CommandLine& line, TrialArguments& a, const std::string& se
   AddPhysics(line, a.physics);
   AddUnknownPlant(line, a.unknown_plant);
   Options own;
+  DescribeControlPeriod(own, &a.control_period);
   DescribeGoal(own, &a.goal);
   line.Arguments(own);
   AddPlantFlags(line, a.plant_flags);

@@ -28,6 +28,14 @@ void AddCompletion(CommandLine& line);
 /// controllers' settings.
 void AddPolicy(CommandLine& line, PolicyArguments& a);
 
+/// Gets the policy of the arguments for a trial. If it is carried over to a plant of another size,
+/// says so on standard error. Throws as GetPolicy does.
+LoadedPolicy GetPolicyIn(const TrialArguments& trial, PolicyArguments a);
+/// The same for several, as GetPolicies gets them.
+std::vector<LoadedPolicy> GetPoliciesIn(const TrialArguments& trial,
+                                        const std::vector<std::string>& names,
+                                        PolicyArguments controllers);
+
 /// What an argument for several policies takes: `policy.safetensors, run folders, …`.
 std::string PolicyWords();
 

@@ -29,7 +29,7 @@ struct EvalArguments {
 
 /// Evaluates the policies on the same episodes.
 std::vector<EvalReport> Evaluate(const EvalArguments& a) {
-  const std::vector<LoadedPolicy> policies = GetPolicies(a.policies, a.controllers);
+  const std::vector<LoadedPolicy> policies = GetPoliciesIn(a.trial, a.policies, a.controllers);
   std::vector<EvalReport> reports;
   for (const LoadedPolicy& loaded : policies) {
     reports.push_back(PlanEvaluation(loaded, a.trial, a.episodes));

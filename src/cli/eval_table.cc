@@ -155,8 +155,8 @@ void PrintEvalTable(const EvalReport& report) {
     fmt::print("    {:<22} {} of {}\n", name, t.successes, t.episodes);
   }
   PrintSuccesses(e, report.env.any_pose);
-  fmt::print("  return         {}   in the first {} s\n", MomentsText(e.reward_sum),
-             kReturnSeconds);
+  fmt::print("  return         {}   in the first {:.4g} s\n", MomentsText(e.reward_sum),
+             PendulumSpec(report.env).evaluation.return_seconds);
   for (size_t k = 0; k < e.term_means.size(); ++k) {
     fmt::print("    {:<18}{:8.2f}\n", kRewardTermNames[k], e.term_means[k]);
   }

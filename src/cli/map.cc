@@ -65,7 +65,7 @@ int RunMapCommand(const MapCommand& a) {
     throw BadInput(Concat("--out: expected a folder for several maps, got none; policies: ",
                           Join(a.policies, ", ")));
   }
-  const std::vector<LoadedPolicy> policies = GetPolicies(a.policies, a.controllers);
+  const std::vector<LoadedPolicy> policies = GetPoliciesIn(a.trial, a.policies, a.controllers);
   std::vector<MapResult> maps;
   for (const LoadedPolicy& loaded : policies) maps.push_back(PlanMap(a, loaded));
   CheckSameAxes(maps);

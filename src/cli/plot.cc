@@ -12,6 +12,7 @@
 #include "judge/rollout.h"
 #include "os/file.h"
 #include "os/streams.h"
+#include "pendulum/control_period.h"
 #include "report/figure.h"
 #include "runs/find_policy.h"
 #include "runs/run_folder.h"
@@ -90,10 +91,11 @@ std::optional<Figure> TermsFigure(const fs::path& run) {
 }
 
 int RunPlot(const PlotArguments& a) {
-  const LoadedPolicy loaded = GetPolicy(a.policy);
+  const LoadedPolicy loaded = GetPolicyIn(a.trial, a.policy);
   RolloutConfig config = TrialEpisode(a.trial, &loaded);
-  const double usual = a.trial.is_of_eval() ? kEvaluationSeconds : 10;
+  const double usual = a.trial.is_of_eval() ? kEvaluationSeconds * config.env.scale.time : 10;
   config.seconds = a.seconds < 0 ? usual : a.seconds;
+  ExpectWholePeriods("--seconds", config.seconds, config.env.control_period);
   config.estimates = true;
   const fs::path folder = FigureFolder(a.out, loaded, "plot");
   CheckCanDraw();
@@ -136,7 +138,6 @@ void AddPlot(CommandLine& line) {
   AddEpisodeOptions(line, a.trial);
   Options own;
   Option& seconds = own.Add(&a.seconds, "seconds", {0.1, 1000}, "s", "length of the episode");
-  seconds.step = kControlPeriod;
   seconds.usual = "10; 20 with --episode";
   line.Arguments(own);
   AddTrialOptions(line, a.trial, "noise, random plants and the start of --episode");

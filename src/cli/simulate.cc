@@ -14,6 +14,7 @@
 #include "cli/commands.h"
 #include "judge/rollout.h"
 #include "os/streams.h"
+#include "pendulum/control_period.h"
 #include "runs/find_policy.h"
 
 namespace upswing {
@@ -35,10 +36,9 @@ bool IsTime(std::string_view name) {
   return std::ranges::find(kNames, word) != kNames.end();
 }
 
-/// The column `torque` of a CSV file with a row per control step. Throws BadInput with the line
+/// The column `torque` of a CSV file with a row per control step (s). Throws BadInput with the line
 /// number, and if a column of times has other steps.
-std::vector<double> ReadTorqueFile(const std::string& path) {
-  constexpr double step = kControlPeriod;
+std::vector<double> ReadTorqueFile(const std::string& path, double step) {
   const std::string where = InputName(path), text = ReadInput(path);
   std::vector<std::string> names{"torque"};
   std::ranges::copy_if(CsvNames(text, where), std::back_inserter(names), IsTime);
@@ -70,16 +70,19 @@ int RunSimulate(const SimulateArguments& a) {
     throw BadInput("simulate: expected a policy or --torque FILE, got both");
   }
   std::optional<LoadedPolicy> loaded;
-  if (!a.policy.empty()) loaded.emplace(GetPolicy(a.policy));
+  if (!a.policy.empty()) loaded.emplace(GetPolicyIn(a.trial, a.policy));
   RolloutConfig config = TrialEpisode(a.trial, loaded ? &*loaded : nullptr);
-  if (!a.torque.empty()) config.schedule = ReadTorqueFile(a.torque);
+  const double period = config.env.control_period;
+  if (!a.torque.empty()) config.schedule = ReadTorqueFile(a.torque, period);
 
   // The requested number of steps, or one step for each row of the schedule.
-  const double scheduled = static_cast<double>(config.schedule.size()) * kControlPeriod;
-  const double usual = config.schedule.empty() ? kEvaluationSeconds : scheduled;
+  const double scheduled = static_cast<double>(config.schedule.size()) * period;
+  const double episode = kEvaluationSeconds * config.env.scale.time;
+  const double usual = config.schedule.empty() ? episode : scheduled;
   config.seconds = a.seconds < 0 ? usual : a.seconds;
+  ExpectWholePeriods("--seconds", config.seconds, period);
   if (!config.schedule.empty() &&
-      RolloutSteps(config.seconds) > static_cast<int64_t>(config.schedule.size())) {
+      PeriodsIn(config.seconds, period) > static_cast<int64_t>(config.schedule.size())) {
     throw BadInput(Concat("--seconds: expected at most ", FormatNumber(scheduled),
                           " s, the length of ", InputName(a.torque), ", got ",
                           FormatNumber(config.seconds)));
@@ -106,12 +109,11 @@ void AddSimulate(CommandLine& line) {
   AddPolicy(line, a.policy);
   line.Text(
       "--torque", a.torque, "FILE",
-      "CSV file with a column `torque` [N·m], a row per 0.02 s; -: standard input. Times in a "
-      "column `t` or `time` [s] must be 0.02 s apart");
+      "CSV file with a column `torque` [N·m], a row per control period; -: standard input. Times "
+      "in a column `t` or `time` [s] must be a control period apart");
   AddEpisodeOptions(line, a.trial);
   Options own;
   Option& seconds = own.Add(&a.seconds, "seconds", {0, 1e5}, "s", "length of the rollout");
-  seconds.step = kControlPeriod;
   seconds.usual = "20, or the length of the file of --torque";
   line.Arguments(own);
   AddTrialOptions(line, a.trial, "noise, random plants and the start of --episode");
@@ -119,8 +121,8 @@ void AddSimulate(CommandLine& line) {
   line.Notes(
       "Columns: t [s], qpos0, qpos1 [rad], qvel0, qvel1 [rad/s], torque [N·m], energy [J],\n"
       "height of the tip [m], inverted (0 or 1), the reward and its five terms. The torque\n"
-      "is what the motor applies over the next 0.02 s, after its delay and within its\n"
-      "limit. The reward is that of these 0.02 s: of this torque and the next row's state, 0\n"
+      "is what the motor applies over the next control period, after its delay and within its\n"
+      "limit. The reward is that of this period: of this torque and the next row's state, 0\n"
       "in the last row. The rewards of the first 10 s add up to the return of `eval`.\n");
   line.Examples(
       "  ./upswing simulate runs/d3qn-seed1 --csv rollout.csv\n"

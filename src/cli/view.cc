@@ -96,6 +96,13 @@ class Show {
     };
     for (const LoadedPolicy& loaded : policies) add(&loaded);
     if (policies.empty()) add(nullptr);
+    for (const Episode& episode : episodes_) {
+      if (episode.config().env.control_period == period()) continue;
+      throw BadInput(Concat(Printable(episode.config().title), ": expected the control period of ",
+                            Printable(episodes_.front().config().title), ", ",
+                            FormatNumber(period()), " s, got ",
+                            FormatNumber(episode.config().env.control_period)));
+    }
   }
 
   /// Adds names, plants and goals.
@@ -142,6 +149,8 @@ class Show {
 
   /// The time of the last answer [control steps].
   double steps() const { return steps_; }
+  /// The control period of all episodes, s.
+  double period() const { return episodes_.front().config().env.control_period; }
 
  private:
   void Restart() {
@@ -161,7 +170,8 @@ class Show {
 
 /// Adds what a recording consists of. Frame i shows the time (i · speed / fps); a single picture
 /// the end.
-void DescribeRecording(const ViewArguments& a, const fs::path& path, nlohmann::json& job) {
+void DescribeRecording(const ViewArguments& a, const fs::path& path, double period,
+                       nlohmann::json& job) {
   const std::string kind = KindOf(a.record);
   const double usual = a.trial.is_of_eval() ? kEvaluationSeconds : 10;
   const double seconds = a.seconds < 0 ? usual : a.seconds;
@@ -171,8 +181,8 @@ void DescribeRecording(const ViewArguments& a, const fs::path& path, nlohmann::j
   job["kind"] = kind;
   job["path"] = path;
   job["fps"] = fps;
-  job["first"] = single ? seconds / kControlPeriod : 0;
-  job["stride"] = a.speed / fps / kControlPeriod;
+  job["first"] = single ? seconds / period : 0;
+  job["stride"] = a.speed / fps / period;
   job["frames"] = single ? 1 : static_cast<int64_t>(seconds * fps / a.speed + 1e-9) + 1;
 }
 
@@ -184,16 +194,16 @@ int RunView(const ViewArguments& a) {
     throw BadInput(
         Concat("view: expected at most ", kMostPolicies, " policies, got ", a.names.size()));
   }
-  const std::vector<LoadedPolicy> policies = GetPolicies(a.names, a.controller);
+  const std::vector<LoadedPolicy> policies = GetPoliciesIn(a.trial, a.names, a.controller);
   Show show(a, policies);
   show.Describe(job);
   std::unique_ptr<Making> making;
   if (a.record.empty()) {
     job["speed"] = a.speed;
-    job["end"] = a.seconds < 0 ? nlohmann::json() : nlohmann::json(a.seconds / kControlPeriod);
+    job["end"] = a.seconds < 0 ? nlohmann::json() : nlohmann::json(a.seconds / show.period());
   } else {
     making = MakeRecording(a.record);
-    DescribeRecording(a, making->path(), job);
+    DescribeRecording(a, making->path(), show.period(), job);
   }
 
   InstallSignalHandlers("");

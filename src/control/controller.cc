@@ -11,14 +11,14 @@
 namespace upswing {
 namespace {
 
-PolicyInfo InfoOf(const std::string& kind, const Options& settings, const Plant& plant) {
+PolicyInfo InfoOf(const std::string& kind, const Options& settings, const DesignPlant& plant) {
   PolicyInfo info;
   info.agent = kind;
   info.task = kDoublePendulum;
   info.config = settings.Toml(false, [](const Option&) { return true; });
   for (const auto& [name, value] : PlantValues(plant)) info.plant[name] = value;
-  info.control_period = kControlPeriod;
-  info.observation = ObservationInfoOf(0);
+  info.control_period = plant.control_period;
+  info.observation = ObservationInfoOf(TaskScaleOf(plant), 0);
   return info;
 }
 
@@ -28,11 +28,11 @@ StateVector UprightDeviation(const StateVector& x) {
   return {Wrapped(x[0] - std::numbers::pi), Wrapped(x[1]), x[2], x[3]};
 }
 
-StateVector UprightDeviation(std::span<const float> obs) {
+StateVector UprightDeviation(std::span<const float> obs, const Scale& scale) {
   // Sine and cosine of q1 - π are the negatives of those of q1.
   const auto angle = [](double sine, double cosine) { return std::atan2(sine, cosine); };
-  return {angle(-obs[1], -obs[0]), angle(obs[4], obs[3]), kMaxVelocity1 * obs[2],
-          kMaxVelocity2 * obs[5]};
+  return {angle(-obs[1], -obs[0]), angle(obs[4], obs[3]), kMaxVelocity1 * scale.velocity() * obs[2],
+          kMaxVelocity2 * scale.velocity() * obs[5]};
 }
 
 StateVector Difference(const StateVector& x, const StateVector& y) {
@@ -46,8 +46,11 @@ std::string Rounded(double x) {
   return {text.begin(), end};
 }
 
-ComputedPolicy::ComputedPolicy(const std::string& kind, const Options& settings, const Plant& plant)
-    : plant_(plant), info_(InfoOf(kind, settings, plant)) {}
+ComputedPolicy::ComputedPolicy(const std::string& kind, const Options& settings,
+                               const DesignPlant& plant)
+    : plant_(plant), info_(InfoOf(kind, settings, plant)) {
+  SetScale(TaskScaleOf(plant));
+}
 
 std::unique_ptr<Policy::Memory> PendulumController::Start(int /*num_envs*/) const {
   return std::make_unique<Memory>();
@@ -55,7 +58,8 @@ std::unique_ptr<Policy::Memory> PendulumController::Start(int /*num_envs*/) cons
 
 void PendulumController::Act(Matrix<const float> obs, Matrix<double> action, Memory& memory) const {
   for (int i = 0; i < obs.rows(); ++i) {
-    action(i, 0) = Limited(Torque(UprightDeviation(obs.row(i)), static_cast<size_t>(i), memory));
+    action(i, 0) =
+        Limited(Torque(UprightDeviation(obs.row(i), scale()), static_cast<size_t>(i), memory));
   }
 }
 

@@ -14,9 +14,9 @@
 namespace upswing {
 
 /// The deviation from upright [q1 - π, q2, w1, w2], angles in [-π, π], of a state or of an
-/// observation of pendulum/task.h.
+/// observation of pendulum/task.h in units of `scale`.
 StateVector UprightDeviation(const StateVector& x);
-StateVector UprightDeviation(std::span<const float> obs);
+StateVector UprightDeviation(std::span<const float> obs, const Scale& scale = {});
 
 /// x - y, with the angles in [-π, π].
 StateVector Difference(const StateVector& x, const StateVector& y);
@@ -41,18 +41,29 @@ class ComputedPolicy : public Policy {
 
  protected:
   /// `settings` describes how the policy was computed.
-  ComputedPolicy(const std::string& kind, const Options& settings, const Plant& plant);
+  ComputedPolicy(const std::string& kind, const Options& settings, const DesignPlant& plant);
 
-  const Plant& plant() const { return plant_; }
-  /// Sets the observation, for parts that see more than one without memory.
-  void SetObservation(const ObservationInfo& observation) { info_.observation = observation; }
+  const DesignPlant& plant() const { return plant_; }
+  const Scale& scale() const { return scale_; }  // of observations
+  /// Sets the observation, for parts that see more than one without memory, and its units.
+  void SetObservation(const ObservationInfo& observation, const Scale& scale) {
+    info_.observation = observation;
+    SetScale(scale);
+  }
   /// A torque (N·m) cut at the motor's limit.
   double Limited(double u) const {
     return std::clamp(u, -plant_.torque_limit, plant_.torque_limit);
   }
 
  private:
-  Plant plant_;
+  void SetScale(const Scale& scale) {
+    scale_ = scale;
+    info_.time_scale = scale.time;
+    info_.torque_scale = scale.torque;
+  }
+
+  DesignPlant plant_;
+  Scale scale_;
   PolicyInfo info_;
 };
 

@@ -6,9 +6,12 @@
 namespace upswing {
 
 HybridPolicy::HybridPolicy(const std::string& kind, const Options& settings, const LqrConfig& lqr,
-                           std::shared_ptr<const Policy> swing_up, const Plant& plant)
+                           std::shared_ptr<const Policy> swing_up, const DesignPlant& plant)
     : ComputedPolicy(kind, settings, plant), swing_up_(std::move(swing_up)), upright_(lqr, plant) {
-  if (swing_up_->info().observation) SetObservation(*swing_up_->info().observation);
+  if (swing_up_->info().observation) {
+    const PolicyInfo& info = swing_up_->info();
+    SetObservation(*info.observation, {info.time_scale, info.torque_scale});
+  }
   const std::string& task = swing_up_->info().task;
   if ((task.empty() || task == kDoublePendulum) && swing_up_->action_size() == 1) return;
   throw BadInput(
@@ -27,7 +30,7 @@ std::unique_ptr<Policy::Memory> HybridPolicy::Start(int num_envs) const {
 void HybridPolicy::Act(Matrix<const float> obs, Matrix<double> action, Memory& memory) const {
   swing_up_->Act(obs, action, memory);
   for (int i = 0; i < obs.rows(); ++i) {
-    const StateVector deviation = UprightDeviation(obs.row(i));
+    const StateVector deviation = UprightDeviation(obs.row(i), scale());
     if (upright_.Holds(deviation)) action(i, 0) = Limited(upright_.lqr().Torque(deviation));
   }
 }

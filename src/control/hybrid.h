@@ -14,7 +14,7 @@ class HybridPolicy : public ComputedPolicy {
   /// `swing_up`: any policy of the double pendulum with one torque. `kind`, `settings`: its name
   /// and how it was made. Throws as SolveLqr does, and BadInput if `swing_up` is not such a policy.
   HybridPolicy(const std::string& kind, const Options& settings, const LqrConfig& lqr,
-               std::shared_ptr<const Policy> swing_up, const Plant& plant);
+               std::shared_ptr<const Policy> swing_up, const DesignPlant& plant);
 
   std::string description() const override;
   std::unique_ptr<Memory> Start(int num_envs) const override;

@@ -7,14 +7,13 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "control/linearize.h"
-#include "pendulum/timestep.h"
 #include "pendulum/upright_modes.h"
 
 namespace upswing {
 namespace {
 
 /// The error for the user, with the reason why there is no solution.
-Error NoGain(const LqrConfig& config, const Plant& plant) {
+Error NoGain(const LqrConfig& config, const DesignPlant& plant) {
   const UprightModes modes = ModesOf(plant);
   if (std::max({config.q1, config.q2, config.w1, config.w2}) == 0) {
     return BadInput("lqr: expected a weight above 0 for q1, q2, w1 or w2, got only 0");
@@ -39,15 +38,15 @@ Eigen::Matrix4d WeightsOf(const LqrConfig& config) {
   return Eigen::Vector4d(config.q1, config.q2, config.w1, config.w2).asDiagonal();
 }
 
-Lqr SolveLqr(const LqrConfig& config, const Plant& plant) {
-  CheckTimestep(plant, "design plant");
-  const LinearModel model = Discretize(LinearizeUpright(plant), kPhysicsTimestep, kPhysicsSteps);
+Lqr SolveLqr(const LqrConfig& config, const DesignPlant& plant) {
+  const LinearModel model =
+      Discretize(LinearizeUpright(plant), plant.timestep(), plant.physics_steps());
   const auto lqr = SolveDiscreteLqr(model, WeightsOf(config), config.torque);
   if (!lqr) throw NoGain(config, plant);
   return *lqr;
 }
 
-LqrPolicy::LqrPolicy(LqrConfig config, const Plant& plant)
+LqrPolicy::LqrPolicy(LqrConfig config, const DesignPlant& plant)
     : PendulumController("lqr", OptionsOf(config), plant),
       config_(config),
       lqr_(SolveLqr(config, plant)) {}

@@ -16,13 +16,13 @@ Eigen::Matrix4d WeightsOf(const LqrConfig& config);
 
 /// Solves the regulator problem for a plant and the control period. Throws BadInput if the plant's
 /// motor cannot stabilise it, or if no gain from these weights does.
-Lqr SolveLqr(const LqrConfig& config, const Plant& plant);
+Lqr SolveLqr(const LqrConfig& config, const DesignPlant& plant);
 
 /// The controller u = -K x, cut at the torque limit.
 class LqrPolicy : public PendulumController {
  public:
   /// Throws as SolveLqr does.
-  LqrPolicy(LqrConfig config, const Plant& plant);
+  LqrPolicy(LqrConfig config, const DesignPlant& plant);
 
   std::string description() const override;
 

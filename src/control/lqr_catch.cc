@@ -17,15 +17,18 @@ namespace {
 
 constexpr int kSamples = 512;      // states on an ellipsoid
 constexpr double kSettled = 1e-3;  // settled: the cost has fallen to this share
+constexpr double kLeastSettling = 5, kMostSettling = 40;  // s, by Scale::time
 constexpr double kLargestLean = std::numbers::pi / 3;
 
 /// Control periods in which the regulator's slowest mode makes the cost fall to kSettled, times
-/// 1.5, and at least 5 s.
-int SettleSteps(const Lqr& lqr, const Plant& plant) {
-  const LinearModel model = Discretize(LinearizeUpright(plant), kPhysicsTimestep, kPhysicsSteps);
+/// 1.5. At least kLeastSettling and at most kMostSettling.
+int SettleSteps(const Lqr& lqr, const DesignPlant& plant) {
+  const LinearModel model =
+      Discretize(LinearizeUpright(plant), plant.timestep(), plant.physics_steps());
   const double slowest = SpectralRadius(model.A - model.B * lqr.K);
-  return static_cast<int>(
-      std::clamp(1.5 * std::log(kSettled) / (2 * std::log(slowest)), 250.0, 2000.0));
+  const double second = TaskScaleOf(plant).time / plant.control_period;  // of the built-in plant
+  return static_cast<int>(std::clamp(1.5 * std::log(kSettled) / (2 * std::log(slowest)),
+                                     kLeastSettling * second, kMostSettling * second));
 }
 
 /// Random points on the unit sphere in four dimensions.
@@ -59,7 +62,7 @@ bool AllSettle(const Lqr& lqr, double level, const std::vector<Eigen::Vector4d>&
 
 }  // namespace
 
-double RegionOfAttraction(const Lqr& lqr, const Plant& plant) {
+double RegionOfAttraction(const Lqr& lqr, const DesignPlant& plant) {
   const Eigen::Matrix4d shape =
       Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(lqr.P).operatorInverseSqrt();
   std::vector<Eigen::Vector4d> directions = Directions();
@@ -89,7 +92,7 @@ double RegionOfAttraction(const Lqr& lqr, const Plant& plant) {
   return low;
 }
 
-LqrCatch::LqrCatch(const LqrConfig& config, const Plant& plant)
+LqrCatch::LqrCatch(const LqrConfig& config, const DesignPlant& plant)
     : lqr_(SolveLqr(config, plant)),
       region_(RegionOfAttraction(lqr_, plant)),
       steps_(SettleSteps(lqr_, plant) / 2),

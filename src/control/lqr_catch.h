@@ -12,12 +12,12 @@ namespace upswing {
 /// tested level. This is a simulation (Reist, Preiswerk, Tedrake, "Feedback-motion-planning with
 /// simulation-based LQR-trees", 2016, section 3). It is no proof, because states in between are not
 /// tested. Takes some hundredths of a second.
-double RegionOfAttraction(const Lqr& lqr, const Plant& plant);
+double RegionOfAttraction(const Lqr& lqr, const DesignPlant& plant);
 
 class LqrCatch {
  public:
   /// Throws as SolveLqr does, and BadInput if no region of attraction is found.
-  LqrCatch(const LqrConfig& config, const Plant& plant);
+  LqrCatch(const LqrConfig& config, const DesignPlant& plant);
 
   const Lqr& lqr() const { return lqr_; }
 
@@ -36,7 +36,7 @@ class LqrCatch {
   Lqr lqr_;
   double region_;
   int steps_;  // control periods within which it must reach the region
-  Plant plant_;
+  DesignPlant plant_;
 };
 
 }  // namespace upswing

@@ -236,12 +236,11 @@ TEST(Lqr, RefusesAPlantThatCannotBeHeld) {
 
 TEST(Lqr, RefusesAPlantThatTheStepsCannotFollow) {
   Plant plant;
-  plant.damping2 = 100;
-  EXPECT_EQ(
-      MessageOf(LqrConfig(), plant),
-      "design plant: expected friction that stops the joints at a rate of at most 557/s, because "
-      "time steps of 0.005 s are unstable beyond it, got 3111.25/s: damping2 = 100 N·m·s/rad and "
-      "coulomb2 = 0 N·m act on 0.0321477 kg·m²");
+  plant.damping2 = 1e4;
+  EXPECT_EQ(MessageOf(LqrConfig(), plant),
+            "design plant: expected friction that stops the joints at a rate of at most 51200/s, "
+            "because time steps of 1.95313e-05 s are too long beyond it, got 311065/s: damping2 = "
+            "10000 N·m·s/rad and coulomb2 = 0 N·m act on 0.0321477 kg·m²");
 }
 
 TEST(Lqr, RefusesWeightsOfNothing) {

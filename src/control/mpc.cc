@@ -18,7 +18,7 @@ constexpr double kTolerance = 1e-6;  // relative gain of an iteration
 
 /// The plans of some environments, and one optimiser for all of them.
 struct MpcPolicy::Plans : Memory {
-  Plans(int num_envs, const Plant& plant)
+  Plans(int num_envs, const DesignPlant& plant)
       : plans(static_cast<size_t>(num_envs)), optimizer(plant) {}
 
   struct Plan {
@@ -29,7 +29,7 @@ struct MpcPolicy::Plans : Memory {
   TrajectoryOptimizer optimizer;
 };
 
-MpcPolicy::MpcPolicy(LqrConfig lqr, MpcConfig config, const Plant& plant)
+MpcPolicy::MpcPolicy(LqrConfig lqr, MpcConfig config, const DesignPlant& plant)
     : PendulumController("mpc", OptionsOfAll(lqr, config), plant),
       config_(config),
       lqr_(SolveLqr(lqr, plant)),
@@ -62,7 +62,7 @@ double MpcPolicy::Torque(const StateVector& deviation, size_t env, Memory& memor
   auto& plans = static_cast<Plans&>(memory);
   auto& [trajectory, K] = plans.plans[env];
   TrajectoryOptimizer& optimizer = plans.optimizer;
-  const auto T = static_cast<size_t>(std::lround(config_.seconds / kControlPeriod));
+  const auto T = static_cast<size_t>(std::lround(config_.seconds / plant().control_period));
   StateVector x = FromUpright(deviation);
   const bool first = trajectory.u.empty();
   if (first) {

@@ -14,7 +14,7 @@ namespace upswing {
 class MpcPolicy : public PendulumController {
  public:
   /// Throws as SolveLqr does.
-  MpcPolicy(LqrConfig lqr, MpcConfig config, const Plant& plant);
+  MpcPolicy(LqrConfig lqr, MpcConfig config, const DesignPlant& plant);
 
   std::string description() const override;
   std::unique_ptr<Memory> Start(int num_envs) const override;

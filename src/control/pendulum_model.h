@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <span>
 
+#include "control/design_plant.h"
 #include "control/linearize.h"
 #include "pendulum/closed_form.h"
 #include "pendulum/plant.h"
@@ -18,9 +19,10 @@ inline PendulumState StateOf(const StateVector& x) { return {x[0], x[1], x[2], x
 /// same kernels as the simulation.
 class PendulumModel {
  public:
-  explicit PendulumModel(const Plant& plant) : plant_(plant), batch_(0) {}
+  explicit PendulumModel(const DesignPlant& plant)
+      : plant_(plant), steps_(plant.physics_steps()), batch_(0) {}
 
-  const Plant& plant() const { return plant_; }
+  const DesignPlant& plant() const { return plant_; }
 
   /// Steps states (n) in place, each under its own torque (n). Does not limit the torque.
   void Step(std::span<StateVector> x, std::span<const double> u);
@@ -34,7 +36,8 @@ class PendulumModel {
   /// Makes room for n pendulums.
   void Reserve(size_t n);
 
-  Plant plant_;
+  DesignPlant plant_;
+  int steps_;  // of the physics in a control period
   ClosedFormBatch batch_;
 };
 

@@ -1,8 +1,30 @@
 #include "control/settings.h"
 
-#include "pendulum/plant.h"
-
 namespace upswing {
+
+LqrConfig LqrConfig::In(const Scale& scale) const {
+  const double time2 = scale.time * scale.time, torque2 = scale.torque * scale.torque;
+  return {q1, q2, w1 * time2, w2 * time2, torque / torque2};
+}
+
+MpcConfig MpcConfig::In(const Scale& scale) const {
+  MpcConfig scaled = *this;
+  scaled.seconds *= scale.time;
+  return scaled;
+}
+
+SwingUpConfig SwingUpConfig::In(const Scale& scale) const {
+  return {seconds * scale.time, reserve};
+}
+
+EnergyShapingConfig EnergyShapingConfig::In(const Scale& scale) const {
+  // The unit of energy is that of torque.
+  return {kE / (scale.torque * scale.torque * scale.time), kD * scale.time, kP / scale.time};
+}
+
+PartialFeedbackConfig PartialFeedbackConfig::In(const Scale& scale) const {
+  return {kP / (scale.time * scale.time), kD / scale.time, kE / (scale.torque * scale.time)};
+}
 
 void LqrConfig::Describe(Options& o) {
   constexpr Range kWeight{0, 1e9};
@@ -17,7 +39,7 @@ void LqrConfig::Describe(Options& o) {
 
 void MpcConfig::Describe(Options& o) {
   o.Section("mpc");
-  o.Add(&seconds, "mpc_seconds", {0.1, 10}, "s", "planning horizon of mpc").step = kControlPeriod;
+  o.Add(&seconds, "mpc_seconds", {0.1, 10}, "s", "planning horizon of mpc");
   o.Add(&iterations, "mpc_iterations", {1, 1000}, "",
         "optimisation steps of mpc's plan at each decision");
   o.Add(&guesses, "mpc_guesses", {1, 99}, "",
@@ -30,8 +52,7 @@ void MpcConfig::Describe(Options& o) {
 
 void SwingUpConfig::Describe(Options& o) {
   o.Section("tvlqr");
-  o.Add(&seconds, "tvlqr_seconds", {0.2, 30}, "s", "length of the swing-up that tvlqr plans").step =
-      kControlPeriod;
+  o.Add(&seconds, "tvlqr_seconds", {0.2, 30}, "s", "length of the swing-up that tvlqr plans");
   o.Add(&reserve, "tvlqr_reserve", {0, 0.9}, "",
         "share of the torque limit that tvlqr's plan reserves for feedback");
 }

@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "base/options.h"
+#include "pendulum/scale.h"
 
 /// Settings of the computed controllers. This header includes no mathematics, so commands can
 /// include it cheaply.
@@ -15,6 +16,8 @@ struct LqrConfig {
   double w1 = 1, w2 = 1;    // of Q, s²/rad²
   double torque = 1;        // R, 1/(N·m)²
 
+  /// These settings of the built-in plant for a plant of these natural units.
+  LqrConfig In(const Scale& scale) const;
   /// Declares each setting in `options`: name, range, unit, help.
   void Describe(Options& options);
 };
@@ -28,6 +31,7 @@ struct MpcConfig {
   double angle_range = 1e6;  // largest angle of an upright goal, with full turns, rad
   double velocity = 1e6;     // of the motor's joint, above which mpc brakes, rad/s
 
+  MpcConfig In(const Scale& scale) const;
   /// Declares each setting in `options`: name, range, unit, help.
   void Describe(Options& options);
 };
@@ -38,6 +42,7 @@ struct SwingUpConfig {
   double seconds = 4;    // length of the plan, s
   double reserve = 0.2;  // share of the motor's torque that the plan reserves for feedback
 
+  SwingUpConfig In(const Scale& scale) const;
   /// Declares each setting in `options`: name, range, unit, help.
   void Describe(Options& options);
 };
@@ -48,6 +53,7 @@ struct EnergyShapingConfig {
   double kD = 0.00067;  // weight of velocity, s
   double kP = 0.27;     // weight of link 1's angle, 1/s
 
+  EnergyShapingConfig In(const Scale& scale) const;
   void Describe(Options& options);
 };
 
@@ -55,6 +61,7 @@ struct EnergyShapingConfig {
 struct PartialFeedbackConfig {
   double kP = 4, kD = 7, kE = 3;  // 1/s², 1/s, 1/(J·s)
 
+  PartialFeedbackConfig In(const Scale& scale) const;
   void Describe(Options& options);
 };
 

@@ -33,7 +33,7 @@ class LawPolicy : public PendulumController {
   using Law = std::function<double(const StateVector& deviation)>;
 
   LawPolicy(const std::string& kind, const std::string& description, const Options& settings,
-            const Plant& plant, Law law)
+            const DesignPlant& plant, Law law)
       : PendulumController(kind, settings, plant),
         description_(description),
         law_(std::move(law)) {}

@@ -119,6 +119,9 @@ bool TrajectoryOptimizer::Backward(const QuadraticCost& cost, const Trajectory& 
                                    double regularization) {
   const size_t steps = trajectory.u.size();
   const double limit = model_.plant().torque_limit;
+  const Scale scale = TaskScaleOf(model_.plant());
+  const double time2 = scale.time * scale.time, torque2 = scale.torque * scale.torque;
+  const StateVector W(1, 1, time2, time2);
   k_.assign(steps, 0);
   K_.assign(steps, Eigen::RowVector4d::Zero());
   CostExpansion last = cost.ExpandFinal(trajectory.x[steps]);
@@ -135,8 +138,10 @@ bool TrajectoryOptimizer::Backward(const QuadraticCost& cost, const Trajectory& 
     const Eigen::RowVector4d Qux = B.transpose() * VA;
     const double Quu = l.uu + B.dot(Vxx * B);
     // Regularisation acts like an extra cost on changing the torque and the state that follows.
-    const double curvature = Quu + regularization * (1 + B.squaredNorm());
-    const Eigen::RowVector4d change = Qux + regularization * B.transpose() * A;
+    // Both count in natural units.
+    const StateVector WB = W.cwiseProduct(B);
+    const double curvature = Quu + regularization * (1 / torque2 + B.dot(WB));
+    const Eigen::RowVector4d change = Qux + regularization * WB.transpose() * A;
     if (!(curvature > 0)) return false;
 
     const double low = -limit - u, high = limit - u, best = -Qu / curvature;

@@ -57,7 +57,7 @@ class QuadraticCost {
 /// many problems of one plant, one after the other.
 class TrajectoryOptimizer {
  public:
-  explicit TrajectoryOptimizer(const Plant& plant) : model_(plant) {}
+  explicit TrajectoryOptimizer(const DesignPlant& plant) : model_(plant) {}
 
   /// The trajectory from `start` under torques (T), N·m, cut at the limit, and its cost.
   Trajectory Follow(const QuadraticCost& cost, const StateVector& start,

@@ -14,27 +14,31 @@ namespace upswing {
 namespace {
 
 constexpr int kGuesses = 16;
-/// Control periods of the longest guess: 5 s. At first, longer plans hold upright to their end.
-constexpr int kLongestGuess = 250;
+/// Longest guess, s, by Scale::time. At first, longer plans hold upright to their end.
+constexpr double kLongestGuess = 5;
 constexpr int kPlanIterations = 300;
 constexpr double kPlanTolerance = 1e-7;  // relative gain of an iteration
 /// The policy moves to another place of the plan if that costs less than this share.
 constexpr double kCheaper = 0.25;
 
 /// A swing-up from hanging of `steps` control periods, found by trajectory optimisation from a
-/// random guess. The guess is a sine wave of torque with a period of 1 to 2 s; amplitude, length
-/// and the price of the way against its end are random. The regulator holds from the wave's end to
-/// the plan's end. Returns nothing if the result does not end where `upright` catches.
+/// random guess. The guess is a sine wave of torque with a period of 1 to 2 s for the built-in
+/// plant; amplitude, length and the price of the way against its end are random. The regulator
+/// holds from the wave's end to the plan's end. Returns nothing if the result does not end where
+/// `upright` catches.
 std::optional<Trajectory> GuessSwingUp(const LqrConfig& lqr, const LqrCatch& upright, int steps,
                                        Rng& rng, TrajectoryOptimizer& optimizer) {
-  const double limit = optimizer.model().plant().torque_limit;
-  const auto length = static_cast<size_t>(rng.Uniform(0.4, 1) * std::min(steps, kLongestGuess));
-  const double amplitude = rng.Uniform(0, limit), rate = rng.Uniform(3, 6);
+  const DesignPlant& plant = optimizer.model().plant();
+  const Scale scale = TaskScaleOf(plant);
+  const double limit = plant.torque_limit, period = plant.control_period;
+  const auto longest = static_cast<int>(std::lround(kLongestGuess * scale.time / period));
+  const auto length = static_cast<size_t>(rng.Uniform(0.4, 1) * std::min(steps, longest));
+  const double amplitude = rng.Uniform(0, limit), rate = rng.Uniform(3, 6) * scale.velocity();
   const double phase = rng.Uniform(0, 2 * std::numbers::pi);
   const double price = std::pow(10, rng.Uniform(-2.5, 0));
   std::vector<double> torques;
   for (size_t t = 0; t < length; ++t) {
-    torques.push_back(amplitude * std::sin(rate * kControlPeriod * static_cast<double>(t) + phase));
+    torques.push_back(amplitude * std::sin(rate * period * static_cast<double>(t) + phase));
   }
   const QuadraticCost cost(price * WeightsOf(lqr), price * lqr.torque, upright.lqr().P);
   Trajectory trajectory = optimizer.Follow(cost, StateVector::Zero(), torques);
@@ -73,10 +77,10 @@ SwingUp Tracking(Trajectory trajectory, const LqrConfig& lqr, const Eigen::Matri
 }  // namespace
 
 SwingUp PlanSwingUp(const LqrConfig& lqr, const SwingUpConfig& config, const LqrCatch& upright,
-                    const Plant& plant) {
+                    const DesignPlant& plant) {
   const QuadraticCost cost(WeightsOf(lqr), lqr.torque, upright.lqr().P);
-  const int steps = static_cast<int>(std::lround(config.seconds / kControlPeriod));
-  Plant weaker = plant;
+  const int steps = static_cast<int>(std::lround(config.seconds / plant.control_period));
+  DesignPlant weaker = plant;
   weaker.torque_limit *= 1 - config.reserve;
   TrajectoryOptimizer optimizer(weaker);
   PendulumModel model(plant);
@@ -99,13 +103,13 @@ SwingUp PlanSwingUp(const LqrConfig& lqr, const SwingUpConfig& config, const Lqr
   return Tracking(*std::move(best), lqr, upright.lqr().P, model);
 }
 
-TvlqrPolicy::TvlqrPolicy(LqrConfig lqr, SwingUpConfig config, const Plant& plant)
+TvlqrPolicy::TvlqrPolicy(LqrConfig lqr, SwingUpConfig config, const DesignPlant& plant)
     : PendulumController("tvlqr", OptionsOfAll(lqr, config), plant),
       upright_(lqr, plant),
       plan_(PlanSwingUp(lqr, config, upright_, plant)) {}
 
 std::string TvlqrPolicy::description() const {
-  return Concat("planned swing-up of ", Rounded(plan_.trajectory.steps() * kControlPeriod),
+  return Concat("planned swing-up of ", Rounded(plan_.trajectory.steps() * plant().control_period),
                 " s, followed by a time-varying linear-quadratic regulator");
 }
 

@@ -19,7 +19,7 @@ struct SwingUp {
 /// about the best one. Throws as SolveLqr does, and BadInput if no plan ends where `upright`
 /// catches.
 SwingUp PlanSwingUp(const LqrConfig& lqr, const SwingUpConfig& config, const LqrCatch& upright,
-                    const Plant& plant);
+                    const DesignPlant& plant);
 
 /// Follows a planned swing-up, or its mirror image, with feedback, and holds upright with the
 /// regulator whenever that catches. At the start, and after every push, it enters the plan at the
@@ -27,7 +27,7 @@ SwingUp PlanSwingUp(const LqrConfig& lqr, const SwingUpConfig& config, const Lqr
 class TvlqrPolicy : public PendulumController {
  public:
   /// Throws as PlanSwingUp does. Takes about half a second.
-  TvlqrPolicy(LqrConfig lqr, SwingUpConfig config, const Plant& plant);
+  TvlqrPolicy(LqrConfig lqr, SwingUpConfig config, const DesignPlant& plant);
 
   std::string description() const override;
   std::unique_ptr<Memory> Start(int num_envs) const override;

@@ -97,7 +97,7 @@ MapCell CellOf(std::span<const EpisodeResult> episodes) {
 
 void MapPoint::Describe(Options& o) {
   plant.Describe(o);
-  disturbance.Describe(o);
+  disturbance.Describe(o, control_period);
   o.Section("start");
   o.Add(&q1, "q1", {-360, 360}, "°", "start angle of link 1; 0: hanging");
   o.Add(&q2, "q2", {-360, 360}, "°", "start angle of link 2 relative to link 1");

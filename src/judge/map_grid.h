@@ -17,8 +17,9 @@ namespace upswing {
 struct MapPoint {
   Plant plant;
   Disturbance disturbance;
-  double q1 = 0, q2 = 0;  // degrees
-  double w1 = 0, w2 = 0;  // rad/s
+  double q1 = 0, q2 = 0;                   // degrees
+  double w1 = 0, w2 = 0;                   // rad/s
+  double control_period = kControlPeriod;  // s, of the policy; not a setting
 
   void Describe(Options& options);
   PendulumState start() const;

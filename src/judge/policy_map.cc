@@ -24,6 +24,7 @@ struct DesignConditions {
 DesignConditions DesignOf(const LoadedPolicy& loaded) {
   DesignConditions design;
   design.point.plant = loaded.plant;
+  design.point.control_period = loaded.control_period();
   design.word = loaded.origin();
   if (loaded.path.empty()) {
     design.known = true;  // designed without noise, delay and random plants
@@ -88,6 +89,7 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
   config.env = TrialEnvironments(trial, &loaded);
   config.point.plant = config.env.plants.front();
   config.point.disturbance = config.env.disturbance(0);
+  config.point.control_period = config.env.control_period;
   config.x = ParseMapAxis(a.x, design.point, "--x");
   config.y = ParseMapAxis(a.y, design.point, "--y");
   CheckDifferent(config.x, config.y);

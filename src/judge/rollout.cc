@@ -10,13 +10,11 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "judge/trial.h"
+#include "pendulum/control_period.h"
 #include "rl/train/evaluate.h"
 
 namespace upswing {
 namespace {
-
-constexpr double kStepsPerSecond = 50;
-static_assert(kStepsPerSecond * kControlPeriod == 1);
 
 /// The policy's values (Q) in units of reward.
 std::vector<double> ValuesOf(const Policy& policy, Matrix<const float> obs,
@@ -30,6 +28,13 @@ std::vector<double> ValuesOf(const Policy& policy, Matrix<const float> obs,
   return values;
 }
 
+/// The time (s) of a control step. Of whole steps a second it is rounded once.
+double TimeOf(size_t step, double period) {
+  const double steps = std::round(1 / period);
+  if (1 / period == steps) return static_cast<double>(step) / steps;
+  return static_cast<double>(step) * period;
+}
+
 /// Adds the estimates that the policy has to a row.
 void AddEstimates(const Policy& policy, Matrix<const float> obs, Policy::Memory& memory,
                   RolloutRow& row) {
@@ -41,8 +46,6 @@ void AddEstimates(const Policy& policy, Matrix<const float> obs, Policy::Memory&
 
 }  // namespace
 
-int64_t RolloutSteps(double seconds) { return std::llround(seconds * kStepsPerSecond); }
-
 Episode::Episode(RolloutConfig config)
     : config_(std::move(config)),
       env_([&] {
@@ -51,9 +54,11 @@ Episode::Episode(RolloutConfig config)
         return std::make_unique<PendulumEnv>(env);
       }()),
       result_(env_->spec()),
-      rollout_{{}, Plant(), Disturbance()} {
+      rollout_{.rows = {}, .plant = Plant(), .disturbance = Disturbance()} {
   if (config_.start) env_->SetState(0, *config_.start);
   if (config_.policy != nullptr) memory_ = config_.policy->Start(1);
+  rollout_.control_period = period();
+  rollout_.return_seconds = env_->spec().evaluation.return_seconds;
   rollout_.plant = env_->plant(0);
   rollout_.disturbance = env_->disturbance(0);
   rollout_.goal = env_->goal(0);
@@ -67,7 +72,7 @@ void Episode::Step(const std::array<double, 2>& push) {
   if (config_.policy != nullptr) config_.policy->Act(env_->obs(), {&torque, 1, 1}, *memory_);
   if (step < config_.schedule.size()) torque = config_.schedule[step];
   RolloutRow row;
-  row.t = static_cast<double>(step) / kStepsPerSecond;
+  row.t = TimeOf(step, period());
   row.state = env_->state(0);
   row.inverted = Inverted(SeenFrom(rollout_.goal.value_or(Pose()), row.state));
   row.chosen = torque;
@@ -90,7 +95,7 @@ PendulumState Episode::StateAt(double steps) const {
   const auto k = static_cast<int64_t>(std::floor(steps));
   const double share = steps - static_cast<double>(k);
   const PendulumState a = StateOfRow(k);
-  return share > 0 ? StateBetween(a, StateOfRow(k + 1), kControlPeriod, share) : a;
+  return share > 0 ? StateBetween(a, StateOfRow(k + 1), period(), share) : a;
 }
 
 double Episode::TorqueAt(double steps) const {
@@ -102,7 +107,7 @@ Rollout RunRollout(const RolloutConfig& config) {
   Episode episode(config);
   // Step once more than the rollout has steps: the extra step computes the motor's torque in the
   // last state.
-  const int64_t steps = RolloutSteps(config.seconds);
+  const int64_t steps = PeriodsIn(config.seconds, config.env.control_period);
   while (episode.steps() <= steps && !episode.done()) episode.Step();
   Rollout rollout = episode.rollout();
   rollout.rows.back().reward = 0;
@@ -114,7 +119,7 @@ std::string TorqueText(const Rollout& rollout) {
   const std::vector<RolloutRow>& rows = rollout.rows;
   // Leave out the last state, because no step follows it.
   const size_t steps = std::max<size_t>(1, rows.size() - 1);
-  TorqueTally tally({&rollout.plant.torque_limit, 1}, kControlPeriod);
+  TorqueTally tally({&rollout.plant.torque_limit, 1}, rollout.control_period);
   for (size_t k = 0; k < steps; ++k) {
     const size_t after = std::min(k + 1, rows.size() - 1);
     tally.Add({&rows[k].torque, 1}, rows[after].inverted);
@@ -136,10 +141,11 @@ std::string RewardText(const Rollout& rollout) {
     return reward;
   };
   const size_t steps = rows.size() - 1;
-  const auto counted = static_cast<size_t>(RolloutSteps(kReturnSeconds));
+  const auto counted =
+      static_cast<size_t>(PeriodsIn(rollout.return_seconds, rollout.control_period));
   std::string text = fmt::format("{:.6g} in {:g} s", sum(steps), rows.back().t);
   if (steps <= counted) return text;
-  return text + fmt::format(", {:.6g} in the first {:g} s", sum(counted), kReturnSeconds);
+  return text + fmt::format(", {:.6g} in the first {:g} s", sum(counted), rollout.return_seconds);
 }
 
 std::string RolloutCsv(const Rollout& rollout) {

@@ -41,7 +41,9 @@ struct RolloutConfig {
 };
 
 struct Rollout {
-  std::vector<RolloutRow> rows;  // one per control step, and one for the last state
+  std::vector<RolloutRow> rows;            // one per control step, and one for the last state
+  double control_period = kControlPeriod;  // s
+  double return_seconds = kReturnSeconds;  // length of the part whose rewards are the return, s
   // Of this episode:
   Plant plant;
   Disturbance disturbance;
@@ -71,6 +73,7 @@ class Episode {
   double TorqueAt(double steps) const;
 
  private:
+  double period() const { return config_.env.control_period; }
   PendulumState StateOfRow(int64_t k) const;
 
   RolloutConfig config_;
@@ -80,9 +83,6 @@ class Episode {
   Rollout rollout_;
   std::array<double, 2> push_{};  // of the last step, N·m
 };
-
-/// Number of control steps in `seconds`, rounded to the nearest.
-int64_t RolloutSteps(double seconds);
 
 /// Runs an episode to its end. Throws Failure if the state blows up.
 Rollout RunRollout(const RolloutConfig& config);

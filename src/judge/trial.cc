@@ -40,6 +40,11 @@ PendulumState ParseStart(const std::string& text) {
 
 }  // namespace
 
+void UseIn(const TrialArguments& trial, PolicyArguments& policy) {
+  policy.control_period = trial.control_period;
+  if (!trial.plant.empty()) policy.used_on = ReadPlantFile(trial.plant).plant;
+}
+
 TrialConditions ConditionsOf(const std::vector<FlagValue>& flags) {
   TrialConditions conditions;
   SetFlags(OptionsOf(conditions), flags);
@@ -66,7 +71,12 @@ PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy*
   if (a.unknown_plant && loaded == nullptr) {
     throw BadInput("--unknown-plant: expected a policy with it, got none");
   }
+  env.scale = loaded != nullptr ? loaded->scale : TaskScaleOf(plant);
+  env.episode_seconds = kEvaluationSeconds * env.scale.time;
+  env.control_period = kControlPeriod * env.scale.time;
+  if (a.control_period > 0) env.control_period = a.control_period;
   if (loaded != nullptr) {
+    env.control_period = loaded->control_period();
     env.memory = loaded->memory();
     if (loaded->identifies()) env.identified_from = loaded->plant;
     if (a.unknown_plant) env.assumed_plant = loaded->plant;
@@ -84,6 +94,7 @@ PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy*
   SetFlags(OptionsOf(plant), a.plant_flags);
   ApplyChanges(OptionsOf(plant), a.set);
   env.plants = {plant};
+  CheckPeriods(env);
   env.seed = static_cast<uint64_t>(a.seed);
   env.stream = "evaluation";
   return env;

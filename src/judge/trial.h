@@ -9,6 +9,7 @@
 #include "agents/loaded_policy.h"
 #include "judge/rollout.h"
 #include "pendulum/pendulum_env.h"
+#include "runs/find_policy.h"
 
 /// The plant, sensors and motor for `eval`, `simulate` and `plot`. The same flags make the same
 /// episodes in all of them.
@@ -23,7 +24,8 @@ struct TrialArguments {
   std::vector<FlagValue> flags;        // settings of Disturbance and Randomization
   int64_t seed = 0;
   bool unknown_plant = false;
-  bool known_plant = false;  // design a controller for each episode's plant; only in eval
+  bool known_plant = false;   // design a controller for each episode's plant; only in eval
+  double control_period = 0;  // s; 0: the policy's, or that of the size of the plant
   std::string goal;  // name of the pose to reach; empty: upright, or in eval one for each episode
   // The single episode of `simulate`, `plot` and `view`: its start (empty: hanging), or its index
   // in `eval` (negative: none).
@@ -32,6 +34,10 @@ struct TrialArguments {
 
   bool is_of_eval() const { return episode >= 0; }
 };
+
+/// Completes the arguments of a policy by the trial: the plant on which it is used, and the control
+/// period. Throws BadInput.
+void UseIn(const TrialArguments& trial, PolicyArguments& policy);
 
 /// Disturbances of sensors and motor, and random plants.
 struct TrialConditions {

@@ -25,10 +25,10 @@ PendulumEnvConfig FourKinds() {
 }
 
 TEST(Disturbance, DelaysAreWholeControlPeriods) {
-  EXPECT_EQ((Disturbance{0, 0}).delay_steps(), 0);
-  EXPECT_EQ((Disturbance{0, 0.02}).delay_steps(), 1);
-  EXPECT_EQ((Disturbance{0, 0.06}).delay_steps(), 3);
-  EXPECT_EQ((Disturbance{0, 1}).delay_steps(), 50);
+  EXPECT_EQ((Disturbance{0, 0}).delay_steps(kControlPeriod), 0);
+  EXPECT_EQ((Disturbance{0, 0.02}).delay_steps(kControlPeriod), 1);
+  EXPECT_EQ((Disturbance{0, 0.06}).delay_steps(kControlPeriod), 3);
+  EXPECT_EQ((Disturbance{0, 1}).delay_steps(kControlPeriod), 50);
 }
 
 TEST(Disturbance, SettingsAreChecked) {
@@ -36,14 +36,34 @@ TEST(Disturbance, SettingsAreChecked) {
   const Options options = OptionsOf(disturbance);
   EXPECT_THROW(options.Set("delay", "-0.02", "test"), Error);
   EXPECT_THROW(options.Set("delay", "1.5", "test"), Error);
-  EXPECT_THROW(options.Set("delay", "0.001", "test"), Error);
   EXPECT_THROW(options.Set("sensor_noise", "-1", "test"), Error);
   EXPECT_THROW(options.Set("sensor_noise", "nan", "test"), Error);
   EXPECT_FALSE(disturbance.any());
 }
 
+TEST(Disturbance, DelaysFollowTheControlPeriod) {
+  const auto problem = [](double delay, double period) -> std::string {
+    PendulumEnvConfig config;
+    config.disturbances = {{0, delay}};
+    config.control_period = period;
+    try {
+      PendulumEnv env(config);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(problem(0.06, 0.02), "");
+  EXPECT_EQ(problem(0.025, 0.005), "");
+  EXPECT_EQ(
+      problem(0.025, 0.02),
+      "delay: expected a multiple of 0.02, the control period, got \"0.025\"; the nearest are "
+      "0.02 and 0.04");
+  EXPECT_EQ(problem(0, 0.2), "control_period: expected 0.001 to 0.1 s, got 0.2");
+}
+
 TEST(DelayedMotors, TorquesArriveAfterTheDelayAndNoneFromAnEarlierEpisode) {
-  DelayedMotors motors(3, 3);
+  DelayedMotors motors(3, kControlPeriod, 3);
   Episodes episodes;
   episodes.disturbances = {{0, 0}, {0, 0.02}, {0, 0.06}};
   episodes.steps = {0, 0, 0};
@@ -68,7 +88,7 @@ TEST(DelayedMotors, TorquesArriveAfterTheDelayAndNoneFromAnEarlierEpisode) {
 
 TEST(NoisySensors, NoiseIsNormalAndIndependentOnAllFour) {
   constexpr int kCount = 20000;
-  NoisySensors sensors(1, {}, 1, "test");
+  NoisySensors sensors(1, kControlPeriod, {}, 1, "test");
   const PendulumState truth{1, 2, 3, 4};
   double sum[4] = {}, product[4][4] = {}, fourth[4] = {}, lag = 0, last = 0;
   for (int n = 0; n < kCount; ++n) {
@@ -97,8 +117,8 @@ TEST(NoisySensors, NoiseIsNormalAndIndependentOnAllFour) {
 
 TEST(NoisySensors, EachEnvironmentHasItsOwnStream) {
   const Disturbance noisy{1, 0}, silent{0, 0};
-  NoisySensors two(2, {}, 7, "test"), second(2, {}, 7, "test");
-  NoisySensors other(1, {}, 7, "other"), first(1, {}, 7, "test");
+  NoisySensors two(2, kControlPeriod, {}, 7, "test"), second(2, kControlPeriod, {}, 7, "test");
+  NoisySensors other(1, kControlPeriod, {}, 7, "other"), first(1, kControlPeriod, {}, 7, "test");
   (void)two.Measure(0, noisy, {}, 0);  // leaves the second environment's stream unchanged
   (void)second.Measure(0, silent, {}, 0);
   const double noise = two.Measure(1, noisy, {}, 0).state.q1;

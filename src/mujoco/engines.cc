@@ -70,6 +70,7 @@ MuJoCoPhysics::MuJoCoPhysics(const PhysicsConfig& config)
   // Compile the model with the common plant, or with the first of several.
   const ModelPtr model = CompileModel(Superset(config_.plants));
   WritePlant(config_.plant(0), FieldsOf(*model));
+  model->opt.timestep = config_.timestep();
   // The model has no springs, sensors and islands. Disabled, MuJoCo skips the search.
   model->opt.disableflags |= mjDSBL_SPRING | mjDSBL_SENSOR | mjDSBL_ISLAND;
   const DataPtr data(mj_makeData(model.get()));
@@ -148,8 +149,9 @@ void MuJoCoPhysics::Judge(int env, double torque, StepResult& result) const {
   const PendulumState s = state(env);
   const Plant& plant = config_.plant(env);
   const double tau = std::clamp(torque, -plant.torque_limit, plant.torque_limit);
-  std::ranges::copy(Observe(plant, s), std::span(result.next_obs).subspan(env * obs_size).begin());
-  config_.reward.Weigh(env, RewardTerms(plant, s, tau), result);
+  std::ranges::copy(Observe(plant, s, config_.scale),
+                    std::span(result.next_obs).subspan(env * obs_size).begin());
+  config_.reward.Weigh(env, RewardTerms(plant, s, tau, config_.scale), result);
   result.at_goal[env] = Inverted(s) ? 1 : 0;
   result.torque[env] = tau;
   result.work[env] = std::abs(tau * (MotorAngle(plant, s) - previous_angle_[env]));
@@ -172,7 +174,7 @@ void MuJoCoPhysics::StepSlice(const Slice& slice, std::span<const double> torque
     previous_angle_[env] = MotorAngle(config_.plant(env), state(env));
     Component(slice.ctrl, env)[0] = torque[env];
   }
-  mjb_step(slice.batch.get(), nullptr, 0, kPhysicsSteps, mjSTAGE_NONE);
+  mjb_step(slice.batch.get(), nullptr, 0, config_.physics_steps, mjSTAGE_NONE);
   for (int env = slice.first; env < end; ++env) {
     result.terminated[env] = BlewUp(env) ? 1 : 0;
     if (!result.terminated[env]) Judge(env, torque[env], result);

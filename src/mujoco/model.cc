@@ -100,7 +100,7 @@ void WritePlant(const Plant& plant, const ModelFields& fields) {
     fields.body_mass[body] = m;
     fields.body_inertia[3 * body] = I;
     fields.body_inertia[3 * body + 1] = I;
-    fields.body_inertia[3 * body + 2] = std::min(CapsuleInertia(m, kCapsuleRadius, l).along, I);
+    fields.body_inertia[3 * body + 2] = std::min(CapsuleInertia(m, CapsuleRadius(l), l).along, I);
     fields.body_ipos[3 * body + 2] = -c;
   }
   fields.body_pos[3 * 2 + 2] = -plant.length1;

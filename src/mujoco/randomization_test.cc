@@ -98,11 +98,11 @@ TEST(Randomization, DisturbancesGoFromTheNominalUpwards) {
   std::array<int, 6> delays{};
   double sum = 0;
   for (int n = 0; n < kCount; ++n) {
-    const Disturbance drawn = box.Draw(Disturbance{0.2, 0.04}, rng);
+    const Disturbance drawn = box.Draw(Disturbance{0.2, 0.04}, kControlPeriod, rng);
     ASSERT_GE(drawn.sensor_noise, 0.2);
     ASSERT_LE(drawn.sensor_noise, 0.3);
     sum += drawn.sensor_noise;
-    ++delays.at(static_cast<size_t>(drawn.delay_steps()));
+    ++delays.at(static_cast<size_t>(drawn.delay_steps(kControlPeriod)));
   }
   EXPECT_NEAR(sum / kCount, 0.25, 5 * 0.1 / std::sqrt(12.0 * kCount));
   for (size_t k = 0; k < delays.size(); ++k) {
@@ -115,11 +115,11 @@ TEST(Randomization, ARandomLatencyLeavesTheOtherDraws) {
   box.sensor_noise = 0.1;
   Rng rng(1, "test"), same(1, "test");
   const Disturbance nominal{0.2, 0.04, {0.01, 4096, 0.01, 0.02}};
-  const Disturbance before = box.Draw(nominal, rng);
+  const Disturbance before = box.Draw(nominal, kControlPeriod, rng);
   EXPECT_EQ(before.sensors.latency, 0.01);
   EXPECT_EQ(before.sensors.encoder_counts, 4096);
   box.sensor_latency = 0.03;
-  const Disturbance drawn = box.Draw(nominal, same);
+  const Disturbance drawn = box.Draw(nominal, kControlPeriod, same);
   EXPECT_EQ(drawn.sensor_noise, before.sensor_noise);
   EXPECT_GT(drawn.sensors.latency, 0.01);
   EXPECT_LE(drawn.sensors.latency, box.Largest(nominal).sensors.latency);

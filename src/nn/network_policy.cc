@@ -216,6 +216,13 @@ void NetworkPolicy::Spread(std::span<const float> outputs, std::span<double> low
   }
 }
 
+NetworkPolicy NetworkPolicy::WithTorques(double factor, PolicyInfo info) const {
+  NetworkPolicyParts parts = parts_;
+  for (double& torque : parts.torques) torque *= factor;
+  for (double& limit : parts.action_limit) limit *= factor;
+  return {std::move(parts), std::move(info)};
+}
+
 NetworkPolicy NetworkPolicy::Rounded() const {
   NetworkPolicyParts parts = parts_;
   for (float& x : parts.parameters) x = RoundedToBfloat16(x);

@@ -94,6 +94,9 @@ class NetworkPolicy : public Policy {
   /// Result of the checks on loading.
   const SelfCheck& self_check() const { return self_check_; }
 
+  /// A copy whose torques and limits are `factor` times as large, with another description.
+  NetworkPolicy WithTorques(double factor, PolicyInfo info) const;
+
   /// A copy with parameters rounded to bfloat16, for a file of half the size.
   NetworkPolicy Rounded() const;
 

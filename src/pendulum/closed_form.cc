@@ -198,11 +198,16 @@ HWY_INLINE Features FeaturesOf(const ClosedFormBatch& batch, size_t i, const Sta
   return features;
 }
 
-HWY_INLINE void JudgeObservation(const Features& features, const State& x, Verdict& verdict) {
-  const V obs[kObservationSize] = {
-      features.angles.c1, features.angles.s1, x.w.one * Constant(1 / kMaxVelocity1),
-      features.angles.c2, features.angles.s2, x.w.two * Constant(1 / kMaxVelocity2),
-      features.energy,    features.height};
+HWY_INLINE void JudgeObservation(const Features& features, const State& x, const Scale& scale,
+                                 Verdict& verdict) {
+  const V obs[kObservationSize] = {features.angles.c1,
+                                   features.angles.s1,
+                                   x.w.one * Constant(1 / (kMaxVelocity1 * scale.velocity())),
+                                   features.angles.c2,
+                                   features.angles.s2,
+                                   x.w.two * Constant(1 / (kMaxVelocity2 * scale.velocity())),
+                                   features.energy,
+                                   features.height};
   const hn::Rebind<float, D> floats;
   HWY_UNROLL(8)
   for (size_t k = 0; k < kObservationSize; ++k) {
@@ -211,20 +216,21 @@ HWY_INLINE void JudgeObservation(const Features& features, const State& x, Verdi
 }
 
 HWY_INLINE void JudgeReward(const Features& features, const State& x, V tau,
-                            const RewardConfig& weights, Verdict& verdict) {
+                            const RewardConfig& weights, const Scale& scale, Verdict& verdict) {
   const V minus_cos30 = Constant(-std::numbers::sqrt3 / 2);
   const auto inverted =
       hn::And(hn::Le(features.angles.c1, minus_cos30), hn::Le(features.c12, minus_cos30));
   hn::Store(hn::IfThenElseZero(inverted, Constant(1)), kDoubles, verdict.inverted);
 
   const V half = Constant(0.5);
-  const V velocity_cost = Constant(-0.01) * MulAdd(x.w.one, x.w.one, x.w.two * x.w.two);
+  const double time2 = scale.time * scale.time, torque2 = scale.torque * scale.torque;
+  const V velocity_cost = Constant(-0.01 * time2) * MulAdd(x.w.one, x.w.one, x.w.two * x.w.two);
   const V terms[kRewardTerms] = {
       hn::Min(hn::Max(features.energy, Constant(0)), Constant(1.5)),
       MulAdd(half, features.height, half),
       hn::IfThenElseZero(inverted, Constant(5)),
       hn::IfThenElseZero(inverted, velocity_cost),
-      hn::IfThenElse(inverted, Constant(-0.05), Constant(-0.01)) * tau * tau,
+      hn::IfThenElse(inverted, Constant(-0.05 / torque2), Constant(-0.01 / torque2)) * tau * tau,
   };
   V reward = Constant(0);
   HWY_UNROLL(5)
@@ -249,8 +255,8 @@ HWY_INLINE void JudgeVector(const ClosedFormBatch& batch, const RewardConfig& we
   const State x = LoadState(batch, i);
   const V tau = LoadFrom(batch.tau, i);
   const Features features = FeaturesOf(batch, i, x);
-  JudgeObservation(features, x, verdict);
-  JudgeReward(features, x, tau, weights, verdict);
+  JudgeObservation(features, x, batch.scale, verdict);
+  JudgeReward(features, x, tau, weights, batch.scale, verdict);
   const V turned = MotorAngleOf(batch, i, x) - LoadFrom(batch.angle_before, i);
   hn::Store(hn::Abs(tau * turned), kDoubles, verdict.work);
   hn::Store(hn::IfThenElse(IsSound(x), Constant(0), Constant(1)), kDoubles, verdict.blew_up);

@@ -5,6 +5,7 @@
 #include "base/aligned.h"
 #include "base/env.h"
 #include "pendulum/equations.h"
+#include "pendulum/scale.h"
 #include "pendulum/task_config.h"
 
 /// The double pendulum in closed form, equivalent to the built-in MJCF and vectorised over
@@ -44,6 +45,8 @@ struct ClosedFormBatch {
   bool dry_friction = false;  // whether any environment has, or has had, dry friction
   Array limit;                // torque limit, N·m
   Array joint;                // the joint that the motor drives: 1 or 2
+
+  Scale scale;  // of observations and penalties, for all environments
 
   // Constants of the task, from TaskLinksOf.
   Array T1, T2;          // inertias like J1 and J2, without armatures, kg·m²

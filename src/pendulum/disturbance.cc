@@ -4,20 +4,22 @@
 #include <cmath>
 
 #include "base/text.h"
+#include "pendulum/control_period.h"
 
 namespace upswing {
 
-void Disturbance::Describe(Options& o) {
+void Disturbance::Describe(Options& o, double delay_step) {
   o.Section("disturbance");
   o.Add(&sensor_noise, "sensor_noise", {0, 10}, "rad, rad/s",
         "standard deviation of the noise on measured angles and velocities");
-  o.Add(&delay, "delay", {0, kLargestDelay}, "s", "time from choosing a torque to its effect")
-      .step = kControlPeriod;
+  o.Add(&delay, "delay", {0, kLargestDelay}, "s",
+        "time from choosing a torque to its effect, in whole control periods")
+      .step = delay_step;
   sensors.Describe(o);
 }
 
-int Disturbance::delay_steps() const {
-  return static_cast<int>(std::lround(delay / kControlPeriod));
+int Disturbance::delay_steps(double control_period) const {
+  return static_cast<int>(PeriodsIn(delay, control_period));
 }
 
 Disturbance Larger(const Disturbance& a, const Disturbance& b) {
@@ -29,9 +31,9 @@ Disturbance Larger(const Disturbance& a, const Disturbance& b) {
            std::max(x.velocity_filter, y.velocity_filter)}};
 }
 
-NoisySensors::NoisySensors(int num_envs, const SensorModel& slowest, uint64_t seed,
-                           const std::string& stream, uint64_t first_index) {
-  if (!slowest.exact()) sensors_.emplace(num_envs, slowest);
+NoisySensors::NoisySensors(int num_envs, double control_period, const SensorModel& slowest,
+                           uint64_t seed, const std::string& stream, uint64_t first_index) {
+  if (!slowest.exact()) sensors_.emplace(num_envs, control_period, slowest);
   const auto n = static_cast<size_t>(num_envs);
   for (size_t i = 0; i < n; ++i) rngs_.emplace_back(seed, stream, first_index + i);
 }

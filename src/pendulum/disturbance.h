@@ -26,11 +26,12 @@ struct Disturbance {
   SensorModel sensors = {};
 
   /// Declares each setting in `options`: name, range, unit, help.
-  void Describe(Options& options);
+  /// Delays are multiples of `delay_step` (s); 0: any.
+  void Describe(Options& options, double delay_step = 0);
 
   bool any() const { return sensor_noise > 0 || delay > 0 || !sensors.exact(); }
-  /// The delay in control periods.
-  int delay_steps() const;
+  /// The delay in control periods (s).
+  int delay_steps(double control_period) const;
 };
 
 /// For each setting, the larger of its two values.
@@ -39,10 +40,11 @@ Disturbance Larger(const Disturbance& a, const Disturbance& b);
 /// The sensors of N environments: sensor models and noise.
 class NoisySensors {
  public:
-  /// No environment may have a larger latency, window or time constant than `slowest`. Environment
-  /// i draws its noise from (seed, stream, first_index + i).
-  NoisySensors(int num_envs, const SensorModel& slowest, uint64_t seed, const std::string& stream,
-               uint64_t first_index = 0);
+  /// Measures after each control period (s). No environment may have a larger latency, window or
+  /// time constant than `slowest`. Environment i draws its noise from (seed, stream, first_index +
+  /// i).
+  NoisySensors(int num_envs, double control_period, const SensorModel& slowest, uint64_t seed,
+               const std::string& stream, uint64_t first_index = 0);
 
   /// Sets the stream from which an environment draws its noise.
   void Seed(int env, const Rng& rng) { rngs_[static_cast<size_t>(env)] = rng; }

@@ -50,8 +50,9 @@ inline PendulumState RestIn(const Pose& pose, const PendulumState& off = {}) {
 /// The reward's terms with `goal` in place of upright: those of the state seen from it, but the
 /// energy term is 1 - |Ê - Ê at rest in the goal|, or 0 if that is negative.
 inline std::array<double, kRewardTerms> RewardTerms(const Plant& plant, const PendulumState& s,
-                                                    double tau, const Pose& goal) {
-  auto terms = RewardTerms(plant, SeenFrom(goal, s), tau);
+                                                    double tau, const Pose& goal,
+                                                    const Scale& scale = {}) {
+  auto terms = RewardTerms(plant, SeenFrom(goal, s), tau, scale);
   const double missing = NormalizedEnergy(plant, s) - NormalizedEnergy(plant, RestIn(goal));
   terms[0] = std::max(0.0, 1 - std::abs(missing));
   return terms;

@@ -35,10 +35,10 @@ TEST(Reward, OfAGoalByHand) {
     }
   }
   // Link 1 points at the goal, link 2 away from it: half of the height.
-  EXPECT_NEAR(RewardTerms(plant, RestIn({true, true}), 0, {true, false})[1], 0.5, 1e-15);
-  EXPECT_NEAR(RewardTerms(plant, RestIn({false, true}), 0, {false, true})[1], 1, 1e-15);
+  EXPECT_NEAR(RewardTerms(plant, RestIn({true, true}), 0, Pose{true, false})[1], 0.5, 1e-15);
+  EXPECT_NEAR(RewardTerms(plant, RestIn({false, true}), 0, Pose{false, true})[1], 1, 1e-15);
   // Hanging and much too fast for it: no energy term, and the velocities cost 0.01 (12² + 1²).
-  const auto fast = RewardTerms(plant, {0, 0, 12, -1}, 0, {false, false});
+  const auto fast = RewardTerms(plant, {0, 0, 12, -1}, 0, Pose{false, false});
   EXPECT_EQ(fast[0], 0);
   EXPECT_DOUBLE_EQ(fast[3], -1.45);
   // Upright, the built-in reward differs only in the energy beyond that of the goal.

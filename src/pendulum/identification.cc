@@ -8,12 +8,14 @@
 #include <numeric>
 
 #include "pendulum/regressor.h"
+#include "pendulum/scale.h"
+#include "pendulum/timestep.h"
 
 namespace upswing {
 namespace {
 
 constexpr double kPriorShare = 0.15;  // about the deviation of a uniform draw within 25%
-constexpr double kNoise = 1e-3;       // of a measured change of velocity, rad/s
+constexpr double kNoise = 1e-3;       // of a measured change of velocity, rad/s; by Scale::velocity
 // Share of the prediction error that counts as noise too: the factors below hold only in the middle
 // of the period, and a person may push.
 constexpr double kSurprise = 0.3;
@@ -32,8 +34,10 @@ constexpr size_t At(int i, int j) {
 double Get(std::span<const double> P, int i, int j) { return P[i <= j ? At(i, j) : At(j, i)]; }
 
 /// Kalman filter's update with an equation h·x = y of the relative constants x with covariance P.
-/// `noise` is the standard deviation of y (rad/s) in addition to kNoise and kSurprise.
-void Correct(const Row& h, double y, double noise, std::span<double> x, std::span<double> P) {
+/// Standard deviations (rad/s) of y in addition to kSurprise: `noise` of every measurement,
+/// `sensor` of the sensors.
+void Correct(const Row& h, double y, double noise, double sensor, std::span<double> x,
+             std::span<double> P) {
   Row PH{};
   double innovation = y, spread = 0;
   for (int i = 0; i < kConstants; ++i) {
@@ -42,7 +46,7 @@ void Correct(const Row& h, double y, double noise, std::span<double> x, std::spa
     spread += h[i] * PH[i];
   }
   const double surprise = kSurprise * innovation;
-  const double S = spread + kNoise * kNoise + noise * noise + surprise * surprise;
+  const double S = spread + noise * noise + sensor * sensor + surprise * surprise;
   for (int i = 0; i < kConstants; ++i) {
     x[i] += PH[i] / S * innovation;
     for (int j = i; j < kConstants; ++j) P[At(i, j)] -= PH[i] * PH[j] / S;
@@ -55,13 +59,13 @@ struct MiddleEquations {
   Row one, two;
   double c2;  // cos q2
 
-  MiddleEquations(const PendulumState& from, const PendulumState& to) {
+  MiddleEquations(const PendulumState& from, const PendulumState& to, double period) {
     const dynamics::JointPair<double> w{(from.w1 + to.w1) / 2, (from.w2 + to.w2) / 2};
-    const auto angles = dynamics::AnglesOf<double>(
-        {from.q1 + kControlPeriod / 2 * w.one, from.q2 + kControlPeriod / 2 * w.two});
+    const auto angles =
+        dynamics::AnglesOf<double>({from.q1 + period / 2 * w.one, from.q2 + period / 2 * w.two});
     c2 = angles.c2;
-    const Factors factors = Regressor(
-        angles, w, {(to.w1 - from.w1) / kControlPeriod, (to.w2 - from.w2) / kControlPeriod});
+    const Factors factors =
+        Regressor(angles, w, {(to.w1 - from.w1) / period, (to.w2 - from.w2) / period});
     constexpr std::array<size_t, kConstants> kColumns{column::kJ1, column::kJ2, column::kB,
                                                       column::kG1, column::kG2, column::kD1,
                                                       column::kD2};  // of kIdentified
@@ -77,8 +81,11 @@ struct MiddleEquations {
 const std::array<float, kIdentifiedSize> kIdentifiedMirrorSigns{1, 1, 1, 1,  1,  1, 1,
                                                                 1, 1, 1, -1, -1, -1};
 
-Identifier::Identifier(const Plant& nominal, int num_envs)
+Identifier::Identifier(const Plant& nominal, double control_period, int num_envs)
     : plant_(nominal),
+      period_(control_period),
+      physics_steps_(PhysicsStepsFor(nominal, control_period, "nominal plant")),
+      noise_(kNoise * TaskScaleOf(nominal).velocity()),
       nominal_(ManipulatorOf(nominal)),
       prior_{},
       relative_(static_cast<size_t>(num_envs) * kConstants, 1.0),
@@ -136,7 +143,7 @@ PendulumState Identifier::Predict(const Manipulator& plant, double torque,
   prediction_.SetManipulator(0, plant);
   prediction_.SetState(0, from);
   prediction_.tau[0] = torque;
-  Advance(prediction_, kPhysicsSteps, 0, 1);
+  Advance(prediction_, physics_steps_, 0, 1, period_ / physics_steps_);
   return prediction_.state(0);
 }
 
@@ -151,9 +158,9 @@ void Identifier::Update(int env, double torque, const PendulumState& measured, d
   // True constants θ satisfy Φ θ = τ. Estimated ones leave the residual Φ θ' - τ, and so a wrong
   // acceleration: M⁻¹ (Φ θ' - τ) h is the measured minus the predicted change. The prediction is
   // exact; Φ as its derivative is nearly so.
-  MiddleEquations equations(before, measured);
+  MiddleEquations equations(before, measured, period_);
   const MassMatrix M = estimated.Mass(equations.c2);
-  const double scale = -kControlPeriod / M.det;
+  const double scale = -period_ / M.det;
   for (size_t k = 0; k < x.size(); ++k) {
     const double usual = nominal_.*kIdentified[k];
     const double f1 = equations.one[k] * usual, f2 = equations.two[k] * usual;
@@ -168,8 +175,8 @@ void Identifier::Update(int env, double torque, const PendulumState& measured, d
   for (int k = 0; k < kConstants; ++k) {
     if (nominal_.*kIdentified[static_cast<size_t>(k)] > 0) P[At(k, k)] += kDrift * kDrift;
   }
-  Correct(equations.one, y1, noise, x, P);
-  Correct(equations.two, y2, noise, x, P);
+  Correct(equations.one, y1, noise_, noise, x, P);
+  Correct(equations.two, y2, noise_, noise, x, P);
   for (double& share : x) share = std::clamp(share, kLeast, kMost);
   const Manipulator now = estimate(env);
   constexpr size_t kB = 2;

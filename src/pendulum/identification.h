@@ -36,8 +36,9 @@ extern const std::array<float, kIdentifiedSize> kIdentifiedMirrorSigns;
 class Identifier {
  public:
   /// Begins with the nominal plant. Its masses, lengths, dampings, gravity, own centres of mass and
-  /// own inertias each have a standard deviation of 15%.
-  Identifier(const Plant& nominal, int num_envs);
+  /// own inertias each have a standard deviation of 15%. An update comes after each control period
+  /// (s).
+  Identifier(const Plant& nominal, double control_period, int num_envs);
 
   /// Begins an episode of an environment in a measured state, with the nominal plant as the
   /// estimate.
@@ -62,7 +63,10 @@ class Identifier {
   /// The state of a plant one control period later.
   PendulumState Predict(const Manipulator& plant, double torque, const PendulumState& from);
 
-  Plant plant_;  // nominal
+  Plant plant_;        // nominal
+  double period_;      // s, of control
+  int physics_steps_;  // in a control period
+  double noise_;       // of a measured change of velocity, rad/s
   Manipulator nominal_;
   std::array<double, kCovariance> prior_;  // covariance of the relative constants at the start
   std::vector<double> relative_;           // (N × kConstants)

@@ -83,7 +83,7 @@ TEST(Identifier, FindsTheConstants) {
     Rng rng(2, "test");
     Plant nominal, plant = Near(0.2, rng);
     nominal.actuated_joint = plant.actuated_joint = joint;
-    Identifier identifier(nominal, 1);
+    Identifier identifier(nominal, kControlPeriod, 1);
     PendulumState s{0.1, -0.2, 0.3, 0};
     identifier.Begin(0, s);
     double torque = 0;
@@ -104,7 +104,7 @@ TEST(Identifier, TheEnergyIsThatOfTheMotion) {
   // plant from others.
   Plant plant;
   plant.damping1 = plant.damping2 = 0;
-  Identifier identifier(plant, 1);
+  Identifier identifier(plant, kControlPeriod, 1);
   PendulumState s{2, -1, 3, 1};
   identifier.Begin(0, s);
   std::array<float, kIdentifiedSize> numbers;
@@ -122,7 +122,7 @@ TEST(Identifier, TheEnergyIsThatOfTheMotion) {
 }
 
 TEST(Identifier, StaysFiniteWhateverIsMeasured) {
-  Identifier identifier(Plant(), 1);
+  Identifier identifier(Plant(), kControlPeriod, 1);
   identifier.Begin(0, {});
   Rng rng(3, "test");
   std::array<float, kIdentifiedSize> numbers;

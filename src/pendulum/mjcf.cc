@@ -16,10 +16,10 @@ std::string Mjcf(const Plant& plant) {
   <worldbody>
     <body name="link1">
       <joint name="joint1" type="hinge" axis="0 1 0" damping="@damping1" armature="@armature1"@friction1/>@inertial1
-      <geom type="capsule" size="0.04" fromto="0 0 0 0 0 -@length1" mass="@mass1"/>
+      <geom type="capsule" size="@radius1" fromto="0 0 0 0 0 -@length1" mass="@mass1"/>
       <body name="link2" pos="0 0 -@length1">
         <joint name="joint2" type="hinge" axis="0 1 0" damping="@damping2" armature="@armature"@friction2/>@inertial2
-        <geom type="capsule" size="0.04" fromto="0 0 0 0 0 -@length2" mass="@mass2"/>
+        <geom type="capsule" size="@radius2" fromto="0 0 0 0 0 -@length2" mass="@mass2"/>
       </body>
     </body>
   </worldbody>
@@ -50,13 +50,16 @@ std::string Mjcf(const Plant& plant) {
   }
   const auto inertial = [&](const Link& link, const std::string& indent) {
     // The moment of inertia about the link's axis moves nothing. MuJoCo takes at most twice I.
-    const double along = std::min(CapsuleInertia(link.m, kCapsuleRadius, link.l).along, link.I);
+    const double along =
+        std::min(CapsuleInertia(link.m, CapsuleRadius(link.l), link.l).along, link.I);
     const std::string I = FormatNumber(link.I);
     return Concat(indent, "<inertial pos=\"0 0 -", FormatNumber(link.c), "\" mass=\"",
                   FormatNumber(link.m), "\" diaginertia=\"", I, ' ', I, ' ', FormatNumber(along),
                   "\"/>");
   };
   const auto [link1, link2] = LinksOf(plant);
+  fill("@radius1", FormatNumber(CapsuleRadius(plant.length1)));
+  fill("@radius2", FormatNumber(CapsuleRadius(plant.length2)));
   fill("@inertial1", plant.has_own_links() ? inertial(link1, "\n      ") : "");
   fill("@inertial2", plant.has_own_links() ? inertial(link2, "\n        ") : "");
   const Options options = OptionsOf(plant);

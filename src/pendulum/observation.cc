@@ -19,15 +19,15 @@ void WriteGoal(const Pose& goal, int memory, std::span<float> obs) {
   std::ranges::copy(GoalInputs(goal), inputs.begin());
 }
 
-ObservationBuilder::ObservationBuilder(int num_envs, int memory,
-                                       const std::optional<Plant>& identified_from)
-    : memory_(memory) {
-  if (identified_from) identifier_.emplace(*identified_from, num_envs);
+ObservationBuilder::ObservationBuilder(int num_envs, const Scale& scale, double control_period,
+                                       int memory, const std::optional<Plant>& identified_from)
+    : scale_(scale), memory_(memory) {
+  if (identified_from) identifier_.emplace(*identified_from, control_period, num_envs);
 }
 
 void ObservationBuilder::Begin(int env, const Plant& plant, const PendulumState& measured,
                                std::span<float> obs) {
-  std::ranges::copy(Observe(plant, measured), obs.begin());
+  std::ranges::copy(Observe(plant, measured, scale_), obs.begin());
   std::ranges::fill(obs.last(static_cast<size_t>(memory_ * kMemorySize)), 0.0F);
   if (!identifier_) return;
   identifier_->Begin(env, measured);
@@ -36,7 +36,7 @@ void ObservationBuilder::Begin(int env, const Plant& plant, const PendulumState&
 
 void ObservationBuilder::Next(int env, const Plant& plant, const Measurement& measured,
                               std::span<const float> before, double chosen, std::span<float> obs) {
-  std::ranges::copy(Observe(plant, measured.state), obs.begin());
+  std::ranges::copy(Observe(plant, measured.state, scale_), obs.begin());
   Complete(env, measured, before, chosen, obs);
 }
 
@@ -47,17 +47,18 @@ void ObservationBuilder::Complete(int env, const Measurement& measured,
     identifier_->Update(env, measured.torque, measured.state, measured.velocity_noise);
     identifier_->Observe(env, measured.state, obs.subspan(kObservationSize, kIdentifiedSize));
   }
-  if (memory_ > 0) Remember(before, chosen, memory_, obs);
+  if (memory_ > 0) Remember(before, chosen / scale_.torque, memory_, obs);
 }
 
 void ObservationBuilder::State(const Archive& archive) {
   if (identifier_) identifier_->State(archive.In("identification"));
 }
 
-ObservationInfo ObservationInfoOf(int64_t memory, bool identified, bool any_pose) {
+ObservationInfo ObservationInfoOf(const Scale& scale, int64_t memory, bool identified,
+                                  bool any_pose) {
   ObservationInfo observation{
       {"cos q1", "sin q1", "w1", "cos q2", "sin q2", "w2", "energy", "height"},
-      {kMaxVelocity1, kMaxVelocity2}};
+      {kMaxVelocity1 * scale.velocity(), kMaxVelocity2 * scale.velocity()}};
   if (identified) {
     observation.identified = {
         {"J1", "J2", "b", "G1", "G2", "d1", "d2", "delta", "tanh(0.1 / delta)", "identified energy",
@@ -66,8 +67,10 @@ ObservationInfo ObservationInfoOf(int64_t memory, bool identified, bool any_pose
   }
   if (any_pose) observation.goal = {"goal of link 1", "goal of link 2"};
   if (memory > 0) {
-    observation.memory = {
-        memory, {"change of w1", "change of w2", "torque"}, kMemoryVelocity, kMemoryTorque};
+    observation.memory = {memory,
+                          {"change of w1", "change of w2", "torque"},
+                          kMemoryVelocity * scale.velocity(),
+                          kMemoryTorque * scale.torque};
   }
   return observation;
 }

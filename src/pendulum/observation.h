@@ -19,8 +19,8 @@ inline constexpr std::array<float, kObservationSize> kMirrorSigns{1, -1, -1, 1, 
 
 /// Numbers that an observation may hold for each past control step, latest first: [Δw1, Δw2, tau].
 /// Δw is the change of the velocities over kMemoryVelocity, tau the chosen torque over
-/// kMemoryTorque. The plant's response reveals what the state lacks: masses, lengths, and torques
-/// that are still delayed.
+/// kMemoryTorque, both in units of a Scale. The plant's response reveals what the state lacks:
+/// masses, lengths, and torques that are still delayed.
 inline constexpr int kMemorySize = 3;
 /// Numbers that a goal adds to an observation, before the memory: for each link, 1 if it is to
 /// point up and -1 if down.
@@ -33,15 +33,17 @@ constexpr std::array<float, kGoalSize> GoalInputs(const Pose& goal) {
 inline constexpr double kMemoryVelocity = 1.0, kMemoryTorque = 5.0;
 
 /// Writes the memory of an observation, its last 3 × `steps` numbers; the first numbers must be
-/// filled already. `before` is the previous observation, at which the torque (N·m) was chosen.
+/// filled already. `before` is the previous observation, at which the torque was chosen. It counts
+/// in units of Scale::torque: N·m for the built-in plant.
 void Remember(std::span<const float> before, double torque, int steps, std::span<float> obs);
 
 /// Writes the inputs of a goal into an observation with `memory` past steps.
 void WriteGoal(const Pose& goal, int memory, std::span<float> obs);
 
-/// Description, for a policy file, of observations with `memory` past steps; if `identified`, an
-/// identified plant; if `any_pose`, a goal.
-ObservationInfo ObservationInfoOf(int64_t memory, bool identified = false, bool any_pose = false);
+/// Description, for a policy file, of observations in units of `scale` with `memory` past steps; if
+/// `identified`, an identified plant; if `any_pose`, a goal.
+ObservationInfo ObservationInfoOf(const Scale& scale, int64_t memory, bool identified = false,
+                                  bool any_pose = false);
 
 /// Builds the observations (D) of N environments from what their sensors measure:
 ///   8             of the measured state, see Observe
@@ -51,7 +53,8 @@ ObservationInfo ObservationInfoOf(int64_t memory, bool identified = false, bool 
 class ObservationBuilder {
  public:
   /// `identified_from`: the nominal plant where identification starts; none: no identification.
-  ObservationBuilder(int num_envs, int memory, const std::optional<Plant>& identified_from);
+  ObservationBuilder(int num_envs, const Scale& scale, double control_period, int memory,
+                     const std::optional<Plant>& identified_from);
 
   /// Writes the first observation of an episode. `plant` gives its energy and height. Its memory is
   /// zero.
@@ -68,6 +71,7 @@ class ObservationBuilder {
   void State(const Archive& archive);
 
  private:
+  Scale scale_;
   int memory_;
   std::optional<Identifier> identifier_;
 };

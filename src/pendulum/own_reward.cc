@@ -212,6 +212,7 @@ struct OwnReward::Parsed {
 
   PendulumState s;
   Plant plant;
+  double control_period = kControlPeriod;  // s
   double E = 0, h = 0, inverted = 0, tau = 0, dtau = 0, upright = 0;
   const std::vector<std::pair<const char*, double*>> step{{"q1", &s.q1},   {"q2", &s.q2},
                                                           {"w1", &s.w1},   {"w2", &s.w2},
@@ -298,7 +299,7 @@ void OwnReward::Parsed::Draw(const Plant& drawn, Rng& rng) {
   E = built_in[0];
   h = built_in[1];
   inverted = static_cast<double>(rng.Below(2));
-  upright = inverted * kControlPeriod * std::round(std::abs(spread(1, 1000)));
+  upright = inverted * control_period * std::round(std::abs(spread(1, 1000)));
 }
 
 void OwnReward::Parsed::Mirror() {
@@ -319,8 +320,9 @@ std::string OwnReward::Parsed::Problem(double value, const std::string& name) co
                 std::isnan(value) ? "nan" : FormatNumber(value), " at ", Values());
 }
 
-OwnReward::OwnReward(const std::string& expression, int num_envs)
+OwnReward::OwnReward(const std::string& expression, int num_envs, double control_period)
     : parsed_(std::make_unique<Parsed>()) {
+  parsed_->control_period = control_period;
   CheckText(expression);
   for (std::string_view term : Split(expression, ';')) {
     std::string name = TakeName(term);
@@ -387,7 +389,7 @@ void OwnReward::Judge(int env, const Plant& plant, const PendulumState& s, StepR
   } else {
     inverted_steps_[i] = 0;
   }
-  now.upright = static_cast<double>(inverted_steps_[i]) * kControlPeriod;
+  now.upright = static_cast<double>(inverted_steps_[i]) * now.control_period;
 
   const size_t K = names_.size();
   result.reward[i] = 0;

@@ -21,8 +21,10 @@ namespace upswing {
 /// It has no side effects. The parser is muParser.
 class OwnReward {
  public:
-  /// Parses an expression and tries it on a pendulum that hangs at rest. Throws BadInput.
-  explicit OwnReward(const std::string& expression, int num_envs = 1);
+  /// Parses an expression and tries it on a pendulum that hangs at rest. `control_period`: length
+  /// of a control step, s. Throws BadInput.
+  explicit OwnReward(const std::string& expression, int num_envs = 1,
+                     double control_period = kControlPeriod);
   ~OwnReward();
 
   /// The names of the terms (K); a term without a name is called `term1`, by its place.

@@ -2,16 +2,24 @@
 
 #include <algorithm>
 
+#include "base/error.h"
 #include "base/text.h"
+#include "pendulum/control_period.h"
 #include "pendulum/stages.h"
 #include "pendulum/timestep.h"
 
 namespace upswing {
 namespace {
 
-/// The settings, if their time step is stable for all plants. Throws BadInput.
-const PendulumEnvConfig& Checked(const PendulumEnvConfig& config) {
-  for (const Plant& plant : config.plants) CheckTimestep(plant, config.randomization, "plant");
+/// The settings with the physics steps that all plants need. Throws BadInput.
+PendulumEnvConfig WithPhysicsSteps(PendulumEnvConfig config) {
+  CheckPeriods(config);
+  config.physics_steps = 1;
+  for (const Plant& plant : config.plants) {
+    config.physics_steps =
+        std::max(config.physics_steps,
+                 PhysicsStepsFor(plant, config.randomization, config.control_period, "plant"));
+  }
   return config;
 }
 
@@ -33,6 +41,18 @@ Episodes EpisodesOf(const PendulumEnvConfig& config) {
 
 }  // namespace
 
+void CheckPeriods(const PendulumEnvConfig& config) {
+  const double period = config.control_period;
+  if (!(period >= kShortestPeriod && period <= kLongestPeriod)) {
+    throw BadInput(Concat("control_period: expected ", kShortestPeriod, " to ", kLongestPeriod,
+                          " s, got ", FormatNumber(period)));
+  }
+  for (const Disturbance& disturbance : config.disturbances) {
+    ExpectWholePeriods("delay", disturbance.delay, period);
+  }
+  ExpectWholePeriods("randomize_delay", config.randomization.delay, period);
+}
+
 std::string RewardAsymmetry(const PendulumEnvConfig& config) {
   const std::string& reward = config.reward.expression;
   if (reward.empty()) return "";
@@ -52,7 +72,7 @@ EnvSpec PendulumSpec(const PendulumEnvConfig& config) {
   spec.obs_size = kObservationSize + (config.identified_from ? kIdentifiedSize : 0) +
                   (config.any_pose ? kGoalSize : 0) + config.memory * kMemorySize;
   spec.action_limit = {config.plant(0).torque_limit};
-  spec.step_seconds = kControlPeriod;
+  spec.step_seconds = config.control_period;
   spec.term_names = {kRewardTermNames.begin(), kRewardTermNames.end()};
   const std::string& reward = config.reward.expression;
   if (!reward.empty()) spec.term_names = OwnReward(reward).names();
@@ -65,15 +85,16 @@ EnvSpec PendulumSpec(const PendulumEnvConfig& config) {
   spec.mirror_signs.resize(static_cast<size_t>(spec.obs_size), -1.0F);
   if (!RewardAsymmetry(config).empty()) spec.mirror_signs.clear();
   spec.bodies = 2;
-  spec.evaluation = {kEvaluationSeconds, kReturnSeconds, kHoldSeconds, 0};
+  const double time = config.scale.time;
+  spec.evaluation = {kEvaluationSeconds * time, kReturnSeconds * time, kHoldSeconds * time, 0};
   return spec;
 }
 
 PendulumEnv::PendulumEnv(const PendulumEnvConfig& config)
-    : config_(Checked(config)),
-      spec_(PendulumSpec(config)),
-      episodes_(EpisodesOf(config)),
-      stages_(MakeStages(config)),
+    : config_(WithPhysicsSteps(config)),
+      spec_(PendulumSpec(config_)),
+      episodes_(EpisodesOf(config_)),
+      stages_(MakeStages(config_)),
       obs_(static_cast<size_t>(config.num_envs) * static_cast<size_t>(spec_.obs_size)) {
   for (int i = 0; i < config_.num_envs; ++i) {
     rngs_.emplace_back(config_.seed, config_.stream,
@@ -142,7 +163,7 @@ void PendulumEnv::Reset(int env) {
   if (start.is_random) {
     start.state = random_start.Random(plant(env), state(env), rng);
   } else {
-    start.state = random_start.Hanging(rng);
+    start.state = random_start.Hanging(config_.scale, rng);
   }
   for (const auto& stage : stages_) stage->Place(env, episodes_, start);
   SetState(env, start.state);
@@ -153,7 +174,7 @@ void PendulumEnv::SetState(int env, const PendulumState& s) {
   const Matrix<float> rows(obs_, config_.num_envs, spec_.obs_size);
   const std::span<float> obs = rows.row(env);
   std::ranges::fill(obs, 0.0F);
-  std::ranges::copy(Observe(plant(env), state(env)), obs.begin());
+  std::ranges::copy(Observe(plant(env), state(env), config_.scale), obs.begin());
   for (const auto& stage : stages_) stage->Begin(env, episodes_, obs);
 }
 

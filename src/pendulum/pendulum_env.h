@@ -19,7 +19,8 @@
 
 namespace upswing {
 
-/// Settings of a PendulumEnv.
+/// Settings of a PendulumEnv. Times are in s, velocities in rad/s. Only `scale` counts in units of
+/// the built-in plant.
 struct PendulumEnvConfig : PhysicsConfig {
   double episode_seconds = kEvaluationSeconds;
   int memory = 0;  // number of past control steps in an observation
@@ -47,13 +48,16 @@ struct PendulumEnvConfig : PhysicsConfig {
   }
 };
 
+/// Throws BadInput unless the control period is in its range and delays are multiples of it.
+void CheckPeriods(const PendulumEnvConfig& config);
+
 /// States in which the reward differs from the reward in their mirror image, with both rewards, for
 /// messages. Empty: the reward is symmetric, so that mirrored transitions are true.
 std::string RewardAsymmetry(const PendulumEnvConfig& config);
 
-/// The specification of the task "double-pendulum" with these settings. An evaluation episode lasts
-/// 20 s and its return counts the first 10 s. It succeeds if both links are inverted throughout the
-/// last 10 s. It has mirror signs if the reward is symmetric.
+/// The specification of the task "double-pendulum" with these settings. In units of `scale`, an
+/// evaluation episode lasts 20 s and its return counts the first 10 s. It succeeds if both links
+/// are inverted throughout the last 10 s. It has mirror signs if the reward is symmetric.
 EnvSpec PendulumSpec(const PendulumEnvConfig& config);
 
 /// N double pendulums and their episodes. Reaching the time limit truncates; only a numerical
@@ -65,8 +69,8 @@ EnvSpec PendulumSpec(const PendulumEnvConfig& config);
 /// and goal use the true state.
 class PendulumEnv : public VectorEnv {
  public:
-  /// Throws BadInput under the same conditions as Engine::make, and as CheckTimestep does for the
-  /// plants.
+  /// Throws BadInput under the same conditions as Engine::make, as PhysicsStepsFor does for the
+  /// plants, and for delays that are not whole control periods.
   explicit PendulumEnv(const PendulumEnvConfig& config);
 
   const EnvSpec& spec() const override { return spec_; }

@@ -14,8 +14,11 @@ class ClosedFormPhysics : public Physics {
   explicit ClosedFormPhysics(const PhysicsConfig& config)
       : num_envs_(static_cast<size_t>(config.num_envs)),
         weights_(config.reward),
+        steps_(config.physics_steps),
+        timestep_(config.timestep()),
         batch_(num_envs_),
         pool_(config.pool) {
+    batch_.scale = config.scale;
     for (int env = 0; env < config.num_envs; ++env) SetPlant(env, config.plant(env));
   }
 
@@ -33,7 +36,7 @@ class ClosedFormPhysics : public Physics {
     ParallelFor(pool_, ClosedFormChunks(num_envs_), [this, &result](int chunk) {
       const size_t first = static_cast<size_t>(chunk) * kClosedFormChunk;
       const size_t last = std::min(first + kClosedFormChunk, num_envs_);
-      Advance(batch_, kPhysicsSteps, first, last);
+      Advance(batch_, steps_, first, last, timestep_);
       Judge(batch_, weights_, first, last, result);
     });
   }
@@ -48,6 +51,8 @@ class ClosedFormPhysics : public Physics {
  private:
   size_t num_envs_;
   RewardConfig weights_;
+  int steps_;        // in a control period
+  double timestep_;  // s
   ClosedFormBatch batch_;
   ThreadPool* pool_;
 };

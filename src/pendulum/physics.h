@@ -37,8 +37,12 @@ struct PhysicsConfig {
   std::vector<Plant> plants = std::vector<Plant>(1);  // one for all environments, or one for each
   int num_envs = 1;
   RewardConfig reward;
-  ThreadPool* pool = nullptr;  // runs the work in parallel; results have the same bits
+  Scale scale;                             // units of observations and of the built-in reward
+  double control_period = kControlPeriod;  // for which a torque is held, s
+  int physics_steps = kPhysicsSteps;       // in a control period; PendulumEnv chooses it
+  ThreadPool* pool = nullptr;              // runs the work in parallel; results have the same bits
 
+  double timestep() const { return control_period / physics_steps; }  // of the physics, s
   const Plant& plant(int env) const {
     return plants[plants.size() > 1 ? static_cast<size_t>(env) : 0];
   }

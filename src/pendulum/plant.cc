@@ -1,5 +1,6 @@
 #include "pendulum/plant.h"
 
+#include <algorithm>
 #include <numbers>
 
 #include "base/text.h"
@@ -8,8 +9,9 @@ namespace upswing {
 
 namespace {
 
-constexpr Range kMass{0.01, 100}, kLength{0.1, 10}, kDamping{0, 100}, kCoulomb{0, 10};
-constexpr Range kCenter{0, 10}, kInertia{0, 10000}, kJoint{1, 2}, kRotor{0, 1};
+// From 1 g and 1 cm on, which is smaller than any machine so far.
+constexpr Range kMass{1e-3, 1e5}, kLength{0.01, 100}, kDamping{0, 1e6}, kCoulomb{0, 1e5};
+constexpr Range kCenter{0, 100}, kInertia{0, 1e9}, kJoint{1, 2}, kRotor{0, 1e3};
 
 }  // namespace
 
@@ -21,7 +23,7 @@ const std::array<PlantParameter, 18> kPlantParameters{{
     {"damping1", &Plant::damping1, kDamping, "N·m·s/rad", "damping of joint 1"},
     {"damping2", &Plant::damping2, kDamping, "N·m·s/rad", "damping of joint 2"},
     {"gravity", &Plant::gravity, {0.01, 100}, "m/s²", "downward gravity"},
-    {"torque_limit", &Plant::torque_limit, {0.01, 1000}, "N·m", "largest torque of the motor"},
+    {"torque_limit", &Plant::torque_limit, {1e-3, 1e6}, "N·m", "largest torque of the motor"},
     {"actuated_joint", &Plant::actuated_joint, kJoint, "",
      "joint that the motor drives; 1: pendubot, 2: acrobot"},
     {"rotor_inertia", &Plant::rotor_inertia, kRotor, "kg·m²",
@@ -39,7 +41,7 @@ const std::array<PlantParameter, 18> kPlantParameters{{
      "moment of inertia of link 1 about its centre of mass; 0: that of a solid capsule"},
     {"inertia2", &Plant::inertia2, kInertia, "kg·m²",
      "moment of inertia of link 2 about its centre of mass; 0: that of a solid capsule"},
-    {"armature", &Plant::armature, {0, 10}, "kg·m²", "armature of each joint, without rotors"},
+    {"armature", &Plant::armature, {0, 1e6}, "kg·m²", "armature of each joint, without rotors"},
 }};
 
 void Plant::Describe(Options& o) {
@@ -65,6 +67,8 @@ std::vector<std::pair<std::string, double>> PlantValues(const Plant& plant) {
   return values;
 }
 
+double CapsuleRadius(double length) { return std::min(kCapsuleRadius, 0.4 * length); }
+
 CapsuleInertia::CapsuleInertia(double m, double r, double l) {
   // The mass splits by volume between the cylinder and the two half spheres.
   const double cylinder = std::numbers::pi * r * r * l;
@@ -77,7 +81,7 @@ CapsuleInertia::CapsuleInertia(double m, double r, double l) {
 
 std::array<Link, 2> LinksOf(const Plant& p) {
   const auto link = [](double m, double l, double c, double I) {
-    return Link{m, l, c > 0 ? c : l / 2, I > 0 ? I : CapsuleInertia(m, kCapsuleRadius, l).across};
+    return Link{m, l, c > 0 ? c : l / 2, I > 0 ? I : CapsuleInertia(m, CapsuleRadius(l), l).across};
   };
   return {link(p.mass1, p.length1, p.center1, p.inertia1),
           link(p.mass2, p.length2, p.center2, p.inertia2)};

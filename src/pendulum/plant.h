@@ -12,19 +12,21 @@
 /// The double pendulum: its parameters, its links as rigid bodies, and its state.
 namespace upswing {
 
-/// Time between two actions (s); the physics makes kPhysicsSteps steps in it.
+/// Time between two actions by default (s), in which the physics of the built-in plant makes
+/// kPhysicsSteps steps.
 inline constexpr double kControlPeriod = 0.02;
+inline constexpr double kPhysicsTimestep = 0.005;  // s
+inline constexpr int kPhysicsSteps = 4;
+static_assert(kPhysicsSteps * kPhysicsTimestep == kControlPeriod);
+inline constexpr double kShortestPeriod = 0.001, kLongestPeriod = 0.1;  // between actions, s
 
 /// Constants of every plant; Mjcf uses the same values.
-inline constexpr double kPhysicsTimestep = 0.005;  // s
-inline constexpr int kPhysicsSteps = 4;            // per control period
-static_assert(kPhysicsSteps * kPhysicsTimestep == kControlPeriod);
 inline constexpr double kArmature = 0.01;       // of both joints, kg·m²
-inline constexpr double kCapsuleRadius = 0.04;  // of both links, m
+inline constexpr double kCapsuleRadius = 0.04;  // of links of 0.1 m and longer, m
 inline constexpr double kFrictionSlope = 100;   // of the dry friction's arctangent, s/rad
 
-/// The parameters that can be set at run time. By default the links are solid capsules of a fixed
-/// radius, whose inertia and centre of mass follow from mass and length.
+/// The parameters that can be set at run time. By default the links are solid capsules of
+/// CapsuleRadius, whose inertia and centre of mass follow from mass and length.
 struct Plant {
   double mass1 = 1.0, mass2 = 1.0;        // kg
   double length1 = 0.5, length2 = 0.5;    // m
@@ -71,6 +73,10 @@ struct CapsuleInertia {
 
   CapsuleInertia(double m, double r, double l);
 };
+
+/// Radius (m) of the capsule of a link of this length (m): kCapsuleRadius, or 0.4 of a shorter
+/// length.
+double CapsuleRadius(double length);
 
 /// A link as a rigid body: mass m (kg), length l (m), distance c of the centre of mass from the
 /// link's joint (m), moment of inertia I about the centre of mass and the hinge's axis (kg·m²).

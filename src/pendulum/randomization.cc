@@ -16,8 +16,7 @@ void Randomization::Describe(Options& o) {
   o.Add(&sensor_noise, "randomize_sensor_noise", {0, 10}, "rad, rad/s",
         "largest random increase of sensor_noise, drawn for each episode");
   o.Add(&delay, "randomize_delay", {0, kLargestDelay}, "s",
-        "largest random increase of delay, drawn for each episode")
-      .step = kControlPeriod;
+        "largest random increase of delay, drawn for each episode");
   o.Add(&sensor_latency, "randomize_sensor_latency", {0, kLongestLatency}, "s",
         "largest random increase of sensor_latency, drawn for each episode");
   o.Add(&from_posterior, "randomize_posterior",
@@ -59,12 +58,12 @@ Plant Randomization::Draw(const Plant& nominal, Rng& rng) const {
   return drawn;
 }
 
-Disturbance Randomization::Draw(const Disturbance& nominal, Rng& rng) const {
+Disturbance Randomization::Draw(const Disturbance& nominal, double control_period, Rng& rng) const {
   Disturbance drawn = nominal;
   drawn.sensor_noise += rng.Uniform(0, sensor_noise);
-  const int most = Disturbance{0, delay}.delay_steps();
+  const int most = Disturbance{0, delay}.delay_steps(control_period);
   const int more = static_cast<int>(rng.Uniform() * (most + 1));
-  drawn.delay = (nominal.delay_steps() + more) * kControlPeriod;
+  drawn.delay = (nominal.delay_steps(control_period) + more) * control_period;
   // Runs of earlier versions drew no third number.
   if (sensor_latency > 0) drawn.sensors.latency += rng.Uniform(0, sensor_latency);
   return drawn;

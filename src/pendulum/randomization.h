@@ -33,9 +33,9 @@ struct Randomization {
   /// Draws a plant from the box: each parameter is uniform and independent of the others. Always
   /// draws eight numbers from the stream.
   Plant Draw(const Plant& nominal, Rng& rng) const;
-  /// Draws a disturbance: uniform noise, a uniform number of control periods of delay, and a
+  /// Draws a disturbance: uniform noise, a uniform number of control periods (s) of delay, and a
   /// uniform latency. Draws two numbers from the stream, and a third if the latency is random.
-  Disturbance Draw(const Disturbance& nominal, Rng& rng) const;
+  Disturbance Draw(const Disturbance& nominal, double control_period, Rng& rng) const;
   /// The largest values that Draw may return.
   Disturbance Largest(const Disturbance& nominal) const;
 };

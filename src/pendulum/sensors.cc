@@ -6,38 +6,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "pendulum/control_period.h"
+
 namespace upswing {
-namespace {
-
-constexpr int kFilterUpdates = 20;  // per control period
-static_assert(kFilterUpdates * kFilterPeriod == kControlPeriod);
-
-/// The true state `age` seconds before the latest of these control steps (M × 4).
-PendulumState StateAgo(std::span<const double> past, double age) {
-  const auto at = [&](size_t k) {
-    const auto s = past.subspan(4 * k, 4);
-    return PendulumState{s[0], s[1], s[2], s[3]};
-  };
-  const double steps = age / kControlPeriod;
-  const auto k = static_cast<size_t>(steps);
-  return StateBetween(at(k + 1), at(k), kControlPeriod, 1 - (steps - static_cast<double>(k)));
-}
-
-/// The encoder readings of the state `age` seconds before the latest control step.
-PendulumState Reading(std::span<const double> past, const SensorModel& model, double age) {
-  const double step = model.encoder_step(), T = model.velocity_window;
-  PendulumState s = StateAgo(past, age);
-  s.q1 = Quantized(s.q1, step);
-  s.q2 = Quantized(s.q2, step);
-  if (T > 0) {
-    const PendulumState before = StateAgo(past, age + T);
-    s.w1 = (s.q1 - Quantized(before.q1, step)) / T;
-    s.w2 = (s.q2 - Quantized(before.q2, step)) / T;
-  }
-  return s;
-}
-
-}  // namespace
 
 void SensorModel::Describe(Options& o) {
   o.Add(&latency, "sensor_latency", {0, kLongestLatency}, "s",
@@ -62,13 +33,40 @@ double Quantized(double number, double step) {
   return step == 0 ? number : step * std::round(number / step);
 }
 
-Sensors::Sensors(int num_envs, const SensorModel& slowest) {
+Sensors::Sensors(int num_envs, double control_period, const SensorModel& slowest)
+    : period_(control_period),
+      filter_updates_(
+          static_cast<int>(std::max<int64_t>(1, PeriodsIn(control_period, kFilterPeriod)))) {
   const double age = std::max(slowest.latency + slowest.velocity_window, slowest.velocity_age());
   // The oldest filter update of a step is less than one control period before the step.
-  moments_ = static_cast<size_t>(std::ceil(age / kControlPeriod)) + 2;
+  moments_ = static_cast<size_t>(std::ceil(age / period_)) + 2;
   past_.resize(static_cast<size_t>(num_envs) * 4 * moments_);
   torques_.resize(static_cast<size_t>(num_envs) * moments_);
   filtered_.resize(static_cast<size_t>(num_envs) * 2);
+}
+
+PendulumState Sensors::StateAgo(std::span<const double> past, double age) const {
+  const auto at = [&](size_t k) {
+    const auto s = past.subspan(4 * k, 4);
+    return PendulumState{s[0], s[1], s[2], s[3]};
+  };
+  const double steps = age / period_;
+  const auto k = static_cast<size_t>(steps);
+  return StateBetween(at(k + 1), at(k), period_, 1 - (steps - static_cast<double>(k)));
+}
+
+PendulumState Sensors::Reading(std::span<const double> past, const SensorModel& model,
+                               double age) const {
+  const double step = model.encoder_step(), T = model.velocity_window;
+  PendulumState s = StateAgo(past, age);
+  s.q1 = Quantized(s.q1, step);
+  s.q2 = Quantized(s.q2, step);
+  if (T > 0) {
+    const PendulumState before = StateAgo(past, age + T);
+    s.w1 = (s.q1 - Quantized(before.q1, step)) / T;
+    s.w2 = (s.q2 - Quantized(before.q2, step)) / T;
+  }
+  return s;
 }
 
 void Sensors::Begin(int env, const PendulumState& start) {
@@ -76,7 +74,7 @@ void Sensors::Begin(int env, const PendulumState& start) {
   // The first Measure puts the start state before these.
   const auto past = Past(env);
   for (size_t k = 0; k < moments_; ++k) {
-    const double age = static_cast<double>(k + 1) * kControlPeriod;
+    const double age = static_cast<double>(k + 1) * period_;
     std::ranges::copy(std::array{q1 - age * w1, q2 - age * w2, w1, w2}, past.begin() + 4 * k);
   }
   std::ranges::fill(Torques(env), 0.0);
@@ -99,9 +97,10 @@ PendulumState Sensors::Measure(int env, const SensorModel& model, const Pendulum
     return measured;
   }
   // y is the filter's exact response to a ŵ that is constant between two updates.
-  const double share = 1 - std::exp(-kFilterPeriod / model.velocity_filter);
-  for (int update = kFilterUpdates - 1; update >= 0; --update) {
-    const PendulumState s = Reading(past, model, model.latency + update * kFilterPeriod);
+  const double step = period_ / filter_updates_;
+  const double share = 1 - std::exp(-step / model.velocity_filter);
+  for (int update = filter_updates_ - 1; update >= 0; --update) {
+    const PendulumState s = Reading(past, model, model.latency + update * step);
     y[0] += share * (s.w1 - y[0]);
     y[1] += share * (s.w2 - y[1]);
   }
@@ -111,7 +110,7 @@ PendulumState Sensors::Measure(int env, const SensorModel& model, const Pendulum
 }
 
 double Sensors::Torque(int env, const SensorModel& model) const {
-  const double steps = model.velocity_age() / kControlPeriod;
+  const double steps = model.velocity_age() / period_;
   const auto k = static_cast<size_t>(steps);
   const double share = steps - static_cast<double>(k);
   const double* torque = torques_.data() + static_cast<size_t>(env) * moments_;

@@ -16,7 +16,8 @@ namespace upswing {
 inline constexpr double kLongestLatency = 0.1;  // s
 inline constexpr double kLongestWindow = 0.1;   // s
 inline constexpr double kSlowestFilter = 1;     // s
-/// Time between two updates of the velocity filter (s), as in a motor drive at 1 kHz.
+/// Time between two updates of the velocity filter (s), as in a motor drive at 1 kHz; a control
+/// period has a whole number of updates.
 inline constexpr double kFilterPeriod = 0.001;
 
 /// The sensors of one environment; zeros: exact angles and velocities without latency.
@@ -57,8 +58,9 @@ double Quantized(double number, double step);
 /// at most. It works with every physics, timestep, window and latency.
 class Sensors {
  public:
-  /// No environment may have a larger latency, window or time constant than `slowest`.
-  Sensors(int num_envs, const SensorModel& slowest);
+  /// Measures after each control period (s). No environment may have a larger latency, window or
+  /// time constant than `slowest`.
+  Sensors(int num_envs, double control_period, const SensorModel& slowest);
 
   /// Begins an episode in this state. Before the start, the joints count as moving at its
   /// velocities.
@@ -85,6 +87,13 @@ class Sensors {
     return std::span(filtered_).subspan(static_cast<size_t>(env) * 2, 2);
   }
 
+  /// The true state `age` seconds before the latest of these control steps (M × 4).
+  PendulumState StateAgo(std::span<const double> past, double age) const;
+  /// The encoder readings of that state.
+  PendulumState Reading(std::span<const double> past, const SensorModel& model, double age) const;
+
+  double period_;                 // s, between two control steps
+  int filter_updates_;            // per control period
   size_t moments_;                // M, number of kept control steps
   std::vector<double> past_;      // (N × M × 4) true states q1, q2, w1, w2, latest first
   std::vector<double> torques_;   // (N × M) of the control periods before these states, N·m

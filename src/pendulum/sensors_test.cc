@@ -16,7 +16,7 @@ constexpr double kTurn = 2 * std::numbers::pi;
 
 /// Sensor output at the start of an episode, for joints that have always moved at these velocities.
 PendulumState AtStart(const SensorModel& model, const PendulumState& start) {
-  Sensors sensors(1, model);
+  Sensors sensors(1, kControlPeriod, model);
   sensors.Begin(0, start);
   return sensors.Measure(0, model, start, 0);
 }
@@ -72,7 +72,7 @@ TEST(Sensors, AnEpisodeBeginsInMotion) {
 
 TEST(Sensors, LatencyAndWindowReachBackToEarlierControlSteps) {
   const SensorModel model{0.02, 0, 0.04, 0};
-  Sensors sensors(2, model);
+  Sensors sensors(2, kControlPeriod, model);
   sensors.Begin(1, {});
   std::vector<double> q1{0, 0, 0};
   for (int step = 0; step < 8; ++step) {
@@ -92,7 +92,7 @@ TEST(Sensors, BetweenControlStepsTheyMeasureWhatThePhysicsDo) {
   batch.SetState(0, {3, 0, 8, -15});
   std::array<SensorModel, kPhysicsSteps> models;
   for (int k = 0; k < kPhysicsSteps; ++k) models[k].latency = k * kPhysicsTimestep;
-  Sensors sensors(kPhysicsSteps, models.back());
+  Sensors sensors(kPhysicsSteps, kControlPeriod, models.back());
   for (int k = 0; k < kPhysicsSteps; ++k) sensors.Begin(k, batch.state(0));
   for (int step = 0; step < 100; ++step) {
     batch.SetTorque(std::array{step % 10 < 5 ? 5.0 : -5.0});
@@ -114,7 +114,7 @@ TEST(Sensors, BetweenControlStepsTheyMeasureWhatThePhysicsDo) {
 TEST(Sensors, TheFilterAnswersAStepByTheClosedFormula) {
   // Joint 1 begins at rest; from the second control step on it moves at 2 rad/s.
   const SensorModel model{0, 0, 0, 0.05};
-  Sensors sensors(1, model);
+  Sensors sensors(1, kControlPeriod, model);
   sensors.Begin(0, {});
   EXPECT_EQ(sensors.Measure(0, model, {}, 0).w1, 0);
   const double y0 = sensors.Measure(0, model, {0.02, 0, 2, 0}, 0).w1;
@@ -131,7 +131,7 @@ TEST(Sensors, TheFilterAnswersAStepByTheClosedFormula) {
 TEST(Sensors, ASlowerFilterLagsByItsTimeConstant) {
   // For a velocity ramp a·t, the low-pass lags by τ plus less than one update.
   const SensorModel model{0, 0, 0, 0.03};
-  Sensors sensors(1, model);
+  Sensors sensors(1, kControlPeriod, model);
   sensors.Begin(0, {});
   double w1 = 0;
   for (int step = 0; step < 100; ++step) {
@@ -145,7 +145,7 @@ TEST(Sensors, TheTorqueIsAsOldAsTheVelocities) {
   // The velocities are 5 + 10/2 + 15 ms old: a quarter of the control period before the last one.
   const SensorModel model{0.005, 0, 0.01, 0.015};
   EXPECT_DOUBLE_EQ(model.velocity_age(), 0.025);
-  Sensors sensors(1, {0.005, 0, 0.02, 0.03});
+  Sensors sensors(1, kControlPeriod, {0.005, 0, 0.02, 0.03});
   sensors.Begin(0, {});
   sensors.Measure(0, model, {}, 0);
   sensors.Measure(0, model, {}, 4);
@@ -159,7 +159,7 @@ TEST(Sensors, TheTorqueIsAsOldAsTheVelocities) {
 TEST(Sensors, RoundingNoiseOfTheVelocities) {
   // Angles at random positions within their counts; joint 1 moves by 0 to 10 counts in the window.
   const SensorModel model{0, 1000, 0.01, 0};
-  Sensors sensors(1, model);
+  Sensors sensors(1, kControlPeriod, model);
   Rng rng(1, "test");
   constexpr int kCount = 20000;
   double square = 0;
@@ -179,7 +179,7 @@ TEST(Sensors, RoundingNoiseOfTheVelocities) {
 
 TEST(Sensors, ExactSensorsNextToOthersMeasureTheSameBits) {
   const SensorModel slow{0.05, 4096, 0.03, 0.01};
-  Sensors sensors(2, slow);
+  Sensors sensors(2, kControlPeriod, slow);
   sensors.Begin(0, {});
   sensors.Begin(1, {});
   for (int step = 0; step < 5; ++step) {
@@ -195,7 +195,7 @@ TEST(Sensors, ExactSensorsNextToOthersMeasureTheSameBits) {
 
 TEST(Sensors, LoadedOnesContinueWithTheSameBits) {
   const SensorModel model{0.005, 4096, 0.03, 0.01};
-  Sensors saved(1, model), loaded(1, model);
+  Sensors saved(1, kControlPeriod, model), loaded(1, kControlPeriod, model);
   saved.Begin(0, {1, 2, 3, 4});
   for (int step = 0; step < 3; ++step) saved.Measure(0, model, {0.1 * step, 0, 5, 0}, step);
   SaveAndLoad([&](const Archive& archive) { saved.State(archive); },

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/text.h"
+#include "pendulum/control_period.h"
 #include "pendulum/pendulum_env.h"
 #include "pendulum/timestep.h"
 
@@ -32,6 +33,8 @@ int64_t IndexOf(const Pose& pose) { return std::ranges::find(kPoses, pose) - kPo
 RandomConditions::RandomConditions(const PendulumEnvConfig& config)
     : randomization_(config.randomization),
       posterior_(config.randomization.MakePosterior()),
+      period_(config.control_period),
+      timestep_(config.timestep()),
       stream_(PlantStream(config.stream)) {
   for (int i = 0; i < config.num_envs; ++i) {
     nominal_plants_.push_back(config.plant(i));
@@ -51,10 +54,10 @@ void RandomConditions::Prepare(int env, Episodes& episodes) {
   Plant& plant = episodes.plants[i];
   Disturbance& disturbance = episodes.disturbances[i];
   plant = randomization_.Draw(nominal_plants_[i], next_[i]);
-  disturbance = randomization_.Draw(nominal_disturbances_[i], next_[i]);
+  disturbance = randomization_.Draw(nominal_disturbances_[i], period_, next_[i]);
   if (posterior_) {
     posterior_->Deviate(plant, disturbance, next_[i]);
-    CheckTimestep(plant, "plant drawn from the posterior");
+    CheckTimestep(plant, "plant drawn from the posterior", timestep_);
   }
   episodes.physics->SetPlant(env, plant);
 }
@@ -70,8 +73,9 @@ void RandomConditions::State(const Archive& archive, Episodes& episodes) {
 
 // ---- Delayed motors.
 
-DelayedMotors::DelayedMotors(int num_envs, int longest)
-    : longest_(static_cast<size_t>(longest)),
+DelayedMotors::DelayedMotors(int num_envs, double control_period, int longest)
+    : period_(control_period),
+      longest_(static_cast<size_t>(longest)),
       queues_(static_cast<size_t>(num_envs) * longest_),
       applied_(static_cast<size_t>(num_envs)) {}
 
@@ -84,7 +88,7 @@ void DelayedMotors::Act(ControlStep& step) {
   for (int env = 0; env < step.num_envs(); ++env) {
     const auto i = static_cast<size_t>(env);
     applied_[i] = step.applied[i];
-    const int delay = episodes.disturbances[i].delay_steps();
+    const int delay = episodes.disturbances[i].delay_steps(period_);
     if (delay == 0 || episodes.is_held(env)) continue;
     // The queue is a ring as long as the delay: the new torque replaces the one that is due now.
     std::swap(applied_[i], Queue(env)[static_cast<size_t>(episodes.steps[i] % delay)]);
@@ -99,7 +103,10 @@ void DelayedMotors::State(const Archive& archive, Episodes& /*episodes*/) {
 // ---- Goals.
 
 PoseGoal::PoseGoal(const PendulumEnvConfig& config)
-    : fixed_(config.goal), built_in_(BuiltInReward(config)), memory_(config.memory) {}
+    : fixed_(config.goal),
+      built_in_(BuiltInReward(config)),
+      scale_(config.scale),
+      memory_(config.memory) {}
 
 void PoseGoal::Place(int env, Episodes& episodes, EpisodeStart& start) {
   int64_t& goal = episodes.goals[static_cast<size_t>(env)];
@@ -125,7 +132,8 @@ void PoseGoal::Judge(ControlStep& step) {
     const auto i = static_cast<size_t>(env);
     const Pose goal = *step.episodes.goal(env);
     const PendulumState state = step.episodes.state(env);
-    const auto terms = RewardTerms(step.episodes.plants[i], state, step.result.torque[i], goal);
+    const auto terms =
+        RewardTerms(step.episodes.plants[i], state, step.result.torque[i], goal, scale_);
     built_in_.Weigh(env, terms, step.result);
     step.result.at_goal[i] = Inverted(SeenFrom(goal, state)) ? 1 : 0;
   }
@@ -144,7 +152,7 @@ void PoseGoal::State(const Archive& archive, Episodes& episodes) {
 // ---- Rewards of your own.
 
 ExpressionReward::ExpressionReward(const PendulumEnvConfig& config)
-    : reward_(config.reward.expression, config.num_envs) {}
+    : reward_(config.reward.expression, config.num_envs, config.control_period) {}
 
 void ExpressionReward::Begin(int env, Episodes& /*episodes*/, std::span<float> /*obs*/) {
   reward_.Begin(env);
@@ -175,7 +183,8 @@ Perception::Perception(const PendulumEnvConfig& config, std::optional<NoisySenso
       stream_(NoiseStream(config.stream)),
       assumed_plant_(config.identified_from ? config.identified_from : config.assumed_plant),
       keeps_true_state_(!sensors_ && !assumed_plant_),
-      builder_(config.num_envs, config.memory, config.identified_from) {}
+      builder_(config.num_envs, config.scale, config.control_period, config.memory,
+               config.identified_from) {}
 
 void Perception::Seed(int env, uint64_t seed) {
   if (sensors_) sensors_->Seed(env, Rng(seed, stream_));
@@ -246,11 +255,11 @@ RewardConfig BuiltInReward(const PendulumEnvConfig& config) {
 std::vector<std::unique_ptr<Stage>> MakeStages(const PendulumEnvConfig& config) {
   const Disturbance largest = LargestDisturbance(config);
   const bool has_expression = !config.reward.expression.empty();
-  const auto steps = std::llround(config.episode_seconds / kControlPeriod);
+  const int64_t steps = PeriodsIn(config.episode_seconds, config.control_period);
   std::optional<NoisySensors> sensors;
   if (largest.any()) {
-    sensors.emplace(config.num_envs, largest.sensors, config.seed, NoiseStream(config.stream),
-                    config.first_index);
+    sensors.emplace(config.num_envs, config.control_period, largest.sensors, config.seed,
+                    NoiseStream(config.stream), config.first_index);
   }
   const bool perceives =
       sensors || config.assumed_plant || config.identified_from || config.memory > 0;
@@ -261,7 +270,8 @@ std::vector<std::unique_ptr<Stage>> MakeStages(const PendulumEnvConfig& config) 
   if (config.randomization.any()) stages.push_back(std::make_unique<RandomConditions>(config));
   // A saved run with a disturbance has the state of both motors and sensors.
   if (largest.any()) {
-    stages.push_back(std::make_unique<DelayedMotors>(config.num_envs, largest.delay_steps()));
+    stages.push_back(std::make_unique<DelayedMotors>(config.num_envs, config.control_period,
+                                                     largest.delay_steps(config.control_period)));
   }
   // Before ExpressionReward, which reads the terms and the goal that PoseGoal judges.
   if (config.any_pose) stages.push_back(std::make_unique<PoseGoal>(config));

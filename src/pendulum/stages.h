@@ -34,6 +34,7 @@ class RandomConditions : public Stage {
   std::optional<Posterior> posterior_;
   std::vector<Plant> nominal_plants_;              // (N)
   std::vector<Disturbance> nominal_disturbances_;  // (N)
+  double period_, timestep_;                       // of control and physics, s
   std::string stream_;
   std::vector<Rng> next_;     // (N) streams for the draws of the next episodes
   std::vector<Rng> current_;  // (N) the same before the draws of the running episodes
@@ -42,8 +43,8 @@ class RandomConditions : public Stage {
 /// Motors that apply a torque some control periods after it is chosen; until then zero.
 class DelayedMotors : public Stage {
  public:
-  /// No episode may have a delay above `longest`, in control periods.
-  DelayedMotors(int num_envs, int longest);
+  /// No episode may have a delay above `longest`, in control periods (s).
+  DelayedMotors(int num_envs, double control_period, int longest);
 
   void Begin(int env, Episodes& episodes, std::span<float> obs) override;
   void Act(ControlStep& step) override;
@@ -54,6 +55,7 @@ class DelayedMotors : public Stage {
     return std::span(queues_).subspan(static_cast<size_t>(env) * longest_, longest_);
   }
 
+  double period_;                // of control, s
   size_t longest_;               // control periods
   std::vector<double> queues_;   // (N × longest) waiting torques, N·m
   std::vector<double> applied_;  // (N) N·m
@@ -74,6 +76,7 @@ class PoseGoal : public Stage {
  private:
   std::optional<Pose> fixed_;  // the goal of every episode; none: drawn
   RewardConfig built_in_;
+  Scale scale_;
   int memory_;
 };
 

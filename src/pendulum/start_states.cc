@@ -15,8 +15,10 @@ constexpr double kPi = std::numbers::pi;
 
 }  // namespace
 
-PendulumState StartStates::Hanging(Rng& rng) const {
-  return {noise * rng.Normal(), noise * rng.Normal(), noise * rng.Normal(), noise * rng.Normal()};
+PendulumState StartStates::Hanging(const Scale& scale, Rng& rng) const {
+  const double velocity = noise * scale.velocity();
+  return {noise * rng.Normal(), noise * rng.Normal(), velocity * rng.Normal(),
+          velocity * rng.Normal()};
 }
 
 PendulumState StartStates::Random(const Plant& plant, const PendulumState& last, Rng& rng) const {

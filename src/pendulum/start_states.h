@@ -1,21 +1,22 @@
 #pragma once
 
 #include "base/rng.h"
-#include "pendulum/plant.h"
+#include "pendulum/scale.h"
 
 namespace upswing {
 
 /// Distribution of start states. A share of the episodes begins in a random state. The others begin
 /// hanging, with normal noise on all four state variables.
 struct StartStates {
-  double noise = 0.1;          // standard deviation, rad and rad/s
+  double noise = 0.1;          // standard deviation, rad and rad/s of the built-in plant
   double random_share = 0;     // share of episodes that begin in a random state
   double random_velocity = 5;  // bound of the uniform velocities of random states, rad/s
   // Seconds of DriveToPose before each random start, which then replaces uniform angles and
   // velocities; 0: none.
   double random_drive = 0;
 
-  PendulumState Hanging(Rng& rng) const;
+  /// Velocities are in units of `scale`.
+  PendulumState Hanging(const Scale& scale, Rng& rng) const;
   /// `last`: the state at the end of the episode before; hanging before the first.
   PendulumState Random(const Plant& plant, const PendulumState& last, Rng& rng) const;
 };

@@ -49,24 +49,33 @@ bool Inverted(const PendulumState& s) {
   return -std::cos(s.q1) >= kCos30 && -std::cos(s.q1 + s.q2) >= kCos30;
 }
 
-std::array<float, kObservationSize> Observe(const Plant& plant, const PendulumState& s) {
+std::array<float, kObservationSize> Observe(const Plant& plant, const PendulumState& s,
+                                            const Scale& scale) {
   const double height = TipHeight(plant, s) / (plant.length1 + plant.length2);
+  const double w1 = s.w1 / (kMaxVelocity1 * scale.velocity());
+  const double w2 = s.w2 / (kMaxVelocity2 * scale.velocity());
   const auto f = [](double x) { return static_cast<float>(x); };
-  return {
-      f(std::cos(s.q1)), f(std::sin(s.q1)),       f(s.w1 / kMaxVelocity1),       f(std::cos(s.q2)),
-      f(std::sin(s.q2)), f(s.w2 / kMaxVelocity2), f(NormalizedEnergy(plant, s)), f(height)};
+  return {f(std::cos(s.q1)),
+          f(std::sin(s.q1)),
+          f(w1),
+          f(std::cos(s.q2)),
+          f(std::sin(s.q2)),
+          f(w2),
+          f(NormalizedEnergy(plant, s)),
+          f(height)};
 }
 
-std::array<double, kRewardTerms> RewardTerms(const Plant& plant, const PendulumState& s,
-                                             double tau) {
+std::array<double, kRewardTerms> RewardTerms(const Plant& plant, const PendulumState& s, double tau,
+                                             const Scale& scale) {
+  const double w1 = s.w1 * scale.time, w2 = s.w2 * scale.time, effort = tau / scale.torque;
   const bool inverted = Inverted(s);
   const double height = TipHeight(plant, s) / (plant.length1 + plant.length2);
   return {
-      std::clamp(NormalizedEnergy(plant, s), 0.0, 1.5),      // energy
-      (height + 1) / 2,                                      // height
-      inverted ? 5.0 : 0.0,                                  // balance
-      inverted ? -0.01 * (s.w1 * s.w1 + s.w2 * s.w2) : 0.0,  // velocity
-      (inverted ? -0.05 : -0.01) * tau * tau,                // torque
+      std::clamp(NormalizedEnergy(plant, s), 0.0, 1.5),  // energy
+      (height + 1) / 2,                                  // height
+      inverted ? 5.0 : 0.0,                              // balance
+      inverted ? -0.01 * (w1 * w1 + w2 * w2) : 0.0,      // velocity
+      (inverted ? -0.05 : -0.01) * effort * effort,      // torque
   };
 }
 

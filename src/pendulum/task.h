@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "pendulum/plant.h"
+#include "pendulum/scale.h"
 
 /// The task of the double pendulum as formulas: observation, reward and goal. MuJoCo trainings call
 /// them; closed_form.cc computes the same for many environments at a time.
@@ -15,9 +15,10 @@ namespace upswing {
 /// The task's name.
 inline constexpr const char* kDoublePendulum = "double-pendulum";
 
-/// An evaluation episode starts near hanging and lasts kEvaluationSeconds. Its return is the sum of
-/// the rewards of the first kReturnSeconds. It succeeds if Inverted holds throughout the last
-/// kHoldSeconds (s).
+/// An evaluation episode of the built-in plant starts near hanging and lasts kEvaluationSeconds.
+/// Its return is the sum of the rewards of the first kReturnSeconds. It succeeds if Inverted holds
+/// throughout the last kHoldSeconds (s). Other plants have multiples of these times, by
+/// Scale::time.
 inline constexpr double kEvaluationSeconds = 20, kReturnSeconds = 10, kHoldSeconds = 10;
 
 /// The links in the energy of observation and reward: thin rods of inertia m l²/12. If the plant
@@ -42,21 +43,24 @@ bool Inverted(const PendulumState& s);
 
 inline constexpr int kObservationSize = 8;
 /// Divisors of the velocities in observations (rad/s), so that all inputs have a similar size. They
-/// are a heuristic: a swing-up from hanging stays well within them.
+/// are a heuristic: a swing-up of the built-in plant from hanging stays well within them. Other
+/// plants have multiples of them, by Scale::velocity.
 inline constexpr double kMaxVelocity1 = 10.0;
 inline constexpr double kMaxVelocity2 = 20.0;
 
 /// The observation [cos q1, sin q1, w1/kMaxVelocity1, cos q2, sin q2, w2/kMaxVelocity2, Ê, ĥ], with
 /// Ê = NormalizedEnergy and ĥ = TipHeight / (l1 + l2). ĥ is within [-1, 1].
-std::array<float, kObservationSize> Observe(const Plant& plant, const PendulumState& s);
+std::array<float, kObservationSize> Observe(const Plant& plant, const PendulumState& s,
+                                            const Scale& scale = {});
 
 inline constexpr int kRewardTerms = 5;
 inline constexpr std::array<const char*, kRewardTerms> kRewardTermNames{
     "energy", "height", "balance", "velocity_penalty", "torque_penalty"};
 
 /// The signed terms of the reward Σ weight · term; all weights are 1 by default. In an environment,
-/// s is the state at the end of a control step and tau (N·m) the motor's torque during it.
-std::array<double, kRewardTerms> RewardTerms(const Plant& plant, const PendulumState& s,
-                                             double tau);
+/// s is the state at the end of a control step and tau (N·m) the motor's torque during it. Both
+/// penalties count velocity and torque in units of `scale`.
+std::array<double, kRewardTerms> RewardTerms(const Plant& plant, const PendulumState& s, double tau,
+                                             const Scale& scale = {});
 
 }  // namespace upswing

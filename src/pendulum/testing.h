@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <span>
@@ -18,22 +19,31 @@ inline constexpr double kPi = std::numbers::pi;
 /// Whether the physics' steps are stable for a plant.
 inline bool IsStable(const Plant& plant) {
   try {
-    CheckTimestep(plant, "plant");
+    CheckTimestep(plant, "plant", kPhysicsTimestep);
   } catch (const Error&) {
     return false;
   }
   return true;
 }
 
-/// A plant with parameters drawn from their whole ranges, without rotors and dry friction, for
+/// A plant with parameters drawn from wide ranges, without rotors and dry friction, for
 /// which the physics' steps are stable. Parameters are uniform on a logarithmic scale, or in the
 /// cube root where a range begins at 0.
 inline Plant RandomPlant(Rng& rng) {
+  constexpr std::array<Range, kMainParameters> kRanges{{{0.01, 100},
+                                                        {0.01, 100},
+                                                        {0.1, 10},
+                                                        {0.1, 10},
+                                                        {0, 100},
+                                                        {0, 100},
+                                                        {0.01, 100},
+                                                        {0.01, 1000}}};
   Plant plant;
-  for (const PlantParameter& parameter : std::span(kPlantParameters).first(kMainParameters)) {
-    const auto& [low, high] = parameter.range;
-    plant.*parameter.value = low > 0 ? std::exp(rng.Uniform(std::log(low), std::log(high)))
-                                     : high * std::pow(rng.Uniform(), 3);
+  for (size_t k = 0; k < kMainParameters; ++k) {
+    const auto& [low, high] = kRanges.at(k);
+    plant.*kPlantParameters.at(k).value = low > 0
+                                              ? std::exp(rng.Uniform(std::log(low), std::log(high)))
+                                              : high * std::pow(rng.Uniform(), 3);
   }
   plant.actuated_joint = std::round(std::exp(rng.Uniform(std::log(1), std::log(2))));
   return IsStable(plant) ? plant : RandomPlant(rng);

@@ -6,12 +6,17 @@
 
 #include "base/error.h"
 #include "base/text.h"
+#include "pendulum/scale.h"
 
 namespace upswing {
 namespace {
 
-constexpr double kStable = 2.785;  // largest decay times step
-constexpr double kShake = 0.2;     // rad/s; slower chatter of dry friction is accepted
+constexpr double kStable = 2.785;  // largest stable decay times step
+constexpr double kResolved = 1;    // largest decay times step that follows the decay within 2%
+// Longest step in natural times of the built-in plant, s. Twice that plant's own step would be too
+// long for it.
+constexpr double kLongestStep = 0.008;
+constexpr double kShake = 0.2;  // rad/s; slower chatter of dry friction is accepted
 
 /// Slope (N·m·s/rad) from rest to kShake.
 double Slope(double damping, double friction) {
@@ -29,6 +34,20 @@ FastestDecay DecayAt(const Manipulator& body, double cos_q2) {
   return {rate, 2, M.det / M.M11};
 }
 
+/// The error that steps of `h` seconds are too long for a plant: its decay is above `largest`
+/// (1/s).
+Error TooStiff(const Plant& plant, const FastestDecay& decay, const std::string& where,
+               double largest, double h) {
+  const bool first = decay.joint == 1;
+  const double damping = first ? plant.damping1 : plant.damping2;
+  const double coulomb = first ? plant.coulomb1 : plant.coulomb2;
+  return BadInput(Concat(where, ": expected friction that stops the joints at a rate of at most ",
+                         largest, "/s, because time steps of ", h,
+                         " s are too long beyond it, got ", decay.rate, "/s: damping", decay.joint,
+                         " = ", damping, " N·m·s/rad and coulomb", decay.joint, " = ", coulomb,
+                         " N·m act on ", decay.inertia, " kg·m²"));
+}
+
 }  // namespace
 
 FastestDecay FastestDecayOf(const Manipulator& body) {
@@ -40,19 +59,27 @@ FastestDecay FastestDecayOf(const Manipulator& body) {
 
 void CheckTimestep(const Plant& plant, const std::string& where, double h) {
   const FastestDecay decay = FastestDecayOf(ManipulatorOf(plant));
-  const double largest = kStable / h;
-  if (decay.rate <= largest) return;
-  const bool first = decay.joint == 1;
-  const double damping = first ? plant.damping1 : plant.damping2;
-  const double coulomb = first ? plant.coulomb1 : plant.coulomb2;
-  throw BadInput(Concat(where, ": expected friction that stops the joints at a rate of at most ",
-                        largest, "/s, because time steps of ", h, " s are unstable beyond it, got ",
-                        decay.rate, "/s: damping", decay.joint, " = ", damping,
-                        " N·m·s/rad and coulomb", decay.joint, " = ", coulomb, " N·m act on ",
-                        decay.inertia, " kg·m²"));
+  if (decay.rate * h <= kStable) return;
+  throw TooStiff(plant, decay, where, kStable / h, h);
 }
 
-void CheckTimestep(const Plant& nominal, const Randomization& random, const std::string& where) {
+int PhysicsStepsFor(const Plant& plant, double period, const std::string& where) {
+  const double time = ScaleOf(plant).time;
+  const double longest = kLongestStep * time;
+  const FastestDecay decay = FastestDecayOf(ManipulatorOf(plant));
+  int steps = kPhysicsSteps;
+  const double usual = kPhysicsTimestep * std::min(1.0, time);
+  while (steps > 1 && period <= usual * steps / 2) steps /= 2;
+  const auto resolves = [&] {
+    return period <= longest * steps && decay.rate * period <= kResolved * steps;
+  };
+  while (!resolves() && steps < kMostPhysicsSteps) steps *= 2;
+  if (decay.rate * period <= kResolved * steps) return steps;
+  throw TooStiff(plant, decay, where, kResolved * steps / period, period / steps);
+}
+
+int PhysicsStepsFor(const Plant& nominal, const Randomization& random, double period,
+                    const std::string& where) {
   constexpr int kSteps = 4;  // of each length, which has no worst end
   const auto share = [&](double Plant::*parameter) {
     for (size_t k = 0; k < random.plant.size(); ++k) {
@@ -67,15 +94,17 @@ void CheckTimestep(const Plant& nominal, const Randomization& random, const std:
     plant.*damping *= 1 + share(damping);
   }
   const double share1 = share(&Plant::length1), share2 = share(&Plant::length2);
+  int most = 1;
   for (int i = 0; i <= kSteps; ++i) {
     for (int j = 0; j <= kSteps; ++j) {
       plant.length1 = nominal.length1 * (1 + share1 * (2.0 * i / kSteps - 1));
       plant.length2 = nominal.length2 * (1 + share2 * (2.0 * j / kSteps - 1));
-      CheckTimestep(plant, where);
+      most = std::max(most, PhysicsStepsFor(plant, period, where));
       if (share2 == 0) break;
     }
     if (share1 == 0) break;
   }
+  return most;
 }
 
 }  // namespace upswing

@@ -5,9 +5,9 @@
 #include "pendulum/equations.h"
 #include "pendulum/randomization.h"
 
-/// The time step of the simulation against the fastest decay of a plant. A Runge-Kutta step of `h`
-/// seconds is unstable for velocities that decay at more than 2.785 / h: Hairer, Wanner, "Solving
-/// Ordinary Differential Equations II" (1996), section IV.2.
+/// The time step of the simulation against the swing and the fastest decay of a plant. A
+/// Runge-Kutta step of `h` seconds is unstable for velocities that decay at more than 2.785 / h:
+/// Hairer, Wanner, "Solving Ordinary Differential Equations II" (1996), section IV.2.
 namespace upswing {
 
 /// How fast friction stops the joints.
@@ -24,8 +24,15 @@ FastestDecay FastestDecayOf(const Manipulator& body);
 
 /// Throws BadInput, with a message that begins with `where`, if Runge-Kutta steps of `h` seconds
 /// are unstable for this plant.
-void CheckTimestep(const Plant& plant, const std::string& where, double h = kPhysicsTimestep);
-/// The same for all plants that the box of `random` contains. A posterior is not checked.
-void CheckTimestep(const Plant& nominal, const Randomization& random, const std::string& where);
+void CheckTimestep(const Plant& plant, const std::string& where, double h);
+
+/// Number of Runge-Kutta steps in a control period of `period` seconds that resolve the plant's
+/// swing and its fastest decay: a power of 2, and kPhysicsSteps for the built-in plant. Throws
+/// BadInput, with a message that begins with `where`, if more than kMostPhysicsSteps are necessary.
+int PhysicsStepsFor(const Plant& plant, double period, const std::string& where);
+/// The same for all plants that the box of `random` contains. A posterior is not considered.
+int PhysicsStepsFor(const Plant& nominal, const Randomization& random, double period,
+                    const std::string& where);
+inline constexpr int kMostPhysicsSteps = 1024;
 
 }  // namespace upswing

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "base/error.h"
 #include "pendulum/runge_kutta.h"
@@ -14,9 +15,9 @@
 namespace upswing {
 namespace {
 
-std::string ProblemOf(const Plant& plant, const Randomization& random = {}) {
+std::string ProblemOf(const Plant& plant, double h = kPhysicsTimestep) {
   try {
-    CheckTimestep(plant, random, "plant");
+    CheckTimestep(plant, "plant", h);
   } catch (const Error& error) {
     return error.what();
   }
@@ -56,12 +57,15 @@ bool IsUnstable(const Plant& plant, double h, Rng rng) {
   return false;
 }
 
-TEST(Timestep, ThePlantsOfTheProgramAreStable) {
+int StepsFor(const Plant& plant, const Randomization& random = {}) {
+  return PhysicsStepsFor(plant, random, kControlPeriod, "plant");
+}
+
+TEST(Timestep, ThePlantsOfTheProgramHaveTheUsualSteps) {
   Randomization box;
+  EXPECT_EQ(StepsFor(Plant()), kPhysicsSteps);
   box.plant.fill(0.25);
-  EXPECT_EQ(ProblemOf(Plant(), box), "");
-  box.plant.fill(0.9);
-  EXPECT_EQ(ProblemOf(Plant(), box), "");
+  EXPECT_EQ(StepsFor(Plant(), box), kPhysicsSteps);
   // The machine of RealAIGym: much dry friction on light links.
   Plant machine;
   machine.mass1 = 0.52;
@@ -76,38 +80,107 @@ TEST(Timestep, ThePlantsOfTheProgramAreStable) {
   machine.damping1 = machine.damping2 = 0.001;
   machine.coulomb1 = 0.16;
   machine.coulomb2 = 0.12;
-  box.plant.fill(0.25);
-  EXPECT_EQ(ProblemOf(machine, box), "");
+  EXPECT_EQ(StepsFor(machine), kPhysicsSteps);
 }
 
-TEST(Timestep, APlantIsRefusedWithTheNumberThatIsWrong) {
+TEST(Timestep, StrongFrictionOnALightLinkHasShorterSteps) {
   Plant light;
   light.mass2 = 0.05;
   light.length2 = 0.2;
   light.damping2 = 0.5;
   light.armature = 1e-4;
-  const std::string problem = ProblemOf(light);
-  EXPECT_TRUE(
-      problem.starts_with("plant: expected friction that stops the joints at a rate of at "
-                          "most 557/s, because time steps of 0.005 s are unstable beyond "
-                          "it, got "))
-      << problem;
-  EXPECT_NE(problem.find("/s: damping2 = 0.5 N·m·s/rad and coulomb2 = 0 N·m act on "),
-            std::string::npos)
-      << problem;
+  EXPECT_NE(ProblemOf(light), "");
   EXPECT_TRUE(IsUnstable(light, kPhysicsTimestep, Rng(1, "test")));
+  EXPECT_EQ(StepsFor(light), 16);
+  EXPECT_FALSE(IsUnstable(light, kControlPeriod / 16, Rng(1, "test")));
   light.damping2 = 0.01;
-  EXPECT_EQ(ProblemOf(light), "");
+  EXPECT_EQ(StepsFor(light), kPhysicsSteps);
   // Dry friction counts, and the worst corner of a box.
   light.coulomb2 = 0.5;
-  EXPECT_NE(ProblemOf(light).find("coulomb2 = 0.5"), std::string::npos);
+  EXPECT_GT(StepsFor(light), kPhysicsSteps);
   Plant damped;
-  damped.damping2 = 12;
-  EXPECT_EQ(ProblemOf(damped), "");
+  damped.damping2 = 4;
+  EXPECT_EQ(StepsFor(damped), kPhysicsSteps);
   Randomization box;
   box.plant.fill(0.9);
-  EXPECT_NE(ProblemOf(damped, box), "");
-  EXPECT_THROW(CheckTimestep(damped, "plant", 0.05), Error);
+  EXPECT_GT(StepsFor(damped, box), kPhysicsSteps);
+}
+
+TEST(Timestep, APlantThatIsTooStiffIsRefusedWithTheNumberThatIsWrong) {
+  Plant stiff;
+  stiff.damping2 = 1e5;
+  try {
+    (void)StepsFor(stiff);
+    FAIL();
+  } catch (const Error& error) {
+    const std::string problem = error.what();
+    EXPECT_TRUE(
+        problem.starts_with("plant: expected friction that stops the joints at a rate of "
+                            "at most 51200/s, because time steps of "))
+        << problem;
+    EXPECT_NE(problem.find("/s: damping2 = 100000 N·m·s/rad and coulomb2 = 0 N·m act on "),
+              std::string::npos)
+        << problem;
+  }
+}
+
+TEST(Timestep, StepsFollowTheSizeOfThePlantAndThePeriod) {
+  // Links of a tenth of the length swing in 0.3 of the time.
+  for (const auto& [length, steps] : {std::pair(0.5, 4), {0.25, 4}, {0.05, 8}, {5.0, 4}}) {
+    Plant sized;
+    sized.armature = 0;
+    sized.damping1 = sized.damping2 = 0;
+    sized.length1 = sized.length2 = length;
+    EXPECT_EQ(StepsFor(sized), steps) << length;
+  }
+  for (const auto& [period, steps] : {std::pair(0.001, 1), {0.005, 1}, {0.01, 2}, {0.1, 16}}) {
+    EXPECT_EQ(PhysicsStepsFor(Plant(), period, "plant"), steps) << period;
+  }
+}
+
+/// The state after `periods` control periods of `steps` Runge-Kutta steps each, without torque.
+PendulumState After(const Manipulator& body, PendulumState s, int periods, int steps) {
+  const double h = kControlPeriod / steps;
+  const auto acceleration = [&](const PendulumState& at, double /*share*/) {
+    return body.Acceleration(at, {0, 0});
+  };
+  for (int i = 0; i < periods * steps; ++i) {
+    s = RungeKuttaStep(s, acceleration(s, 0), h, acceleration);
+  }
+  return s;
+}
+
+TEST(Timestep, StepsAreShortEnoughOverNineDecadesOfFriction) {
+  Rng rng(1, "test");
+  const auto spread = [&](double low, double high) {
+    return low * std::exp(std::log(high / low) * rng.Uniform());
+  };
+  int refused = 0;
+  double largest = 0;  // error of an angle, rad
+  for (int n = 0; n < 200; ++n) {
+    Plant plant;
+    plant.mass1 = spread(0.01, 10);
+    plant.mass2 = spread(0.01, 10);
+    plant.length1 = spread(0.1, 1);
+    plant.length2 = spread(0.1, 1);
+    plant.damping1 = spread(1e-6, 1e3);
+    plant.damping2 = spread(1e-6, 1e3);
+    plant.armature = spread(1e-5, 0.1);
+    int steps = 0;
+    try {
+      steps = StepsFor(plant);
+    } catch (const Error&) {
+      ++refused;
+      continue;
+    }
+    const Manipulator body = ManipulatorOf(plant);
+    const PendulumState start{rng.Uniform(-kPi, kPi), rng.Uniform(-kPi, kPi), 0, 0};
+    const PendulumState got = After(body, start, 10, steps);
+    const PendulumState truth = After(body, start, 10, 8 * steps);
+    largest = std::max({largest, std::abs(got.q1 - truth.q1), std::abs(got.q2 - truth.q2)});
+  }
+  EXPECT_LT(refused, 40);
+  EXPECT_LT(largest, 2e-4);
 }
 
 TEST(Timestep, RefusalAndNonsenseCoincide) {

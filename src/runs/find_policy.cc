@@ -55,6 +55,29 @@ PlantFile ChangeDesignPlant(const PolicyArguments& a, Plant& plant) {
   return file;
 }
 
+/// Designs the controller that the arguments name.
+LoadedPolicy DesignNamed(const PolicyArguments& a) {
+  ControllerConfig asked;
+  SetFlags(OptionsOf(asked), a.flags);
+  DesignPlant plant;
+  std::shared_ptr<const Policy> swing_up;
+  if (!asked.swing_up.empty()) {
+    const LoadedPolicy loaded = SwingUpNamed(asked.swing_up);
+    plant = {loaded.plant, loaded.control_period()};
+    swing_up = loaded.policy;
+  }
+  const PlantFile made_for = ChangeDesignPlant(a, plant);
+  if (a.control_period > 0) {
+    plant.control_period = a.control_period;
+  } else if (!swing_up) {
+    plant.control_period = kControlPeriod * TaskScaleOf(plant).time;
+  }
+  ControllerConfig config = ControllerConfig::For(plant);
+  SetFlags(OptionsOf(config), a.flags);
+  config.swing_up_policy = swing_up;
+  return DesignController(a.name, config, TitleOf(a.name, config, made_for.name, made_for.plant));
+}
+
 /// Throws BadInput if a setting belongs to no controller in `names`.
 void CheckSettings(const PolicyArguments& settings, const std::vector<std::string>& names) {
   const std::string got = names.empty() ? "none" : Join(names, ", ");
@@ -73,6 +96,22 @@ void CheckSettings(const PolicyArguments& settings, const std::vector<std::strin
     throw BadInput(
         Concat(FlagOf(flag.name), ": expected the controller ", section, " with it, got ", got));
   }
+}
+
+/// The policy for its own plant.
+LoadedPolicy GetForOwnPlant(const PolicyArguments& a) {
+  CheckSettings(a, a.name.empty() ? std::vector<std::string>() : std::vector{a.name});
+  const bool is_controller = IsController(a.name), is_path = fs::exists(a.name);
+  if (is_controller && is_path) {
+    throw BadInput(Concat(a.name, ": expected a controller or a file, got the name of both; ./",
+                          a.name, " means the file; rename the file to use the controller"));
+  }
+  if (is_controller) return DesignNamed(a);
+  LoadedPolicy loaded = LoadPolicy(a.name);
+  if (a.control_period == 0 || a.control_period == loaded.control_period()) return loaded;
+  throw BadInput(Concat("--control-period: expected ", FormatNumber(loaded.control_period()),
+                        " s, the control period of ", Printable(loaded.name), ", got ",
+                        FormatNumber(a.control_period)));
 }
 
 }  // namespace
@@ -101,6 +140,8 @@ std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
   std::set<fs::path> seen;  // files, and names of controllers
   for (const std::string& name : names) {
     PolicyArguments one{name, {}, {}};
+    one.control_period = controllers.control_period;
+    one.used_on = controllers.used_on;
     if (IsController(name)) {
       one.made_for = controllers.made_for;
       std::ranges::copy_if(controllers.flags, std::back_inserter(one.flags),
@@ -119,35 +160,30 @@ std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
 }
 
 LoadedPolicy GetPolicy(const PolicyArguments& a) {
-  CheckSettings(a, a.name.empty() ? std::vector<std::string>() : std::vector{a.name});
-  ControllerConfig config;
-  SetFlags(OptionsOf(config), a.flags);
-  if (!config.swing_up.empty()) {
-    const LoadedPolicy swing_up = SwingUpNamed(config.swing_up);
-    config.plant = swing_up.plant;
-    config.swing_up_policy = swing_up.policy;
-  }
-  const PlantFile made_for = ChangeDesignPlant(a, config.plant);
-  const bool is_controller = IsController(a.name), is_path = fs::exists(a.name);
-  if (is_controller && is_path) {
-    throw BadInput(Concat(a.name, ": expected a controller or a file, got the name of both; ./",
-                          a.name, " means the file; rename the file to use the controller"));
-  }
-  if (is_controller) {
-    return DesignController(a.name, config, TitleOf(a.name, config, made_for.name, made_for.plant));
-  }
-  return LoadPolicy(a.name);
+  LoadedPolicy loaded = GetForOwnPlant(a);
+  if (!a.used_on || loaded.is_foreign()) return loaded;
+  return ForOtherSize(loaded, *a.used_on).value_or(loaded);
 }
 
 LoadedPolicy DesignController(const std::string& name, const ControllerConfig& config,
                               const std::string& title) {
   const auto design_for = [name, config](const Plant& plant) {
     ControllerConfig other = config;
-    other.plant = plant;
+    const Scale ratio = CarryOver(config.plant, plant);
+    if (ratio != Scale()) other = config.In(ratio);
+    static_cast<Plant&>(other.plant) = plant;
     return MakeController(name, other);
   };
-  return {title,        "",         design_for(config.plant), kDoublePendulum,
-          config.plant, design_for, config.swing_up_policy};
+  const Scale scale = config.swing_up_policy == nullptr ? TaskScaleOf(config.plant)
+                                                        : ScaleIn(config.swing_up_policy->info());
+  return {.name = title,
+          .path = "",
+          .policy = MakeController(name, config),
+          .task = kDoublePendulum,
+          .plant = config.plant,
+          .scale = scale,
+          .design_for = design_for,
+          .swing_up = config.swing_up_policy};
 }
 
 LoadedPolicy LoadPolicy(const fs::path& path) {

@@ -192,7 +192,13 @@ UPSWING_EXPORT(policy_open) Controller* PolicyOpen(const std::byte* file, size_t
           "expected a policy for links that are solid capsules and the usual armature, as in the "
           "page, got others");
     }
-    CheckTimestep(controller->loaded.plant, "plant");
+    CheckTimestep(controller->loaded.plant, "plant", kPhysicsTimestep);
+    if (controller->loaded.control_period() != kControlPeriod ||
+        controller->loaded.scale != Scale()) {
+      throw BadInput(
+          "expected a policy that decides every 0.02 s, for a plant of about the page's size, got "
+          "another");
+    }
     SetText(About(*controller, tensors.metadata));
     return controller.release();
   });
@@ -308,7 +314,7 @@ UPSWING_EXPORT(pendulum_at) void PendulumAt() {
 /// Input: PlantFields. 1 if the physics is stable for it.
 UPSWING_EXPORT(pendulum_check) int PendulumCheck() {
   return Guarded([] {
-    CheckTimestep(Input<PlantFields>().plant, "plant");
+    CheckTimestep(Input<PlantFields>().plant, "plant", kPhysicsTimestep);
     return 1;
   });
 }
@@ -322,7 +328,7 @@ UPSWING_EXPORT(pendulum_step) void PendulumStep() {
 
 /// An estimator of the plant of one pendulum, from its nominal PlantFields.
 UPSWING_EXPORT(identifier_open) Identifier* IdentifierOpen() {
-  return std::make_unique<Identifier>(Input<PlantFields>().plant, 1).release();
+  return std::make_unique<Identifier>(Input<PlantFields>().plant, kControlPeriod, 1).release();
 }
 
 UPSWING_EXPORT(identifier_close) void IdentifierClose(Identifier* identifier) { delete identifier; }

@@ -13,10 +13,10 @@ static inline void policy_observe(policy_state *state, float q1, float q2, float
 #endif
   observation[0] = c1;
   observation[1] = s1;
-  observation[2] = w1 / 10.0f;
+  observation[2] = w1 / POLICY_MAX_VELOCITY1;
   observation[3] = c2;
   observation[4] = s2;
-  observation[5] = w2 / 20.0f;
+  observation[5] = w2 / POLICY_MAX_VELOCITY2;
   /* Kinetic and potential energy: 0 hanging at rest, 1 upright at rest. */
   observation[6] =
       0.5f + k[0] * w1 * w1 + k[1] * w12 * w12 + k[2] * c2 * w1 * w12 + k[3] * c1 + k[4] * c12;
@@ -26,9 +26,9 @@ static inline void policy_observe(policy_state *state, float q1, float q2, float
   /* What the past steps did, the latest first. */
   if (state->running) {
     for (i = POLICY_MEMORY_SIZE - 1; i >= 3; i--) state->memory[i] = state->memory[i - 3];
-    state->memory[0] = (w1 - state->w1) / 1.0f;
-    state->memory[1] = (w2 - state->w2) / 1.0f;
-    state->memory[2] = state->torque / 5.0f;
+    state->memory[0] = (w1 - state->w1) / POLICY_MEMORY_VELOCITY;
+    state->memory[1] = (w2 - state->w2) / POLICY_MEMORY_VELOCITY;
+    state->memory[2] = state->torque / POLICY_MEMORY_TORQUE;
   }
   for (i = 0; i < POLICY_MEMORY_SIZE; i++) observation[8 + i] = state->memory[i];
   state->running = 1;

@@ -87,6 +87,7 @@ int Drive(const RunArguments& a, const MachinePolicy& policy, const std::optiona
   const int joint = static_cast<int>(RobotOf(*policy));
   const auto hz = std::llround(a.hz);
   const double period = 1 / a.hz;
+  const double decides = static_cast<double>(CyclesIn(policy->control_period(), hz)) * period;
   // A first call of another controller touches memory that is not there yet.
   ControllerOf(policy)(0, {});
   MachineController controller = ControllerOf(policy);
@@ -119,6 +120,11 @@ int Drive(const RunArguments& a, const MachinePolicy& policy, const std::optiona
   LogWriter log(a.log);
   fmt::print("{} on {}, {} Hz, {}\n", Printable(policy->name), Printable(a.link), a.hz,
              NameOf(RobotOf(*policy)));
+  if (std::abs(decides - policy->control_period()) > 1e-6) {
+    fmt::print(
+        "  decides every {:.4g} s, a whole number of cycles; the policy was made for {:.4g} s\n",
+        decides, policy->control_period());
+  }
   if (!link.simulated()) {
     const std::string missing = EnterRealTime();
     if (!missing.empty()) fmt::print("  not permitted: {}; cycles may be late\n", missing);
@@ -159,7 +165,7 @@ int RunRun(const RunArguments& a) {
     throw BadInput("--draw: expected a twin with [covariance] as --link, got none");
   if (!twin && a.compensation > 0)
     throw BadInput("--compensation: expected --twin with it, got none");
-  const MachinePolicy policy = GetMachinePolicy(a.policy, a.robot, twin);
+  const MachinePolicy policy = GetMachinePolicy(a.policy, a.robot, twin, std::llround(a.hz));
   if (twin) CompareWithTwin(*policy, *twin);
   return Drive(a, policy, twin, address);
 }

@@ -128,7 +128,7 @@ TEST(Faults, LeaveLittleEnergyAndAreNoticed) {
   const std::vector<int64_t> rates =
       wanted == nullptr ? std::vector<int64_t>{500} : std::vector<int64_t>{250, 500, 1000};
   const Twin twin = ReadTwin("realaigym-twin", "twin");
-  const MachinePolicy policy = GetMachinePolicy({"tvlqr", {}, {}}, "", twin);
+  const MachinePolicy policy = GetMachinePolicy({"tvlqr", {}, {}}, "", twin, 500);
   for (const bool has_twin : {true, false}) {
     for (const FaultCase& fault : FaultCases()) {
       Outcome worst;

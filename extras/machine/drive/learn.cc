@@ -59,6 +59,7 @@ struct Choice {
 /// link.
 std::vector<Candidate> CandidatesFor(const Plant& plant) {
   constexpr double kUsualCompensation = 0.95;
+  // The settings are those for the size of RealAIGym's boards.
   ControllerConfig usual;
   usual.plant = WithoutDryFriction(plant);
 
@@ -400,7 +401,7 @@ class LearningSession {
       for (const Candidate& candidate : CandidatesFor(twin_.plant)) {
         try {
           const PolicyArguments arguments = ArgumentsOf(candidate, twin_.plant);
-          const MachinePolicy policy = GetMachinePolicy(arguments, "", twin_);
+          const MachinePolicy policy = GetMachinePolicy(arguments, "", twin_, std::llround(c_.hz));
           const int held = HeldBy(policy, candidate.compensation);
           say_(fmt::format("design: {}: {} of {} machines of the twin", candidate.controller, held,
                            kDraws));

@@ -1,6 +1,7 @@
 #include "extras/machine/drive/policy_controller.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -19,7 +20,7 @@ class PolicyController {
         obs_(static_cast<size_t>(policy_->policy->obs_size())),
         before_(obs_.size()),
         memory_(policy_->policy->Start(1)),
-        builder_(1, policy_->memory(),
+        builder_(1, policy_->scale, policy_->control_period(), policy_->memory(),
                  policy_->identifies() ? std::optional(policy_->plant) : std::nullopt) {}
 
   double Torque(int64_t step, const PendulumState& state) {
@@ -62,11 +63,17 @@ Plant WithoutDryFriction(Plant plant) {
 }
 
 MachinePolicy GetMachinePolicy(PolicyArguments a, const std::string& robot,
-                               const std::optional<Twin>& twin) {
+                               const std::optional<Twin>& twin, int64_t hz) {
   const std::optional<Robot> asked = ParseRobot(robot);
   if (twin) {
     a.plant = WithoutDryFriction(twin->plant);
     if (asked) a.plant->actuated_joint = static_cast<int>(*asked);
+    a.used_on = a.plant;
+    if (IsController(a.name) && a.control_period == 0) {
+      const double period = kControlPeriod * TaskScaleOf(*a.plant).time;
+      const double cycles = std::max(1.0, std::round(period * static_cast<double>(hz)));
+      a.control_period = cycles / static_cast<double>(hz);
+    }
   }
   auto policy = std::make_shared<const LoadedPolicy>(GetPolicy(a));
   ExpectPendulum(*policy);
@@ -78,8 +85,12 @@ MachinePolicy GetMachinePolicy(PolicyArguments a, const std::string& robot,
 }
 
 MachineController ControllerOf(MachinePolicy policy) {
-  return [controller = std::make_shared<PolicyController>(std::move(policy))](
-             int64_t step, const PendulumState& state) { return controller->Torque(step, state); };
+  const double period = policy->control_period();
+  const auto law = [controller = std::make_shared<PolicyController>(std::move(policy))](
+                       int64_t step, const PendulumState& state) {
+    return controller->Torque(step, state);
+  };
+  return {law, period};
 }
 
 }  // namespace upswing::machine

@@ -31,13 +31,14 @@ inline Robot RobotOf(const LoadedPolicy& policy) {
 Plant WithoutDryFriction(Plant plant);
 
 /// The policy that the arguments name, for this robot ("": the policy's own, a controller's that of
-/// the twin). With `twin`, a controller is designed for its plant without dry friction. Throws
-/// BadInput.
+/// the twin), in a loop with `hz` cycles per second. With `twin`, a controller is designed for its
+/// plant without dry friction, and for a whole number of cycles; a policy of another size is
+/// carried over (ForOtherSize). Throws BadInput.
 MachinePolicy GetMachinePolicy(PolicyArguments a, const std::string& robot,
-                               const std::optional<Twin>& twin = {});
+                               const std::optional<Twin>& twin, int64_t hz);
 
-/// A policy as the controller of one machine. It acts every 20 ms, on PendulumEnv's observations of
-/// the policy's design plant.
+/// A policy as the controller of one machine. It acts once in its control period, on PendulumEnv's
+/// observations of the policy's design plant.
 MachineController ControllerOf(MachinePolicy policy);
 
 }  // namespace upswing::machine

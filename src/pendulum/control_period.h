@@ -1,0 +1,15 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace upswing {
+
+/// Number of control periods of `period` seconds in `seconds`, rounded to the nearest.
+int64_t PeriodsIn(double seconds, double period);
+
+/// Throws BadInput, with a message that begins with `name`, unless `seconds` is a whole number of
+/// control periods of `period` seconds, up to rounding.
+void ExpectWholePeriods(const std::string& name, double seconds, double period);
+
+}  // namespace upswing
