@@ -98,7 +98,7 @@ void DrawSamples(const LoadedPolicy& loaded, double tolerance, std::vector<float
 
 /// The deviations from upright one control period after the samples.
 std::vector<float> StepsFrom(const std::vector<float>& states, const std::vector<float>& torques,
-                             const Plant& plant) {
+                             const DesignPlant& plant) {
   PendulumModel model(plant);
   std::vector<float> steps;
   for (size_t i = 0; i < torques.size(); ++i) {
@@ -130,6 +130,8 @@ void AddCatch(const LoadedPolicy& loaded, const LqrCatch& upright, CParts& parts
       {"upright_cost", "of a deviation from upright", Floats(Triangle(upright.lqr().P))});
   parts.constants.push_back({"region", "of attraction", Floats(std::array{upright.region()})});
   parts.macros.emplace_back("LOOK_AHEAD", Concat(upright.steps(), " /* control periods */"));
+  const int steps = DesignPlant(plant, loaded.control_period()).physics_steps();
+  parts.macros.emplace_back("PHYSICS_STEPS", Concat(steps, " /* of a simulated period */"));
   parts.macros.emplace_back("ACTUATED_JOINT", Concat(plant.actuated_joint));
 }
 
@@ -256,8 +258,8 @@ void AddSelfTest(const LoadedPolicy& loaded, const Plant& plant, bool simulates,
   DrawSamples(loaded, tolerance, states, torques);
   parts.samples = {{"sample_states", "q1, q2, w1, w2", states}, {"sample_torques", "N m", torques}};
   if (simulates) {
-    parts.samples.push_back(
-        {"sample_steps", "deviations a control period later", StepsFrom(states, torques, plant)});
+    parts.samples.push_back({"sample_steps", "deviations a control period later",
+                             StepsFrom(states, torques, {plant, loaded.control_period()})});
   }
   parts.macros.emplace_back("SAMPLES", Concat(kLawSamples));
   parts.macros.emplace_back("TORQUE_TOLERANCE", CLiteral(static_cast<float>(tolerance)));

@@ -54,7 +54,7 @@ void Config::Describe(Options& o) {
 void Config::DescribeEnvironment(Options& o) {
   o.Section("task");
   o.Add(&control_period, "control_period", {kShortestPeriod, kLongestPeriod}, "s",
-        "time for which the agent holds a torque");
+        "time for which the agent holds a torque; gamma follows it unless you give one");
   constexpr Range kScale{1e-6, 1e6};
   o.Add(&time_scale, "time_scale", kScale, "",
         "natural time of the plant over that of the built-in plant; by it, times and velocities in "

@@ -1,5 +1,6 @@
 // The layers of a training's settings: defaults, named agent, configuration file, flags.
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "agents/config.h"
@@ -145,6 +146,16 @@ void FitToPlant(const Options& options, const Plant& designed,
   multiply("torque_scale", ratio.torque);
 }
 
+/// Keeps the time that the agent looks ahead, 1 / (1 - gamma) control periods, if the user gives
+/// another control period than `usual` (s) and no gamma.
+void FitToPeriod(const Options& options, double usual,
+                 const std::function<bool(const Option&)>& is_given, const Config& config) {
+  const Option& gamma = *options.Get("gamma");
+  if (config.control_period == usual || is_given(gamma)) return;
+  gamma.Set(FormatNumber(std::pow(gamma.number(), config.control_period / usual)),
+            "control_period");
+}
+
 /// Turns `mirror` off for a reward that is not symmetric. Throws BadInput if the user set it, at
 /// `place`.
 void FitToReward(const Options& options, const std::string& place, const Config& config) {
@@ -220,6 +231,7 @@ Config ParseConfig(std::string_view text, const std::string& where,
     ApplyTable(options, agent.settings, agent.place, false);
   }
   const Plant designed = config.plant;
+  const double designed_period = config.control_period;
   ApplyTable(options, table, where, false);
   SetFlags(options, flags);
   config.agent = agent.name;  // whatever its own file says
@@ -231,6 +243,8 @@ Config ParseConfig(std::string_view text, const std::string& where,
       return !FindEarly(option.section, option.name, table, where, flags).where.empty();
     };
     FitToPlant(options, designed, is_given, config);
+    const double usual = designed_period * CarryOver(designed, config.plant).time;
+    if (is_given(*options.Get("control_period"))) FitToPeriod(options, usual, is_given, config);
   }
   CheckSettings(config, where);
   // Last, because only the reward of a checked configuration can be evaluated.

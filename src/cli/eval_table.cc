@@ -115,8 +115,16 @@ ComparisonRow DifferencesRow(const EvalReport& report, const EvalReport& first) 
 
 /// Prints the plant and the other conditions.
 void PrintConditions(const EvalReport& report) {
-  fmt::print("  plant          {}, physics {}\n", PlantText(report.env.plant(0)),
-             report.env.engine->name);
+  const Plant& plant = report.env.plant(0);
+  std::string text = PlantText(plant);
+  if (plant.armature == kArmature) text += Concat(", armature ", kArmature);
+  fmt::print("  plant          {}, physics {}\n", text, report.env.engine->name);
+  if (!report.left_out.empty()) {
+    fmt::print("  defaults       {}; the plant file leaves them out\n", report.left_out);
+  }
+  if (report.env.control_period != kControlPeriod) {
+    fmt::print("  decisions      every {:.4g} s\n", report.env.control_period);
+  }
   const std::string changes = ChangesText(report.env);
   if (!changes.empty()) fmt::print("  {:<15}{}\n", "with", changes);
 }

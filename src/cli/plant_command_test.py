@@ -282,7 +282,7 @@ class Unfit(PlantCommandTest):
         self.no_plant(pins, "motions of 1 s differ from MuJoCo's by at most", "expected at most 1e-06", code=1)
 
     def test_numbers_out_of_range(self):
-        self.no_plant(model(links=("0 0 -12", "0 0 -0.5")), "plant of model.xml", "length1", "12")
+        self.no_plant(model(links=("0 0 -120", "0 0 -0.5")), "plant of model.xml", "length1", "120")
 
 
 class Strangers(PlantCommandTest):

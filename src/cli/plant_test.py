@@ -47,7 +47,7 @@ class PlantTest(ProgramTest):
         self.write("stiff.toml", "[plant]\n" + "".join(f"{k} = {v}\n" for k, v in stiff.items()))
         made_for = [word for k, v in stiff.items() for word in ("--made-for", f"{k}={v}")]
         words = ("plant: expected friction that stops the joints at a rate of at most 51200/s, because "
-                 "time steps of 1.95313e-05 s are too long beyond it, got 63345.5/s: damping2 = 50 N·m·s/rad "
+                 "time steps of 1.95313e-05 s are too long beyond it, got 63321.7/s: damping2 = 50 N·m·s/rad "
                  "and coulomb2 = 0 N·m act on 0.000789622 kg·m²")
         for command in (["simulate"], ["eval", "fast"], ["eval", "tvlqr"], ["plot", "mpc"],
                         ["view", "lqr", "--record", "x.png"],

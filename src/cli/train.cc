@@ -11,12 +11,14 @@
 #include "base/text.h"
 #include "cli/commands.h"
 #include "cli/compare_report.h"
+#include "cli/say.h"
 #include "cli/signals.h"
 #include "cli/train_many.h"
 #include "cli/train_view.h"
 #include "os/host.h"
 #include "os/streams.h"
 #include "runs/config_files.h"
+#include "runs/plant_file.h"
 #include "runs/seeds.h"
 #include "runs/training_run.h"
 
@@ -76,6 +78,10 @@ int RunTrain(const TrainArguments& arguments) {
   const std::unique_ptr<TrainingRun> run =
       config ? TrainingRun::Make(arguments.out, std::move(*config))
              : TrainingRun::Resume(arguments.resume, arguments.flags);
+  if (!arguments.plant.empty()) {
+    const std::string left_out = ReadPlantFile(arguments.plant).left_out;
+    if (!left_out.empty()) Say("Defaults that the plant file leaves out: {}\n", left_out);
+  }
   return TrainAndShow(*run) ? 0 : 128 + StopSignal();
 }
 

@@ -13,6 +13,7 @@
 #include "pendulum/observation.h"
 #include "pendulum/upright_modes.h"
 #include "runs/find_policy.h"
+#include "runs/plant_file.h"
 
 namespace upswing {
 namespace {
@@ -222,6 +223,7 @@ EvalReport PlanEvaluation(const LoadedPolicy& loaded, const TrialArguments& tria
   report.policy = loaded.name;
   report.title = ShortTitle(loaded);
   report.known_plant = trial.known_plant;
+  if (!trial.plant.empty()) report.left_out = ReadPlantFile(trial.plant).left_out;
   report.env = TrialEnvironments(trial, &loaded, true);
   report.env.num_envs = static_cast<int>(episodes);
   report.knows_values = loaded.policy->info().gamma.value_or(0) > 0;

@@ -32,6 +32,7 @@ struct EvalReport {
   PendulumEnvConfig env;  // common settings of all episodes
   std::vector<JudgedEpisode> episodes;
   Evaluation figures;
+  std::string left_out = {};   // defaults that the plant file left to the program (PlantFile)
   bool known_plant = false;    // a controller was designed for the plant of each episode
   bool knows_values = false;   // the policy's file defines the unit of its values
   bool only_balances = false;  // true for a controller that does not swing up

@@ -1,6 +1,5 @@
 #include "pendulum/plant.h"
 
-#include <algorithm>
 #include <numbers>
 
 #include "base/text.h"
@@ -67,7 +66,11 @@ std::vector<std::pair<std::string, double>> PlantValues(const Plant& plant) {
   return values;
 }
 
-double CapsuleRadius(double length) { return std::min(kCapsuleRadius, 0.4 * length); }
+double CapsuleRadius(double length) {
+  constexpr double kShort = 0.1;   // m
+  constexpr double kShare = 0.08;  // of the built-in plant
+  return length < kShort ? kShare * length : kCapsuleRadius;
+}
 
 CapsuleInertia::CapsuleInertia(double m, double r, double l) {
   // The mass splits by volume between the cylinder and the two half spheres.

@@ -74,8 +74,8 @@ struct CapsuleInertia {
   CapsuleInertia(double m, double r, double l);
 };
 
-/// Radius (m) of the capsule of a link of this length (m): kCapsuleRadius, or 0.4 of a shorter
-/// length.
+/// Radius (m) of the capsule of a link of this length (m): kCapsuleRadius, or 8% of a length below
+/// 0.1 m, as the built-in plant has.
 double CapsuleRadius(double length);
 
 /// A link as a rigid body: mass m (kg), length l (m), distance c of the centre of mass from the

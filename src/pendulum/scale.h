@@ -30,14 +30,14 @@ inline Scale operator*(const Scale& a, const Scale& b) {
 Scale ScaleOf(const Plant& plant);
 
 /// The units of `plant` as multiples of those of `from`, by which a policy for `from` acts on
-/// `plant`. They are 1 unless `plant` has another size: its torques, or its lengths and times, differ
-/// by more than a factor of kOtherSize. Where only the shape differs, such as one mass, a policy
-/// keeps its units.
+/// `plant`. They are 1 unless `plant` has another size: its torques, or its lengths and times,
+/// differ by more than a factor of kOtherSize. Where only the shape differs, such as one mass, a
+/// policy keeps its units.
 Scale CarryOver(const Plant& from, const Plant& plant);
 inline constexpr double kOtherSize = 3;
 
-/// The units by which the task of a plant counts: those that carry the built-in plant's over. For
-/// plants of about that size, seconds and N·m are the same in all rewards, observations and
+/// The units by which the task of a plant counts, carried over from the built-in plant. For plants
+/// of about its size, seconds and N·m are the same in all rewards, observations and
 /// evaluations.
 Scale TaskScaleOf(const Plant& plant);
 

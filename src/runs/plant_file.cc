@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <set>
 #include <utility>
 
 #include "agents/toml_settings.h"
@@ -68,7 +69,9 @@ PlantFile ParsePlantFile(std::string_view toml, const std::string& where) {
   const Options of_plant = OptionsOf(file.plant);
   Options all = of_plant;
   all.AddMissing(OptionsOf(disturbance));
+  std::set<std::string> given;
   for (FlagValue& flag : ApplyTable(all, table, where, false)) {
+    for (const Option* option : all.Find(flag.name, where)) given.insert(option->name);
     const std::string& first = all.Find(flag.name, where).front()->name;
     if (of_plant.Get(first) == nullptr) file.conditions.push_back(std::move(flag));
   }
@@ -77,6 +80,13 @@ PlantFile ParsePlantFile(std::string_view toml, const std::string& where) {
     Posterior::Parse(posterior, place);  // throws unless the matrix is positive
     file.conditions.push_back({"posterior", posterior, place});
   }
+  std::vector<std::string> left_out;
+  for (const char* name : {"damping1", "damping2", "gravity", "torque_limit", "armature"}) {
+    const Option& option = *of_plant.Get(name);
+    if (given.contains(name)) continue;
+    left_out.push_back(Concat(name, " ", option.text(), " ", option.unit));
+  }
+  file.left_out = Join(left_out, ", ");
   file.name = where;
   return file;
 }

@@ -17,6 +17,10 @@ struct PlantFile {
   // The settings of [disturbance]; with a covariance of the plant, also the setting `posterior`.
   std::vector<FlagValue> conditions;
 
+  // Settings that change the motion of every machine and that the file leaves out, with their
+  // defaults: `armature 0.01 kg·m², gravity 9.81 m/s²`; empty: none.
+  std::string left_out;
+
   /// Each setting of the plant, as a flag.
   std::vector<FlagValue> PlantFlags() const;
 

@@ -40,7 +40,7 @@ export const PARAMETERS = [
 /// Smallest and largest value.
 export type Range = readonly [number, number];
 
-/// Allowed values, the same as in the program.
+/// Allowed values in the page, which the program takes, too.
 export const PLANT_LIMITS: Readonly<Record<Parameter, Range>> = {
   mass1: [0.01, 100],
   mass2: [0.01, 100],

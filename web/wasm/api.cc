@@ -210,7 +210,7 @@ UPSWING_EXPORT(policy_make) Controller* PolicyMake(const char* name, size_t size
   return Guarded([&] {
     const std::string called(name, size);
     auto controller = std::make_unique<Controller>(
-        LoadedPolicy{called, "", MakeController(called, {}), kDoublePendulum, Plant()});
+        LoadedPolicy{called, "", MakeController(called, {}), kDoublePendulum, Plant(), Scale()});
     SetText(About(*controller, PolicyMetadata(controller->loaded.policy->info())));
     return controller.release();
   });
@@ -356,7 +356,7 @@ UPSWING_EXPORT(identifier_observe) void IdentifierObserve(const Identifier* iden
 /// The sensors of one pendulum.
 UPSWING_EXPORT(sensors_open) Sensors* SensorsOpen() {
   const SensorModel slowest{kLongestLatency, 0, kLongestWindow, kSlowestFilter};
-  return std::make_unique<Sensors>(1, slowest).release();
+  return std::make_unique<Sensors>(1, kControlPeriod, slowest).release();
 }
 
 UPSWING_EXPORT(sensors_close) void SensorsClose(Sensors* sensors) { delete sensors; }

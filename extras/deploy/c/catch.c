@@ -19,11 +19,11 @@ static inline void policy_derivative(const float *d, float torque, float *rate) 
   rate[3] = (e.m11 * r2 - e.m12 * r1) / e.det;
 }
 
-/* One control period with the torque held: four Runge-Kutta steps. */
+/* One control period with the torque held: POLICY_PHYSICS_STEPS Runge-Kutta steps. */
 static inline void policy_advance(float *d, float torque) {
-  const float h = POLICY_PERIOD / 4.0f;
+  const float h = POLICY_PERIOD / (float)POLICY_PHYSICS_STEPS;
   int step, i;
-  for (step = 0; step < 4; step++) {
+  for (step = 0; step < POLICY_PHYSICS_STEPS; step++) {
     float k1[4], k2[4], k3[4], k4[4], at[4];
     policy_derivative(d, torque, k1);
     for (i = 0; i < 4; i++) at[i] = d[i] + h / 2.0f * k1[i];
