@@ -234,6 +234,12 @@ void Validate(const MachineArguments& a, bool& is_faulty) {
 
 int RunValidate(const MachineArguments& a) { return RunOnLogs(Validate, a); }
 
+/// A number with these decimals, or with three digits if they would show less of it.
+std::string Decimals(double number, int decimals = 5) {
+  const bool is_small = number != 0 && std::abs(number) < 10 * std::pow(10, -decimals);
+  return is_small ? fmt::format("{:.3g}", number) : fmt::format("{:.{}f}", number, decimals);
+}
+
 void PrintTwin(const Identification& found) {
   const Twin& twin = found.fit.twin;
   const Options options = OptionsOf(twin);
@@ -242,11 +248,11 @@ void PrintTwin(const Identification& found) {
     const Option& option = *options.Get(name);
     const double variance = CovarianceOf(twin, name, name);
     if (variance > 0) {
-      fmt::print("  {:<16} {:>10.5f} ± {:.5f} {}\n", option.name, option.number(),
-                 std::sqrt(variance), option.unit);
+      fmt::print("  {:<16} {:>10} ± {} {}\n", option.name, Decimals(option.number()),
+                 Decimals(std::sqrt(variance)), option.unit);
     } else {
-      fmt::print("  {:<16} {:>10.5f}   {}, at its limit or not visible in the logs\n", option.name,
-                 option.number(), option.unit);
+      fmt::print("  {:<16} {:>10}   {}, at its limit or not visible in the logs\n", option.name,
+                 Decimals(option.number()), option.unit);
     }
   }
   if (twin.sessions.empty()) return;
@@ -254,7 +260,7 @@ void PrintTwin(const Identification& found) {
   for (const Session::Value& v : twin.sessions.front().values) fmt::print(" {:>8}", v.setting);
   for (const Session& s : twin.sessions) {
     fmt::print("\n  {:<30}", Shortened(Printable(s.name), 30));
-    for (const Session::Value& v : s.values) fmt::print("{:>8.4f} ", v.number);
+    for (const Session::Value& v : s.values) fmt::print("{:>8} ", Decimals(v.number, 4));
   }
   fmt::print("\n");
 }

@@ -76,6 +76,19 @@ FitParameters::FitParameters(const Twin& first, const Structure& structure,
 
 double FitParameters::FirstNumber(const std::string& name) const { return NumberIn(base_, name); }
 
+Scale FitParameters::scale() const {
+  Plant usual;
+  usual.mass1 = 0.52;
+  usual.mass2 = 0.63;
+  usual.length1 = 0.2;
+  usual.length2 = 0.3;
+  usual.center1 = 0.2;
+  usual.center2 = 0.26;
+  usual.inertia1 = usual.inertia2 = 0.01;
+  usual.armature = 0.003;
+  return CarryOver(usual, base_.plant);
+}
+
 std::vector<int> FitParameters::IndicesOfMachine() const {
   std::vector<int> own;
   for (int i = 0; i < size(); ++i) {

@@ -10,6 +10,7 @@
 #include "extras/machine/logs/log.h"
 #include "extras/machine/twin/residuals.h"
 #include "extras/machine/twin/twin.h"
+#include "pendulum/scale.h"
 
 /// The values θ that an identification changes, and what they mean for a twin.
 namespace upswing::machine {
@@ -57,6 +58,10 @@ class FitParameters {
   const Eigen::VectorXd& guess() const { return guess_; }
   /// A setting of the twin at first, by name.
   double FirstNumber(const std::string& name) const;
+
+  /// The natural units of the first guess over those of the machine that this program's priors were
+  /// made for, design C.1 of RealAIGym; 1 for machines of about its size (CarryOver).
+  Scale scale() const;
 
   /// Indices in θ of the machine's values.
   std::vector<int> IndicesOfMachine() const;

@@ -22,8 +22,9 @@ struct Deviations {
   double guess;     // of the machine's value about a guess without covariance; 0: half of the guess
 };
 
-/// Encoders' zeros in rad, dry friction in N·m, times in s.
-Deviations DeviationsOf(const std::string& name) {
+/// Encoders' zeros in rad, dry friction in N·m, times in s. Friction and inertia are in units of
+/// `scale`; times are those of motors and buses of any size.
+Deviations DeviationsOf(const std::string& name, const Scale& scale) {
   static const std::map<std::string, Deviations, std::less<>> kDeviations{
       {"zero1", {0.05, 0.05}},          {"zero2", {0.05, 0.05}},
       {"coulomb1", {0.03, 0.1}},        {"coulomb2", {0.03, 0.1}},
@@ -32,7 +33,14 @@ Deviations DeviationsOf(const std::string& name) {
       {"delay", {0.001, 0.005}},        {"lag", {0.001, 0.005}},
       {"current_delay", {0.001, 0.005}}};
   const auto found = kDeviations.find(name);
-  return found == kDeviations.end() ? Deviations{0, 0} : found->second;
+  if (found == kDeviations.end()) return {0, 0};
+  double unit = 1;
+  if (name.starts_with("coulomb")) unit = scale.torque;
+  if (name.starts_with("damping")) unit = scale.torque * scale.time;
+  if (name == "armature" || name == "current_inertia") {
+    unit = scale.torque * scale.time * scale.time;
+  }
+  return {found->second.sessions * unit, found->second.guess * unit};
 }
 
 bool IsTimeOfMotor(const std::string& name) {
@@ -45,7 +53,7 @@ MatrixXd FirstBetweenSessions(const FitParameters& parameters) {
   VectorXd deviations(std::ssize(own));
   for (int k = 0; k < static_cast<int>(own.size()); ++k) {
     const FitValue& value = parameters[own[k]];
-    const double known = DeviationsOf(value.name).sessions;
+    const double known = DeviationsOf(value.name, parameters.scale()).sessions;
     deviations(k) = known > 0 ? known : std::abs(parameters.FirstNumber(value.name)) / 10;
   }
   return deviations.cwiseAbs2().asDiagonal();
@@ -65,7 +73,7 @@ MatrixXd CovarianceOfNewSession(const FitParameters& parameters, const Twin& twi
       if (is_known(i) && is_known(j)) covariance(i, j) = of_twin(i, j);
     }
     if (!is_known(i)) {
-      const double wide = DeviationsOf(parameters[i].name).guess;
+      const double wide = DeviationsOf(parameters[i].name, parameters.scale()).guess;
       covariance(i, i) = std::pow(wide > 0 ? wide : parameters.guess()(i) / 2, 2);
     }
     covariance(i, i) *= 1 + 1e-4;  // positive in spite of rounding
@@ -83,7 +91,8 @@ FitPrior FitPrior::OfMachine(const FitParameters& parameters) {
   // Motors take milliseconds. Without reported torques, much larger delays can imitate friction.
   for (const int i : parameters.IndicesOfMachine()) {
     const std::string& name = parameters[i].name;
-    if (IsTimeOfMotor(name)) prior.inverse_(i, i) = std::pow(DeviationsOf(name).guess, -2);
+    if (IsTimeOfMotor(name))
+      prior.inverse_(i, i) = std::pow(DeviationsOf(name, parameters.scale()).guess, -2);
   }
   prior.first_between_sessions_ = FirstBetweenSessions(parameters);
   prior.SetBetweenSessions(prior.first_between_sessions_);

@@ -59,7 +59,7 @@ FitPoint LevenbergMarquardt::Candidate(const Linearization& linearization) const
 
 bool LevenbergMarquardt::Step(double tolerance) {
   const std::vector<WindowResiduals> residuals = model_.Linearize(point_);
-  scales_ = ScalesOf(residuals);
+  scales_ = model_.ScalesOf(residuals);
   const Linearization linearization = LinearizationOf(model_, residuals, point_, scales_);
   const double before = CostOf(residuals, point_);
   for (; damping_ < kLargestDamping; damping_ *= kMoreDamping) {

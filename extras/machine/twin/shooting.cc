@@ -9,12 +9,16 @@ namespace {
 
 using Eigen::Vector4d;
 
-// Standard deviations of a start state about its cubic (rad, rad/s), and the weight of that prior.
-const Vector4d kStartDeviation(0.002, 0.002, 0.06, 0.06);
-constexpr double kStartWeight = 0.05;
+constexpr double kStartWeight = 0.05;  // of the prior of a start state
 // Limits of the scales of the robust cost.
 constexpr double kSmallestScale = 1e-5, kLargestScale = 0.1;  // rad
-constexpr double kSmallestTorqueScale = 1e-3;                 // N·m
+constexpr double kSmallestTorqueScale = 1e-3;                 // N·m, by FitParameters::scale
+
+/// Standard deviations of a start state about its cubic (rad, rad/s).
+Vector4d StartDeviation(const Scale& scale) {
+  const double velocity = 0.06 * scale.velocity();
+  return {0.002, 0.002, velocity, velocity};
+}
 
 double MedianError(const std::vector<WindowResiduals>& residuals,
                    SquaredResiduals WindowResiduals::*kind) {
@@ -70,11 +74,11 @@ std::vector<WindowResiduals> ShootingModel::ResidualsAt(const FitPoint& point,
 
 double ShootingModel::Cost(const std::vector<WindowResiduals>& residuals, const FitPoint& point,
                            const RobustScales& scales) const {
+  const Vector4d deviation = StartDeviation(parameters_.scale());
   double cost = 0;
   for (int w = 0; w < windows(); ++w) {
     const auto& [angle, torque] = residuals[w];
-    const double start =
-        (point.starts[w] - cubics_[w]).cwiseQuotient(kStartDeviation).squaredNorm();
+    const double start = (point.starts[w] - cubics_[w]).cwiseQuotient(deviation).squaredNorm();
     cost += std::log1p(angle.mean / (scales.angle * scales.angle)) +
             std::log1p(torque.mean / (scales.torque * scales.torque)) + kStartWeight * start;
   }
@@ -84,7 +88,8 @@ double ShootingModel::Cost(const std::vector<WindowResiduals>& residuals, const 
 std::vector<WindowBlock> ShootingModel::Blocks(const std::vector<WindowResiduals>& linearized,
                                                const FitPoint& point,
                                                const RobustScales& scales) const {
-  const Vector4d start_prior = kStartWeight * kStartDeviation.cwiseAbs2().cwiseInverse();
+  const Vector4d start_prior =
+      kStartWeight * StartDeviation(parameters_.scale()).cwiseAbs2().cwiseInverse();
   std::vector<WindowBlock> blocks;
   for (int w = 0; w < windows(); ++w) {
     const auto& [angle, torque] = linearized[w];
@@ -107,10 +112,10 @@ double MedianAngleError(const std::vector<WindowResiduals>& residuals) {
   return MedianError(residuals, &WindowResiduals::angle);
 }
 
-RobustScales ScalesOf(const std::vector<WindowResiduals>& residuals) {
-  return {
-      .angle = std::clamp(MedianAngleError(residuals), kSmallestScale, kLargestScale),
-      .torque = std::max(MedianError(residuals, &WindowResiduals::torque), kSmallestTorqueScale)};
+RobustScales ShootingModel::ScalesOf(const std::vector<WindowResiduals>& residuals) const {
+  const double smallest_torque = kSmallestTorqueScale * parameters_.scale().torque;
+  return {.angle = std::clamp(MedianAngleError(residuals), kSmallestScale, kLargestScale),
+          .torque = std::max(MedianError(residuals, &WindowResiduals::torque), smallest_torque)};
 }
 
 }  // namespace upswing::machine

@@ -60,6 +60,8 @@ class ShootingModel {
   /// The residuals of all windows with their derivatives.
   std::vector<WindowResiduals> Linearize(const FitPoint& point) const;
 
+  /// The median errors as scales of the robust cost, within limits.
+  RobustScales ScalesOf(const std::vector<WindowResiduals>& residuals) const;
   /// The windows' part of the cost: the robust cost of their residuals, and a prior of the start
   /// states about their cubics.
   double Cost(const std::vector<WindowResiduals>& residuals, const FitPoint& point,
@@ -80,8 +82,5 @@ class ShootingModel {
 
 /// Median over the windows of the root mean square of their residuals of angles (rad).
 double MedianAngleError(const std::vector<WindowResiduals>& residuals);
-
-/// The median errors as scales of the robust cost, within limits.
-RobustScales ScalesOf(const std::vector<WindowResiduals>& residuals);
 
 }  // namespace upswing::machine
