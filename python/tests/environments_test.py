@@ -41,6 +41,18 @@ def play(env, actions, **reset):
 
 
 class Environments(unittest.TestCase):
+    def test_the_control_period_is_in_the_metadata(self):
+        for settings, period in (({}, 0.02), ({"control_period": 0.005}, 0.005),
+                                 ({"plant": "cloudpendulum"}, 0.0067)):
+            with self.subTest(settings):
+                env = gym.make(ID, physics="closed-form", **settings)
+                self.assertAlmostEqual(env.metadata["control_period"], period, 4)
+                self.assertEqual(env.metadata["render_fps"], round(1 / env.metadata["control_period"]))
+        vector = gym.make_vec(ID, 2, physics="closed-form", control_period=0.01, max_episode_steps=7)
+        vector.reset(seed=1)
+        ends = [vector.step(np.zeros((2, 1)))[3].all() for _ in range(7)]
+        self.assertEqual(ends, [False] * 6 + [True])
+
     def test_gymnasium_finds_nothing_wrong(self):
         for settings in ({}, {"physics": "closed-form"}, {"actions": "levels"},
                          {"sensor_noise": 0.1, "delay": 0.04, "randomize": 0.25, "memory": 4},

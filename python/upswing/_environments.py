@@ -68,6 +68,10 @@ class Core:
             spaces.Discrete(len(self.levels)) if len(self.levels) > 0
             else spaces.Box(-limit, limit, dtype=np.float32))
 
+    def rates(self) -> dict[str, float]:
+        """Entries of an environment's metadata: control period [s] and pictures per second."""
+        return {"control_period": self.step_seconds, "render_fps": round(1 / self.step_seconds)}
+
     def actions_of(self, actions: Any) -> npt.NDArray[Any]:
         """Actions as an array for the C++ code: float32 or float64 torques, int32 or int64 levels."""
         array = np.asarray(actions)

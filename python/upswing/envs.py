@@ -31,7 +31,7 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
     [rad/s] and the torque over 5 N·m. `any_pose` adds, before them, the goal: for each link 1 if it is
     to point up and -1 if down.
 
-    Action: torque (1,) [N·m], held for 0.02 s and limited to `torque_limit`. With actions="levels":
+    Action: torque (1,) [N·m], held for `control_period` and limited to `torque_limit`. With actions="levels":
     index of one of `levels` evenly spaced torques, from the largest negative one upwards.
 
     Reward: per step 0 hanging at rest to 7 upright at rest. An episode is truncated after
@@ -77,6 +77,7 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
         if "threads" in settings:
             raise _upswing.InputError("threads: expected several environments (gym.make_vec)")
         self._core = Core(1, {"threads": 1, **settings}, actions, levels, False)
+        self.metadata = {**self.metadata, **self._core.rates()}
         self._pictures = Pictures(self._core, width, height)
         self.observation_space: gym.Space[npt.NDArray[np.float32]] = self._core.observation_space
         self.action_space: gym.Space[Any] = self._core.action_space
@@ -111,7 +112,7 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
     def step(
         self, action: Any
     ) -> tuple[npt.NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Holds a torque for 0.02 s.
+        """Holds a torque for a control period, metadata["control_period"] [s].
 
         Args:
             action: torque (1,) [N·m] or index of a torque level
@@ -199,7 +200,7 @@ class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArra
             step overwrites
         render_mode: "rgb_array" or None
         width, height: size of pictures [pixels]
-        max_episode_steps: largest length of an episode [steps of 0.02 s]; None: episode_seconds
+        max_episode_steps: largest length of an episode [control steps]; None: episode_seconds
     """
 
     metadata: dict[str, Any] = {
@@ -224,9 +225,10 @@ class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArra
     ) -> None:
         if max_episode_steps is not None:
             usual = settings_of(settings.get("agent", "d3qn"))["episode_seconds"].default
+            period = Core(1, dict(settings), actions, levels, False).step_seconds
             settings["episode_seconds"] = min(
                 settings.get("episode_seconds", usual),
-                round(0.02 * whole_number("max_episode_steps", max_episode_steps), 2))
+                round(period * whole_number("max_episode_steps", max_episode_steps), 12))
         settings = cast(EnvironmentSettings, with_loaded_plant(settings))
         EzPickle.__init__(self, num_envs, actions=actions, levels=levels,
                           autoreset_mode=autoreset_mode, copy=copy, render_mode=render_mode,
@@ -240,6 +242,7 @@ class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArra
             "actions": actions, "levels": levels,
             **{name: value for name, value in settings.items() if name != "threads"}}
         self._core = Core(num_envs, dict(settings), actions, levels, self._same_step)
+        self.metadata = {**self.metadata, **self._core.rates()}
         self._pictures = Pictures(self._core, width, height)
         self.num_envs: int = self._core.num_envs
         self.render_mode = render_mode
@@ -284,7 +287,7 @@ class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArra
         self, actions: Any
     ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float64], npt.NDArray[np.bool_],
                npt.NDArray[np.bool_], dict[str, Any]]:
-        """Holds a torque in every environment for 0.02 s.
+        """Holds a torque in every environment for a control period.
 
         Args:
             actions: torques (N, 1) [N·m], float32 or float64, or indices of torque levels (N,)
