@@ -107,6 +107,7 @@ class Document:
     def __init__(self, path: Path, leave_out: set[str]) -> None:
         self.folder, self.leave_out = path.parent.resolve(), leave_out
         self.left_out: list[str] = []  # what --drop left out
+        self.files = [path]  # all files that were read
         self.assets: dict[str, bytes] = {}
         self._includes = 0
         self.root = parse(path, "")
@@ -145,6 +146,7 @@ class Document:
             element.remove(child)
             if path is not None:
                 content = parse(path, f"{printable(name)}: ")
+                self.files.append(path)
                 self._include(content)
                 for part in reversed(content):
                     element.insert(place, part)
@@ -184,6 +186,7 @@ class Document:
                 left = MOST_MESH_BYTES - sum(map(len, self.assets.values()))
                 own = f"mesh{len(self.assets)}{path.suffix.lower()}"
                 self.assets[own] = read_bytes(path, left, f"{printable(name)}: ")
+                self.files.append(path)
                 if key == "file":
                     element.attrib.setdefault("name", Path(name).stem)
                 element.set(key, own)
@@ -675,7 +678,7 @@ def remove_features(p: Pendulum, leave_out: set[str], convert_friction: bool) ->
 
 
 def read_plant(job: dict[str, Any]) -> dict[str, Any]:
-    """The plant of a file as TOML, with random motions of the file's model."""
+    """The plant of a file as TOML, with the files read and random motions of the file's model."""
     document = Document(Path(job["file"]), set(job["drop"]))
     p = Pendulum(document.compile())
     frictionloss = p.model.dof_frictionloss.copy()
@@ -700,7 +703,8 @@ def read_plant(job: dict[str, Any]) -> dict[str, Any]:
         raise Refusal(f"MuJoCo's motion diverges in Runge-Kutta steps of {physics.timestep:g} s")
     parameters = parameters_of(p, motor, coulomb, job["length2"])
     return {"toml": toml_of(p, parameters, remarks), "remarks": remarks, "starts": starts.tolist(),
-            "torques": torques.tolist(), "angles": angles.tolist()}
+            "torques": torques.tolist(), "angles": angles.tolist(),
+            "files": [str(file) for file in document.files]}
 
 
 def main() -> None:

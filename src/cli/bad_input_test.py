@@ -8,7 +8,8 @@ import os
 import subprocess
 import unittest
 
-from testing import PATIENCE, UPSWING, ProgramTest, SmallRunTest, limits, small, train_once
+from testing import (PATIENCE, ROOT, UPSWING, ProgramTest, SmallRunTest, limits, small, snapshot,
+                     train_once)
 
 # If one of these is wrongly accepted, the test stays short.
 TRAIN = ["train", "--steps", "8", "--eval-episodes", "1", "--out", "run"]
@@ -217,6 +218,37 @@ class TomlTest(ProgramTest):
     def test_binary_file(self):
         (self.folder / "s.toml").write_bytes(bytes(range(256)))
         self.refuse(["train", "--config", "s.toml"], "s.toml:1:")
+
+
+class OutputFileTest(SmallRunTest):
+    def test_no_output_replaces_a_policy(self):
+        """Nor another file of a run that an argument names by its folder."""
+        before = snapshot(self.folder)
+        shipped = ROOT / "web/public/agents/fast.safetensors"
+        for words, flag, path in (
+                (["export", "run"], "--c", "run/policy.safetensors"),
+                (["export", "run/"], "--onnx", "run/policy.safetensors"),
+                (["eval", "run"], "--episodes-csv", "./run/policy.safetensors"),
+                (["eval", "mpc", "run"], "--episodes-csv", "run/checkpoint.safetensors"),
+                (["eval", "hybrid", "--swing-up", "run"], "--episodes-csv", "run/config.toml"),
+                (["simulate", "run"], "--csv", "run/metrics.csv"),
+                (["view", "run"], "--record", "run/log.txt"),
+                (["demo", "run"], "--file", "run/policy.safetensors"),
+                (["run", "run", "--link", "twin.toml"], "--log", "run/evals.csv"),
+                (["run", "mpc", "--link", "run/config.toml"], "--log", "run/config.toml"),
+                (["plot", "run"], "--out", "run/policy.safetensors"),
+                (["eval", "fast"], "--episodes-csv", shipped),
+                (["eval", "hybrid", "--swing-up", "fast"], "--episodes-csv", shipped)):
+            with self.subTest(words=words):
+                self.refuse([*words, flag, path], f" {flag}: expected another file than ", "which would be lost")
+        for words in (["plot", "run"], ["map", "run"], ["grade", "run"], ["compare", "run"]):
+            with self.subTest(words=words):
+                self.refuse([*words, "--out", "run"], "expected a new")
+        self.assertEqual(snapshot(self.folder), before)
+
+    def test_a_table_of_an_evaluation_may_be_in_the_run_folder(self):
+        for _ in range(2):  # the second one replaces the first one
+            self.succeed("eval", "run", "--episodes", 2, "--episodes-csv", "run/mine.csv")
 
 
 class TorqueFileTest(SmallRunTest):

@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/text.h"
+#include "cli/output_files.h"
 #include "cli/progress.h"
 #include "cli/say.h"
 #include "os/command.h"
@@ -268,40 +269,17 @@ CLI::Option* AddText(CLI::App& app, std::string_view name, Target& target, std::
   return option;
 }
 
-/// Throws BadInput if a file to write is another file of the command line, to read or to write.
-void ExpectOtherOutputs(const CLI::App& app) {
-  namespace fs = std::filesystem;
-  constexpr std::array kOutputs{"--out", "--csv",    "--figure",       "--onnx",
-                                "--c",   "--record", "--episodes-csv", "--log"};
-  struct Named {
-    const CLI::Option* option;
-    std::string path;
-    bool is_output;
-  };
-  std::vector<Named> files;
+/// The texts of the command line that may name files.
+std::vector<NamedFile> NamedFiles(const CLI::App& app) {
+  constexpr std::array kOutputs{"--out", "--csv",    "--figure",       "--onnx", "--c",
+                                "--log", "--record", "--episodes-csv", "--file"};
+  std::vector<NamedFile> files;
   for (const CLI::Option* option : app.get_options()) {
-    const bool is_output = std::ranges::find(kOutputs, option->get_name()) != kOutputs.end();
-    for (const std::string& text : option->results()) files.push_back({option, text, is_output});
+    const std::string name = option->nonpositional() ? option->get_name() : "the argument";
+    const bool is_output = std::ranges::find(kOutputs, name) != kOutputs.end();
+    for (const std::string& text : option->results()) files.push_back({name, text, is_output});
   }
-  const auto same = [](const Named& output, const Named& other) {
-    std::error_code error;
-    if (fs::is_regular_file(output.path, error)) {
-      return fs::equivalent(output.path, other.path, error);
-    }
-    // Other words are names: an agent, for example.
-    return other.is_output && !fs::exists(output.path, error) &&
-           fs::weakly_canonical(output.path, error) == fs::weakly_canonical(other.path, error);
-  };
-  for (const Named& output : files) {
-    if (!output.is_output || output.path.empty() || output.path == "-") continue;
-    for (const Named& other : files) {
-      if (&other == &output || !same(output, other)) continue;
-      throw BadInput(
-          Concat(output.option->get_name(), ": expected another file than ",
-                 other.option->nonpositional() ? other.option->get_name() : "the argument", " ",
-                 Printable(other.path), ", which would be lost"));
-    }
-  }
+  return files;
 }
 
 /// Whether packages have a command: they leave out some programs, and the launcher.
@@ -326,7 +304,7 @@ int CommandLine::Run() const {
   for (const auto& subcommand : subcommands_) {
     if (subcommand->app_.parsed()) return subcommand->Run();
   }
-  ExpectOtherOutputs(app_);
+  ExpectOtherOutputs(NamedFiles(app_));
   for (const auto& check : checks_) check();
   return run_();
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -103,11 +104,23 @@ std::optional<nlohmann::json> ReadModel(const PlantArguments& a, int& code) {
   return read;
 }
 
+/// Throws BadInput if --out is a file that the model includes.
+void ExpectNoPart(const std::string& out, const nlohmann::json& files) {
+  for (const auto& file : files) {
+    std::error_code error;
+    const auto part = file.get<std::string>();
+    if (!std::filesystem::equivalent(out, part, error)) continue;
+    throw BadInput(Concat("--out: expected another file than ", Printable(part),
+                          " of the model, which would be lost"));
+  }
+}
+
 int RunPlant(const PlantArguments& a) {
   CheckWritable("--out", a.out);
   int code = 0;
   const std::optional<nlohmann::json> read = ReadModel(a, code);
   if (!read) return code;
+  ExpectNoPart(a.out, (*read)["files"]);
 
   const auto toml = (*read)["toml"].get<std::string>();
   const Plant plant = ParsePlantFile(toml, Concat("plant of ", Printable(a.model))).plant;

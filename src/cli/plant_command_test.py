@@ -327,6 +327,17 @@ class Strangers(PlantCommandTest):
         self.assertEqual(plant["mass1"], 0.7)
         self.assertIn("includes: a", comments)
 
+    def test_no_plant_replaces_a_part_of_its_model(self):
+        parts = {"motor.xml": f"<mujoco><actuator>{MOTOR}</actuator></mujoco>"}
+        parts["model.xml"] = model(actuators="", more='<include file="motor.xml"/>')
+        for name, text in parts.items():
+            self.write(name, text)
+        for name in ("motor.xml", "./motor.xml", "model.xml"):
+            self.refuse(["plant", "model.xml", "--out", name], "--out: expected another file than ", "be lost",
+                        env=self.ENVIRONMENT)
+        for name, text in parts.items():
+            self.assertEqual((self.folder / name).read_text(encoding="utf-8"), text)
+
     def test_a_mesh_in_the_folder(self):
         """A box as OBJ gives the inertia of a box."""
         corners = [(x, y, z) for x in (-0.02, 0.02) for y in (-0.02, 0.02) for z in (-0.5, 0)]

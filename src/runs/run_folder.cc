@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kEventsName = "events.out.tfevents.0.upswing";
+constexpr const char* kEventsName = "events.out.tfevents.0.upswing";
 constexpr int64_t kLargestTable = int64_t{1} << 60;
 
 // Names of the sizes in the checkpoint of the files that grow during a run.
@@ -74,6 +74,16 @@ FolderLock RunFolder::Create(const fs::path& given, const std::string& config,
     throw Error(failure.exit_code(),
                 Concat("cannot make the run folder ", path.string(), ": ", failure.what()));
   }
+}
+
+std::vector<fs::path> RunFolder::Files(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code none;
+  for (const char* name :
+       {kConfig, kMetrics, kEpisodes, kEvaluations, kEventsName, kCheckpoint, kPolicy, kLog}) {
+    if (fs::exists(folder / name, none)) files.push_back(folder / name);
+  }
+  return files;
 }
 
 RunFolder::RunFolder(fs::path path, const Tensors& checkpoint)

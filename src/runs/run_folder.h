@@ -59,6 +59,9 @@ class RunFolder {
   static FolderLock Create(const std::filesystem::path& path, const std::string& config,
                            Tensors& checkpoint);
 
+  /// The files that a run has in this folder; none if it is another folder.
+  static std::vector<std::filesystem::path> Files(const std::filesystem::path& folder);
+
   /// Opens a run after its checkpoint has been loaded. The caller holds the run's FolderLock.
   /// Throws BadInput and changes nothing if a table is shorter than its size in the checkpoint. The
   /// same holds if a link shares it with another folder (see AppendFile).
