@@ -122,7 +122,8 @@ class Library(unittest.TestCase):
 
     def test_own_task(self):
         program = self.build("own_task")
-        self.assertRegex(run(program), r"\nsolved after \d+ steps\n$")
+        for algorithm in ("sac", "ppo"):
+            self.assertRegex(run(program, algorithm), r"\nsolved after \d+ steps\n$")
         self.assertNotIn("mujoco", run("ldd", program))
 
     def test_dqn_on_one_page(self):

@@ -38,10 +38,14 @@ class Printer : public TrainObserver {
 };
 
 int main(int argc, char** argv) try {
+  const std::string_view algorithm = argc > 1 ? argv[1] : "sac";
+  if (algorithm != "sac" && algorithm != "ppo") throw BadInput("expected sac or ppo first");
+  const bool is_ppo = algorithm == "ppo";
+
   TrainConfig train;
-  train.envs = 1;
-  train.steps = 20000;
-  train.eval_every = 2000;
+  train.envs = is_ppo ? 16 : 1;
+  train.steps = is_ppo ? 500000 : 20000;
+  train.eval_every = is_ppo ? 20000 : 2000;
   SacConfig sac;
   sac.hidden = {64, 64};
   sac.off_policy.batch = 100;
@@ -51,11 +55,14 @@ int main(int argc, char** argv) try {
   sac.actor_period = 1;
   sac.tau = 0.01;
   PpoConfig ppo;
+  ppo.gamma = 0.95;
+  ppo.horizon = 128;
+  ppo.epochs = 10;
+  ppo.mirror = true;
+  ppo.learning_rate_steps = 500000;
 
   // Settings have the names of the flags in `upswing train --help`.
-  const std::string_view algorithm = argc > 1 ? argv[1] : "sac";
-  if (algorithm != "sac" && algorithm != "ppo") throw BadInput("expected sac or ppo first");
-  AgentConfig& learner = algorithm == "ppo" ? static_cast<AgentConfig&>(ppo) : sac;
+  AgentConfig& learner = is_ppo ? static_cast<AgentConfig&>(ppo) : sac;
   Options settings;
   train.Describe(settings);
   learner.Describe(settings);
@@ -70,7 +77,7 @@ int main(int argc, char** argv) try {
   ThreadPool pool(int(train.threads == 0 ? 1 : train.threads));
   PendulumV1 env(int(train.envs), uint64_t(train.seed));
   std::unique_ptr<Agent> agent;
-  if (algorithm == "ppo") {
+  if (is_ppo) {
     agent = std::make_unique<Ppo>(ppo, env.spec(), uint64_t(train.seed), pool);
   } else {
     agent = std::make_unique<Sac>(sac, env.spec(), uint64_t(train.seed), pool);
