@@ -137,6 +137,10 @@ void PrintNotes(const EvalReport& report, const std::string& name) {
         "  designed for   {}the plant of each episode; {} of {} plants have no such controller\n",
         name, episodes - NumDesigned(report), episodes);
   }
+  if (report.figures.diverged > 0) {
+    fmt::print("  note           {}the simulation diverged in {} of {}, which count as failures\n",
+               name, report.figures.diverged, Counted(episodes, "episode"));
+  }
   if (report.only_balances) {
     fmt::print(
         "  note           {}the controller balances and does not swing up; episodes start "

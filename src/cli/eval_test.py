@@ -46,10 +46,10 @@ class EvalTest(ProgramTest):
         result = self.evaluate()
         self.assertEqual(list(result), [
             "policy", "seed", "physics", "task", "plant", "unknown_plant", "disturbance",
-            "randomize", "episodes", "successes", "success_rate", "success_interval_95", "settled",
-            "steady_tilt_degrees", "reward_terms", "return", "swing_up_seconds", "settling_seconds",
-            "energy_used", "peak_torque", "rms_torque", "torque_variation",
-            "torque_variation_upright", "torque_changes_upright", "value", "discounted_return"])
+            "randomize", "episodes", "successes", "diverged", "success_rate",
+            "success_interval_95", "settled", "steady_tilt_degrees", "reward_terms", "return",
+            "swing_up_seconds", "settling_seconds", "energy_used", "peak_torque", "rms_torque",
+            "torque_variation", "torque_variation_upright", "torque_changes_upright", "value", "discounted_return"])
         self.assertEqual(result["plant"], PLANT | {"gravity": 0.05, "damping1": 1, "damping2": 1})
         self.assertEqual(result["policy"], str(self.policy / "policy.safetensors"))
         self.assertEqual(list(result["reward_terms"]), REWARD_TERMS)
@@ -82,6 +82,9 @@ class EvalTest(ProgramTest):
                 pairs = [float(x[column]) - float(y[column]) for x, y in zip(other, first)
                          if x[column] and y[column]]
                 got = difference[figure]
+                if not pairs:
+                    self.assertIsNone(got)
+                    continue
                 self.assertEqual(got["episodes"], len(pairs))
                 self.assertAlmostEqual(got["mean"], math.fsum(pairs) / len(pairs), delta=1e-9)
                 if len(set(pairs)) == 1:
@@ -252,10 +255,39 @@ class EvalTest(ProgramTest):
             self.assertAlmostEqual(mean, result[figure]["mean"], delta=1e-9 * max(1, abs(mean)))
         self.assertEqual(len({row["mass1"] for row in rows}), 6)
         for row in rows:
-            upright = row["swing_up_seconds"] != ""
-            self.assertEqual(row["torque_changes_upright"] != "", upright)
+            for column in ("swing_up_seconds", "torque_changes_upright"):
+                self.assertEqual(row[column] != "", row["success"] == "1")
         # More episodes extend the list of fewer episodes.
         self.assertEqual(self.episodes(*flags, count=8)[:6], rows)
+
+    def test_an_episode_that_fails_upright_has_no_swing_up_time(self):
+        """Episodes 10 and 31 of these are upright at their end, for less than 10 s."""
+        flags = ("--randomize", 0.4, "--episodes", 32)
+        text = self.succeed("eval", "fast", *flags, "--episodes-csv", "-")
+        rows = list(csv.DictReader(text.splitlines()))
+        self.assertIn("failure, upright from ",
+                      self.succeed("simulate", "fast", *flags[:2], "--episode", 31, "--csv", "e.csv"))
+        for row in rows:
+            for column in ("swing_up_seconds", "torque_variation_upright", "torque_changes_upright"):
+                self.assertEqual(row[column] != "", row["success"] == "1")
+            self.assertTrue(row["settling_seconds"] == "" or row["success"] == "1")
+        # The same policy with another name: all differences are 0, over the successes.
+        (self.folder / "same.safetensors").write_bytes(
+            (ROOT / "web/public/agents/fast.safetensors").read_bytes())
+        both = json.loads(self.succeed("eval", "fast", "same.safetensors", *flags, "--json"))
+        successes = sum(row["success"] == "1" for row in rows)
+        for column in ("swing_up_seconds", "torque_variation_upright", "torque_changes_upright"):
+            self.assertEqual(both["differences"][0][column]["episodes"], successes)
+
+    def test_diverged_episodes_are_counted(self):
+        flags = ("--mass", 0.01, "--length", 0.1, "--torque-limit", 1000, "--armature", 0,
+                 "--damping", 0, "--episodes", 4)
+        note = "the simulation diverged in 4 of 4 episodes, which count as failures\n"
+        self.assertIn(f"  note           {note}", self.succeed("eval", "tvlqr", *flags))
+        self.assertIn(f"  note           tvlqr: {note}", self.succeed("eval", "tvlqr", "sac", *flags))
+        self.assertEqual(json.loads(self.succeed("eval", "tvlqr", *flags, "--json"))["diverged"], 4)
+        self.assertEqual(self.evaluate()["diverged"], 0)
+        self.assertNotIn("diverged", self.succeed("eval", self.policy, "--episodes", 4))
 
     def test_simulate_and_plot_say_the_torque_of_the_episode(self):
         flags = ("--seed", 5)
@@ -296,7 +328,8 @@ class EvalTest(ProgramTest):
         while since > 0 and rows[since - 1]["inverted"]:
             since -= 1
         self.assertEqual(number["success"], float(since <= 500))
-        if since < len(rows):
+        self.assertEqual("swing_up_seconds" in number, since <= 500)
+        if since <= 500:
             self.assertAlmostEqual(number["swing_up_seconds"], max(since, 1) / 50, delta=1e-12)
         torques = [row["torque"] for row in rows[:1000]]
         self.assertEqual(number["peak_torque"], max(map(abs, torques)))

@@ -45,6 +45,14 @@ class SmallTrainingTest(ProgramTest):
         self.assertEqual(len(re.findall(r"^ *[24],000 steps .* [1-9][\d,]* updates/s .*"
                                         r"success +\d/4$", self.output, re.M)), 2)
 
+    def test_diverged_episodes_are_counted(self):
+        output = self.succeed("train", "--agent", "ppo", "--steps", 1000, "--eval-every", 1000,
+                              "--eval-episodes", 4, "--mass", 0.01, "--length", 0.1, "--armature", 0,
+                              "--torque-limit", 1000, "--damping", 0, "--out", "light")
+        self.assertRegex(output, r"success   0/4  diverged 4\n")
+        self.assertIn(", the simulation diverged in 4\n",
+                      (self.folder / "light/log.txt").read_text(encoding="utf-8"))
+
     def test_run_folder_holds_just_its_files(self):
         self.assertEqual({path.name for path in (self.place / "run").iterdir()}, RUN_FILES)
         self.assertEqual([path.name for path in self.place.iterdir()], ["run"])

@@ -66,9 +66,10 @@ class TrainView : public TrainObserver {
     value_ = e.value;
     discounted_return_ = e.discounted_return;
     line_.Print(
-        fmt::format("{:>9} steps  {:>11}  {:>6} updates/s  {}  return {:6.0f}  success {:3}/{}",
+        fmt::format("{:>9} steps  {:>11}  {:>6} updates/s  {}  return {:6.0f}  success {:3}/{}{}",
                     FormatCount(s.steps), FormatDuration(s.seconds), UpdatesText(),
-                    Join(AgentTexts(), "  "), e.reward_sum.mean, e.successes, e.episodes));
+                    Join(AgentTexts(), "  "), e.reward_sum.mean, e.successes, e.episodes,
+                    e.diverged > 0 ? fmt::format("  diverged {}", e.diverged) : ""));
   }
 
   /// Updates the progress line if it is due. Returns the request of a signal.

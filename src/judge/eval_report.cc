@@ -44,8 +44,9 @@ bool IsKnown(const EvaluationFigure& figure, bool upright, bool settled, bool va
 /// The value of a figure in an episode; nothing if the episode has none.
 std::optional<double> KnownValue(const EvaluationFigure& figure, const EvaluationEpisode& e,
                                  bool valued) {
-  const bool upright = e.swing_up_seconds.has_value(), settled = e.settling_seconds.has_value();
-  if (!IsKnown(figure, upright, settled, valued)) return std::nullopt;
+  // A failed episode can end upright, but it did not stay so.
+  const bool settled = e.success && e.settling_seconds.has_value();
+  if (!IsKnown(figure, e.success, settled, valued)) return std::nullopt;
   return figure.Of(e);
 }
 
@@ -88,6 +89,7 @@ void AddFigures(const EvalReport& report, ordered_json& j) {
   const bool settled = upright && e.settled > 0;
   j["episodes"] = e.episodes;
   j["successes"] = e.successes;
+  j["diverged"] = e.diverged;
   j["success_rate"] = e.success_rate();
   j["success_interval_95"] = {e.success_interval.low, e.success_interval.high};
   j["settled"] = upright ? e.settled : 0;

@@ -82,7 +82,7 @@ std::vector<PairedFigure> PairedFigures(const EvalReport& report, const EvalRepo
 std::string EvalJson(std::span<const EvalReport> reports);
 
 /// A row for each episode, counted from 0. A missing figure is empty, such as the swing-up time of
-/// an episode that is not upright at the end. Several reports have the policy in the first column.
+/// an episode that fails. Several reports have the policy in the first column.
 std::string EpisodesCsv(std::span<const EvalReport> reports);
 
 }  // namespace upswing

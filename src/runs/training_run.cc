@@ -142,7 +142,8 @@ void TrainingRun::OnMetrics(const TrainState& s, const Metrics& metrics) {
 void TrainingRun::OnEvaluation(const TrainState& s, const Evaluation& e) {
   folder_->LogEvaluation(EvaluationCells(s, e));
   folder_->Log(Concat("step ", s.steps, ": ", e.successes, " of ", e.episodes,
-                      " episodes succeed, mean return ", FormatNumber(e.reward_sum.mean)));
+                      " episodes succeed, mean return ", FormatNumber(e.reward_sum.mean),
+                      e.diverged > 0 ? Concat(", the simulation diverged in ", e.diverged) : ""));
 }
 
 void TrainingRun::OnBest(const TrainState& /*s*/, const Policy& policy) {

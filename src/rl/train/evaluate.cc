@@ -65,7 +65,8 @@ class EpisodeTally {
       for (size_t j = 0; j < terms; ++j) episode_.terms[j] += result.reward_terms[i * terms + j];
     }
     // The last step may time out, because the rule's time is over then.
-    ended_ = result.terminated[i] != 0 || (result.truncated[i] != 0 && torques_.steps() < steps_);
+    terminated_ = result.terminated[i] != 0;
+    ended_ = terminated_ || (result.truncated[i] != 0 && torques_.steps() < steps_);
   }
 
   /// Returns the results. Call it once, at the end.
@@ -80,6 +81,7 @@ class EpisodeTally {
     e.seconds = seconds(torques_.steps());
     if (at_goal) e.swing_up_seconds = seconds(goal_since);
     if (settled) e.settling_seconds = seconds(settled_since_);
+    e.diverged = terminated_ && !rule_.by_return();
     e.success = rule_.by_return() ? e.reward_sum >= rule_.solved_return
                                   : at_goal && goal_since <= steps_ - hold_steps_;
     torques_.Finish(at_goal, e);
@@ -94,6 +96,7 @@ class EpisodeTally {
   std::vector<double> lean_;  // (bodies) rad, current lean
   TorqueTally torques_;
   int64_t settled_since_ = -1;
+  bool terminated_ = false;
   bool ended_ = false;  // ended early; further steps belong to another episode
   EvaluationEpisode episode_;
 };
@@ -241,6 +244,7 @@ Evaluation Summarize(std::span<const EvaluationEpisode> episodes, const Evaluati
   }
   e.episodes = static_cast<int64_t>(all.size());
   e.successes = static_cast<int64_t>(successful.size());
+  e.diverged = std::ranges::count(episodes, true, &EvaluationEpisode::diverged);
   e.success_interval = WilsonInterval(e.successes, e.episodes);
   e.settled = std::ranges::count_if(
       successful, [](const EvaluationEpisode* one) { return one->settling_seconds.has_value(); });

@@ -24,7 +24,8 @@ inline constexpr double kLeastChange = 1e-3;
 /// Results of one evaluation episode.
 struct EvaluationEpisode {
   bool success = false;
-  double seconds = 0;  // length; a termination makes it shorter than the rule's time
+  bool diverged = false;  // ended by a numerical blow-up; a failure
+  double seconds = 0;     // length; a termination makes it shorter than the rule's time
   // Start of the stretch at the goal, and of the settled stretch, with which the episode ends.
   // Nothing if the episode does not end at the goal, or not settled.
   std::optional<double> swing_up_seconds, settling_seconds;
@@ -48,7 +49,7 @@ struct EvaluationEpisode {
 
 /// Summary of an evaluation.
 struct Evaluation {
-  int64_t episodes = 0, successes = 0;
+  int64_t episodes = 0, successes = 0, diverged = 0;
   Interval success_interval;
   Quartiles swing_up_seconds;  // of the successful episodes
   int64_t settled = 0;         // successful episodes that are settled at the end

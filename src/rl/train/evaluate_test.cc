@@ -97,8 +97,11 @@ TEST(Evaluate, ABlownUpEpisodeFailsEvenIfLaterStatesAreAtTheGoal) {
   EXPECT_DOUBLE_EQ(episodes[1].seconds, 18);
   EXPECT_DOUBLE_EQ(episodes[1].work, 450);  // 900 steps of half a joule
   EXPECT_FALSE(episodes[1].swing_up_seconds);
+  EXPECT_FALSE(episodes[0].diverged);
+  EXPECT_TRUE(episodes[1].diverged);
   const Evaluation e = Summarize(episodes, env.spec().evaluation);
   EXPECT_EQ(e.successes, 1);
+  EXPECT_EQ(e.diverged, 1);
   EXPECT_DOUBLE_EQ(e.seconds.mean, 19);
 }
 
