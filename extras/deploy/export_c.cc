@@ -263,8 +263,9 @@ CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
 
 CHeader CHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
   if (prefix.size() > kLongestPrefix || AsPrefix(prefix) != prefix || prefix.empty()) {
-    throw BadInput(Concat("prefix: expected a lower-case letter, then lower-case letters, digits ",
-                          "and _, at most ", kLongestPrefix, " characters, got \"", prefix, "\""));
+    throw BadInput(
+        Concat("--prefix: expected a lower-case letter, then lower-case letters, digits ",
+               "and _, at most ", kLongestPrefix, " characters, got \"", prefix, "\""));
   }
   if (loaded.policy->num_parameters() > kMostParameters) {
     throw BadInput(Concat(loaded.path, ": expected at most ", kMostParameters,

@@ -95,6 +95,11 @@ struct FlagValue {
 /// Applies flags to the options. Throws BadInput.
 void SetFlags(const Options& options, const std::vector<FlagValue>& flags);
 
+/// Runs a check whose message begins with the name of a setting. The message then begins with the
+/// place that set it: the last of `flags` with this name, otherwise `where` and the name.
+void CheckNamingFlags(const std::vector<FlagValue>& flags, const std::string& where,
+                      const std::function<void()>& check);
+
 /// Builds the settings from four layers, each over the one before: defaults, named agent,
 /// configuration file (`text`), flags. `where` names the file in messages. Throws BadInput, also if
 /// settings contradict each other.

@@ -22,7 +22,7 @@ std::string Gigabytes(double bytes) {
 
 /// Throws BadInput if a setting of the double pendulum differs from its default in another
 /// environment.
-void CheckForeign(Config& config, const std::string& where) {
+void CheckForeign(Config& config) {
   const auto settings_of = [](Config& from) {
     Options settings;
     from.train.DescribeCurriculum(settings);
@@ -33,7 +33,7 @@ void CheckForeign(Config& config, const std::string& where) {
   const Options now = settings_of(config);
   const Options usual = settings_of(defaults);
   for (const auto& [option, other] : Differences(now, usual)) {
-    throw BadInput(Concat(where.empty() ? "" : where + ": ", option.name,
+    throw BadInput(Concat(option.name,
                           ": expected none with a Gymnasium environment, which has no such "
                           "setting, got ",
                           option.text()));
@@ -42,27 +42,21 @@ void CheckForeign(Config& config, const std::string& where) {
 
 }  // namespace
 
-void CheckSettings(Config& config, const std::string& where) {
-  try {
-    config.learner().Check(config.train.envs);
-    (void)config.randomization.MakePosterior();  // throws if there is none to draw from
-    if (!config.start_policy.empty() && !config.learner().StartsFromPolicy()) {
-      const std::vector<std::string> able =
-          AlgorithmsThat([](const AgentConfig& settings) { return settings.StartsFromPolicy(); });
-      throw BadInput(Concat("start_policy: expected an agent of ", Join(able, " or "),
-                            ", got one of ", config.algorithm));
-    }
-    if (!config.reward.expression.empty()) (void)OwnReward(config.reward.expression);
-    if (!config.is_foreign()) {
-      const PendulumEnvConfig env = config.Environments();
-      CheckPeriods(env);
-      ExpectWholePeriods("episode_seconds", env.episode_seconds, env.control_period);
-      (void)PhysicsStepsFor(config.plant, config.randomization, env.control_period, "plant");
-    }
-  } catch (const Error& error) {
-    throw BadInput(Concat(where, where.empty() ? "" : ": ", error.what()));
+void CheckSettings(Config& config) {
+  config.learner().Check(config.train.envs);
+  (void)config.randomization.MakePosterior();  // throws if there is none to draw from
+  if (!config.start_policy.empty() && !config.learner().StartsFromPolicy()) {
+    const std::vector<std::string> able =
+        AlgorithmsThat([](const AgentConfig& settings) { return settings.StartsFromPolicy(); });
+    throw BadInput(Concat("start_policy: expected an agent of ", Join(able, " or "),
+                          ", got one of ", config.algorithm));
   }
-  if (config.is_foreign()) CheckForeign(config, where);
+  if (!config.reward.expression.empty()) (void)OwnReward(config.reward.expression);
+  if (config.is_foreign()) return CheckForeign(config);
+  const PendulumEnvConfig env = config.Environments();
+  CheckPeriods(env);
+  ExpectWholePeriods("episode_seconds", env.episode_seconds, env.control_period);
+  (void)PhysicsStepsFor(config.plant, config.randomization, env.control_period, "plant");
 }
 
 std::vector<std::string> Warnings(const Config& config) {

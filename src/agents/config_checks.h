@@ -8,9 +8,9 @@
 
 namespace upswing {
 
-/// Throws BadInput that begins with `where` if settings contradict each other, although each is in
-/// its range. Also throws it if a setting does not exist in the task.
-void CheckSettings(Config& config, const std::string& where);
+/// Throws BadInput that begins with the name of a setting if settings contradict each other,
+/// although each is in its range. Also throws it if a setting does not exist in the task.
+void CheckSettings(Config& config);
 
 /// Warnings, one per line, about settings with which the agent would hardly learn.
 std::vector<std::string> Warnings(const Config& config);

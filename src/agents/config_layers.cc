@@ -192,6 +192,20 @@ void SetFlags(const Options& options, const std::vector<FlagValue>& flags) {
   }
 }
 
+void CheckNamingFlags(const std::vector<FlagValue>& flags, const std::string& where,
+                      const std::function<void()>& check) {
+  try {
+    check();
+  } catch (const Error& error) {
+    const std::string what = error.what(), name = what.substr(0, what.find(':'));
+    std::string place = Concat(where, where.empty() ? "" : ": ", name);
+    for (const FlagValue& flag : flags) {
+      if (flag.name == name) place = flag.where.empty() ? FlagOf(name) : flag.where;
+    }
+    throw Error(error.exit_code(), Concat(place, what.substr(name.size())));
+  }
+}
+
 Config ConfigIn(std::string_view text, const std::string& where) {
   const toml::table table = ParseToml(text, where);
   Config config(AlgorithmIn(table, where));
@@ -235,18 +249,20 @@ Config ParseConfig(std::string_view text, const std::string& where,
   ApplyTable(options, table, where, false);
   SetFlags(options, flags);
   config.agent = agent.name;  // whatever its own file says
-  if (foreign) {
-    const EarlySetting decay = FindEarly("agent", "learning_rate_steps", table, where, flags);
-    FitToForeign(options, !decay.where.empty(), config);
-  } else {
-    const auto is_given = [&](const Option& option) {
-      return !FindEarly(option.section, option.name, table, where, flags).where.empty();
-    };
-    FitToPlant(options, designed, is_given, config);
-    const double usual = designed_period * CarryOver(designed, config.plant).time;
-    if (is_given(*options.Get("control_period"))) FitToPeriod(options, usual, is_given, config);
-  }
-  CheckSettings(config, where);
+  CheckNamingFlags(flags, where, [&] {
+    if (foreign) {
+      const EarlySetting decay = FindEarly("agent", "learning_rate_steps", table, where, flags);
+      FitToForeign(options, !decay.where.empty(), config);
+    } else {
+      const auto is_given = [&](const Option& option) {
+        return !FindEarly(option.section, option.name, table, where, flags).where.empty();
+      };
+      FitToPlant(options, designed, is_given, config);
+      const double usual = designed_period * CarryOver(designed, config.plant).time;
+      if (is_given(*options.Get("control_period"))) FitToPeriod(options, usual, is_given, config);
+    }
+    CheckSettings(config);
+  });
   // Last, because only the reward of a checked configuration can be evaluated.
   FitToReward(options, FindEarly("agent", "mirror", table, where, flags).where, config);
   return config;

@@ -85,11 +85,11 @@ class CommandLineTest(ProgramTest):
                             f'got "{value}"')
 
     def test_delay_that_is_no_whole_number_of_control_periods(self):
-        for flag, name in (("--delay", "delay"), ("--randomize-delay", "randomize_delay")):
+        for flag in ("--delay", "--randomize-delay"):
             for value, nearest in (("0.001", "0 and 0.02"), ("0.99", "0.98 and 1"),
                                    ("0.70001", "0.7 and 0.72")):
                 with self.subTest(flag=flag, value=value):
-                    words = [f" {name}: expected a multiple of 0.02", f'got "{value}"',
+                    words = [f" {flag}: expected a multiple of 0.02", f'got "{value}"',
                              f"the nearest are {nearest}"]
                     self.refuse([*TRAIN, flag, value], *words)
                     self.refuse(["eval", "lqr", flag, value], *words)
@@ -118,10 +118,33 @@ class CommandLineTest(ProgramTest):
                 (["--algorithm", "sarsa"], ["--algorithm", "dqn, sac, ppo", "sarsa"]),
                 (["--agent", "sac", "--target-entropy", "1"], ["--target-entropy", "0.69"]),
                 (["--agent", "ppo", "--batch", "300"], ["batch", "256 or 512", "300"]),
-                (["--agent", "ppo", "--initial-std", "3"], ["initial_std", "max_std (1)", "3"]),
+                (["--agent", "ppo", "--initial-std", "3"], ["--initial-std", "max_std (1)", "3"]),
                 (["--agent", "ppo", "--levels", "5"], ["levels", "continuous", "5"])):
             with self.subTest(flags=flags):
                 self.refuse(["train", *flags], *words)
+
+    def test_contradictions_name_the_flag_that_caused_them(self):
+        posterior = "expected rows with different values of a machine"
+        self.write("wide.toml", "[agent]\nbatch = 300\n")
+        self.write("reward.toml", '[reward]\nreward = "E + w3"\n')
+        for flags, start in (
+                (["--agent", "ppo", "--batch", "300"], " --batch: expected a size"),
+                (["--agent", "ppo", "--config", "wide.toml"], " wide.toml: batch: expected a size"),
+                (["--config", "wide.toml", "--agent", "ppo", "--batch", "200"], " --batch: expected a size"),
+                (["--reward", "E + w3"], " --reward: term1: expected a known name"),
+                (["--config", "reward.toml"], " reward.toml: reward: term1: expected a known name"),
+                (["--environment", "x"], " --environment: expected a JSON object"),
+                (["--randomize-posterior"], " --randomize-posterior: expected --plant"),
+                (["--posterior", "foo 1"], f" --posterior: {posterior}"),
+                (["--posterior", "mass1 -1"], " --posterior: expected a positive matrix")):
+            with self.subTest(flags=flags):
+                self.refuse([*TRAIN, *flags], f"upswing:{start}")
+        for flags, start in ((["--randomize-posterior"], " --randomize-posterior: expected --plant"),
+                             (["--posterior", "foo 1"], f" --posterior: {posterior}")):
+            for command in ("eval", "simulate", "plot"):
+                with self.subTest(command=command, flags=flags):
+                    self.refuse([command, "fast", *flags], f"upswing:{start}")
+        self.refuse(["export", "fast", "--c", "x.h", "--prefix", "3x"], " --prefix: expected a lower-case")
 
     def test_no_layers(self):
         self.refuse([*TRAIN, "--hidden", "[]"], "expected", "--hidden")

@@ -171,6 +171,18 @@ class CompareTest(ProgramTest):
         self.assertTrue(any("budgets, 4,000 to 9,000 steps" in n for n in answer["notes"]), answer)
         self.assertTrue(any("some do not" in n for n in answer["notes"]), answer)
 
+    def test_a_posterior_that_nothing_is_drawn_from_does_not_split_a_group(self):
+        covariance = 'posterior = "mass1 0.01"\n'
+        self.make_group("with", [2], more=covariance)
+        self.make_run("without", 2, [(0.5, 1000)] * 4)
+        self.make_run("other", 3, [(0.5, 1000)] * 4, agent="dqn", more=covariance)
+        found = json.loads(self.succeed("compare", "with", "without", "other", "--json"))
+        self.assertEqual([group["group"] for group in found["groups"]], ["d3qn", "dqn"])
+        self.assertFalse(any("different tasks" in note for note in found["notes"]), found)
+        self.assertNotIn("posterior", json.dumps(found))
+        self.make_run("drawn", 1, [(0.5, 1000)] * 4, more=covariance + "randomize_posterior = true\n")
+        self.assertIn("posterior", self.succeed("compare", "with", "drawn"))
+
     def test_one_seed_has_no_interval(self):
         self.make_run("run", 1, [(1, 2600), (1, 2610)])
         answer = self.compare("run")

@@ -419,7 +419,7 @@ class EvalTest(ProgramTest):
             self.assertAlmostEqual(center, usual["plant"]["center1"], delta=0.0104)
         for plant in ((), ("--plant", "realaigym")):
             self.refuse(["eval", self.policy, *plant, "--randomize-posterior"],
-                        "randomize_posterior: expected --plant with a twin that has a covariance")
+                        "--randomize-posterior: expected --plant with a twin that has a covariance")
 
     def test_random_plants_are_the_same_in_closed_form(self):
         usual, twin = (self.evaluate("--randomize", 0.25, "--physics", physics)

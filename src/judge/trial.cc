@@ -67,7 +67,6 @@ PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy*
   const TrialConditions conditions = ConditionsOf(flags);
   env.disturbances = {conditions.disturbance};
   env.randomization = conditions.randomization;
-  (void)env.randomization.MakePosterior();  // throws if there is none to draw from
   if (a.unknown_plant && loaded == nullptr) {
     throw BadInput("--unknown-plant: expected a policy with it, got none");
   }
@@ -94,7 +93,10 @@ PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy*
   SetFlags(OptionsOf(plant), a.plant_flags);
   ApplyChanges(OptionsOf(plant), a.set);
   env.plants = {plant};
-  CheckPeriods(env);
+  CheckNamingFlags(flags, "", [&] {
+    (void)env.randomization.MakePosterior();  // throws if there is none to draw from
+    CheckPeriods(env);
+  });
   env.seed = static_cast<uint64_t>(a.seed);
   env.stream = "evaluation";
   return env;

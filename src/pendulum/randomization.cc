@@ -41,13 +41,18 @@ bool Randomization::any() const {
 }
 
 std::optional<Posterior> Randomization::MakePosterior() const {
-  if (!from_posterior) return std::nullopt;
   if (posterior.empty()) {
+    if (!from_posterior) return std::nullopt;
     throw BadInput(
         "randomize_posterior: expected --plant with a twin that has a covariance of its plant, "
         "got none");
   }
-  return Posterior::Parse(posterior, "posterior");
+  const Posterior parsed = Posterior::Parse(posterior, "posterior");
+  return from_posterior ? std::optional(parsed) : std::nullopt;
+}
+
+void Randomization::DropUnused() {
+  if (!from_posterior) posterior.clear();
 }
 
 Plant Randomization::Draw(const Plant& nominal, Rng& rng) const {

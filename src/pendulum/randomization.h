@@ -28,8 +28,10 @@ struct Randomization {
   void Describe(Options& options);
   bool any() const;
   /// The posterior that plants and sensors are drawn from; none unless `from_posterior`. Throws
-  /// BadInput if there is none to draw from.
+  /// BadInput if there is none to draw from, or if `posterior` is malformed.
   std::optional<Posterior> MakePosterior() const;
+  /// Removes a posterior that nothing is drawn from.
+  void DropUnused();
   /// Draws a plant from the box: each parameter is uniform and independent of the others. Always
   /// draws eight numbers from the stream.
   Plant Draw(const Plant& nominal, Rng& rng) const;

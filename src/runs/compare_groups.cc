@@ -206,7 +206,11 @@ Comparison GroupRuns(const CompareRequest& request) {
     std::ranges::sort(group.runs, {}, [](const RunRecord& run) { return run.config.train.seed; });
   }
   std::vector<Options> settings;
-  for (const RunGroup& group : groups) settings.push_back(OptionsOf(group.runs.front().config));
+  for (RunGroup& group : groups) {
+    Config& config = group.runs.front().config;
+    config.randomization.DropUnused();
+    settings.push_back(OptionsOf(config));
+  }
   TellGroupsApart(groups, settings);
   TellTasksApart(comparison, settings);
   comparison.notes = found.notes;

@@ -85,8 +85,10 @@ void MakeReadyForMany(Config& config) {
 }
 
 std::string SettingsMark(const Config& config) {
+  Config used = config;
+  used.randomization.DropUnused();
   Checksum sum;
-  const Options options = OptionsOf(config);
+  const Options options = OptionsOf(used);
   for (const Option& option : options.all()) {
     if (option.decides != Option::Decides::kTraining) continue;
     sum.Update(BytesOf(Concat(option.section, ".", option.name, "=", option.text(), "\n")));
