@@ -52,6 +52,9 @@ nlohmann::json JobOf(const PlantArguments& a) {
     throw BadInput(Concat("--drop: expected one of ", Join(kDroppable, ", "), ", got \"",
                           Printable(name), "\""));
   }
+  if (a.convert_friction && std::ranges::find(a.drop, "frictionloss") != a.drop.end()) {
+    throw BadInput("--convert-friction: expected no --drop frictionloss with it, which drops it");
+  }
   const auto given = [](double value) {
     return value > 0 ? nlohmann::json(value) : nlohmann::json();
   };

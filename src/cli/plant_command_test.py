@@ -372,6 +372,8 @@ class Strangers(PlantCommandTest):
                 (["--out", "x.toml"], "expected FILE.xml|FILE.urdf"),
                 (["model.xml", "--out", "no/x.toml"], "--out no/x.toml", "No such file"),
                 (["model.xml", "--out", "x.toml", "--drop", "spring"], "--drop: expected one of stiffness", '"spring"'),
+                (["model.xml", "--out", "x.toml", "--drop", "frictionloss", "--convert-friction"],
+                 "--convert-friction: expected no --drop frictionloss with it"),
                 (["model.xml", "--out", "x.toml", "--motor", "3"], "--motor"),
                 (["model.xml", "--out", "x.toml", "--length2", "0"], "--length2")):
             with self.subTest(arguments):
