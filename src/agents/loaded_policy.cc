@@ -90,6 +90,11 @@ Plant TrainingPlant(const PolicyInfo& info, const std::string& where) {
     }
   }
   const Options options = OptionsOf(plant);
+  for (const auto& [name, value] : info.plant) {
+    if (options.Get(name) != nullptr) continue;
+    throw BadInput(Concat(place, ": expected parameters of a plant, got \"", Printable(name), "\"",
+                          DidYouMean(name, NamesOf(options.all()))));
+  }
   for (const Option& option : options.all()) {
     const auto found = info.plant.find(option.name);
     if (found == info.plant.end()) continue;  // it has its default; see PlantValues

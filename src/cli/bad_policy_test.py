@@ -141,6 +141,7 @@ class PolicyFileTest(SmallRunTest):
                        {"network": "{}"}, {"network": "nonsense"}, {"plant": "nonsense"},
                        {"plant": "{}"}, {"plant": metadata["plant"].replace("9.81", "-9.81")},
                        {"plant": json.dumps(json.loads(metadata["plant"]) | {"actuated_joint": 3})},
+                       {"plant": json.dumps(json.loads(metadata["plant"]) | {"mass": 3})},
                        {"network": json.dumps(network | {"hidden": [64]})},
                        {"network": json.dumps(network | {"hidden": []})},
                        {"network": json.dumps(network | {"hidden": [-1]})},
@@ -157,6 +158,13 @@ class PolicyFileTest(SmallRunTest):
                 self.change(drop=[key])
                 self.refuse(["eval", "run"], f'"{key}"')
                 self.restore()
+
+    def test_unknown_parameters_of_the_plant(self):
+        metadata, _ = read_tensors(self.policy)
+        self.change(metadata={"plant": json.dumps(json.loads(metadata["plant"]) | {"centre1": 0.2})})
+        for command in ("eval", "plot", "simulate"):
+            self.refuse([command, "run"], 'metadata "plant": expected parameters of a plant, got "centre1" '
+                                          '(did you mean center1?)')
 
     def test_metadata_that_the_program_uses(self):
         metadata, _ = read_tensors(self.policy)
