@@ -375,6 +375,19 @@ class LauncherTest(ProgramTest):
             self.assert_one_line(self.launch("--no-setup", "test", "--preset=debug", word), 2,
                                  f"expected {word}")
 
+    def test_flags_that_ctest_would_ignore(self):
+        for words in (["--foo"], ["-R", "dqn", "--foo"], ["--preset", "debug", "--foo=3"], ["-Rx", "--foo"],
+                      ["--cluster", "--foo"]):
+            with self.subTest(words=words):
+                self.assert_one_line(self.launch("--no-setup", "test", *words), 2, "test: unknown flag -",
+                                     "expected --preset, --cluster, --benchmarks or flags of ctest")
+        # Those that ctest knows get further: nothing is built here.
+        for words in ("-R dqn", "-R --foo", "-LE slow -j4 -V", "-j 4 --parallel 2 -I 1,3", "--tests-regex=dqn",
+                      "-N", "--show-only=json-v1", "--no-tests=ignore", "--timeout 5 -E -x", "-FA x -U",
+                      "--repeat until-fail:2 --stop-on-failure --rerun-failed --output-on-failure"):
+            with self.subTest(words=words):
+                self.assert_one_line(self.launch("--no-setup", "test", *words.split()), 1, "are not built")
+
     def test_benchmarks_that_are_not_built(self):
         self.assert_one_line(self.launch("--no-setup", "test", "--benchmarks"), 1,
                              "run ./upswing test --benchmarks without --no-setup")
