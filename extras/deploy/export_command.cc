@@ -98,8 +98,9 @@ int RunExport(const ExportArguments& a) {
 void AddExport(CommandLine& line) {
   ExportArguments& a = line.Runs(RunExport);
   line.Texts("policies", a.policies, "POLICY|RUN",
-             Concat("policies: policy.safetensors, run folders or shipped policies; for --c also ",
-                    Join(ControllersInC(), ", ")));
+             Concat("policies: policy.safetensors, run folders or shipped policies; for --c also "
+                    "controllers (",
+                    Join(ControllersInC(), ", "), ")"));
   AddControllers(line, a.controller);
   line.Text(
       "--onnx", a.onnx, "FILE",

@@ -111,8 +111,9 @@ void ControllerConfig::Describe(Options& o) {
   energy.Describe(o);
   pfl.Describe(o);
   o.Section("hybrid");
-  o.Add(&swing_up, "swing_up", "policy that swings up: policy.safetensors or a run folder").usual =
-      "none";
+  o.Add(&swing_up, "swing_up",
+        "policy that swings up: policy.safetensors, a run folder or a shipped policy")
+      .usual = "none";
 }
 
 std::span<const ControllerKind> ControllerKinds() { return kControllers; }

@@ -58,7 +58,28 @@ class HelpTest(ProgramTest):
                  ("upswing", "eval", "--epis", {"--episodes", "--episodes-csv"}),
                  ("upswing", "machine adapt", "--th", {"--threads"}),
                  ("upswing", "eval lqr --physics", "", {"mujoco", "closed-form"}),
-                 ("upswing", "train --agent", "sac", {"sac", "sac-fast"}))
+                 ("upswing", "train --agent", "sac", {"sac", "sac-fast"}),
+                 ("upswing", "train", "--gam", {"--gamma"}),
+                 ("upswing", "completion", "", {"bash", "zsh", "fish"}),
+                 ("upswing", "eval", "d3qn-a", {"d3qn-adaptive"}),
+                 ("upswing", "eval fast", "tv", {"tvlqr"}),
+                 ("upswing", "eval", "mine", {"mine.toml", "mine-seed1"}),
+                 ("upswing", "info", "", {"fast", "mpc", "mine-seed1"}),
+                 ("upswing", "export", "", {"fast", "tvlqr", "mine-seed1"}),
+                 ("upswing", "run", "en", {"energy"}),
+                 ("upswing", "compare", "mine-", {"mine-seed1"}),
+                 ("upswing", "eval fast --plant", "real", {"realaigym", "realaigym-c1", "realaigym-twin"}),
+                 ("upswing", "eval fast --plant", "mine", {"mine.toml", "mine-seed1"}),
+                 ("upswing", "eval fast --made-for", "realaigym-", {"realaigym-c1", "realaigym-twin"}),
+                 ("upswing", "run fast --link", "realaigym-", {"realaigym-c1", "realaigym-twin"}),
+                 ("upswing", "run fast --robot", "", {"pendubot", "acrobot"}),
+                 ("upswing", "eval hybrid --swing-up", "do", {"double-dqn"}),
+                 ("upswing", "train --start-policy", "mine-", {"mine-seed1"}),
+                 ("upswing", "train --config", "mine.", {"mine.toml"}),
+                 ("upswing", "export fast --c", "--", set()),
+                 ("upswing", "eval fast --episodes", "--", set()))
+        self.write("mine.toml", "")
+        (self.folder / "mine-seed1").mkdir()
         for shell, script in self.COMPLETIONS.items():
             if not shutil.which(shell):
                 continue
@@ -66,9 +87,9 @@ class HelpTest(ProgramTest):
                 with self.subTest(shell=shell, words=f"{before} {word}"):
                     done = subprocess.run([shell, "-c", script.format(UPSWING, program, before, word)],
                                           check=True, capture_output=True, encoding="utf-8",
-                                          env=os.environ | {"PATH": f"{UPSWING.parent}:{os.environ['PATH']}"})
+                                          cwd=self.folder, env=os.environ | {"PATH": f"{UPSWING.parent}:{os.environ['PATH']}"})
                     # zsh leaves the choice by prefix to its own code, and fish adds files.
-                    found = {name for name in done.stdout.split() if name.startswith(word)}
+                    found = {name.rstrip("/") for name in done.stdout.split() if name.startswith(word)}
                     self.assertEqual((found & expected if word == "" else found, done.stderr),
                                      (expected, ""))
         self.refuse(["completion", "ksh"], "expected bash, zsh or fish, got ksh")

@@ -86,7 +86,7 @@ void AddFake(CommandLine& line) {
             "pseudo-terminal, whose path is printed");
   line.Text(
       "--start", a.start, "STATE",
-      "state at the beginning: hanging, upright or q1,q2,w1,w2 [rad, rad/s] (default hanging)");
+      "state at the beginning, or q1,q2,w1,w2 [rad, rad/s] (hanging, upright; default hanging)");
   line.Text("--stuck", a.stuck, "JOINT@SECONDS", "encoder that sticks from a time on");
   line.Arguments(OptionsOf(a.config));
   AddSeed(line, a.seed, "the line's faults and of --draw");

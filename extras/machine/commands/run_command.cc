@@ -181,13 +181,13 @@ void AddRun(CommandLine& line) {
   line.Text("--twin", a.twin, "FILE",
             "twin of the machine at a UDP or serial link, for the estimate of its state");
   line.Text("--robot", a.robot, "ROBOT",
-            "pendubot or acrobot: the motor of a controller's design (default: the policy's own)");
+            "motor of a controller's design (pendubot, acrobot; default the policy's own)");
   line.Text("--log", a.log, "FILE",
             "new CSV file to write, a row per reading; `machine check` reads it");
   line.Text(
       "--start", a.start, "STATE",
-      "state in which the controller takes over: hanging, upright or q1,q2,w1,w2 [rad, rad/s] "
-      "(default hanging)");
+      "state in which the controller takes over, or q1,q2,w1,w2 [rad, rad/s] (hanging, upright; "
+      "default hanging)");
   Options own;
   own.Section("loop");
   own.Add(&a.hz, "hz", {100, 1000}, "1/s", "cycles per second").step = 50;
