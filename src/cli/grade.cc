@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <functional>
 
+#include "base/error.h"
 #include "base/format.h"
 #include "base/text.h"
 #include "base/thread_pool.h"
@@ -16,6 +18,8 @@
 
 namespace upswing {
 namespace {
+
+namespace fs = std::filesystem;
 
 struct GradeArguments {
   std::string folder, out;
@@ -43,9 +47,21 @@ void PrintGrades(const std::vector<Grade>& grades, const GradeConfig& config) {
   }
 }
 
+/// Throws BadInput unless --out is a new folder outside the folder of the class, whose entries are
+/// graded.
+void CheckOut(const GradeArguments& a) {
+  CheckFree(a.out);
+  std::error_code error;
+  const fs::path folder = fs::canonical(a.folder, error);
+  const fs::path out = fs::weakly_canonical(fs::absolute(a.out), error);
+  const fs::path below = out.lexically_relative(folder);
+  if (folder.empty() || below.empty() || *below.begin() == "..") return;
+  throw BadInput(Concat("--out: expected a folder outside ", Printable(a.folder),
+                        ", whose entries are graded, got ", Printable(a.out)));
+}
+
 int RunGrade(const GradeArguments& a) {
-  namespace fs = std::filesystem;
-  if (!a.out.empty()) CheckFree(a.out);
+  if (!a.out.empty()) CheckOut(a);
   ThreadPool pool(ResolveThreads(a.threads), a.threads == 0);
   const std::vector<Grade> grades = [&] {
     EpisodeProgress progress(false);

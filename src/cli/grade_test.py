@@ -68,6 +68,26 @@ class GradeTest(ProgramTest):
         self.assertAlmostEqual(abs(first_link / 3142), 1, delta=0.05)
         self.assertAlmostEqual(second_link, 0, delta=150)
 
+    def test_namesakes_are_told_apart(self):
+        self.hand_in("fast", "anna.safetensors")
+        self.hand_in("sac", "anna/policy.safetensors")
+        self.hand_in("ppo", "bob.safetensors")
+        printed = self.succeed("grade", "class", *QUICK, "--out", "out")
+        self.assertEqual({row["name"] for row in self.rows()}, {"anna", "anna.safetensors", "bob"})
+        self.assertEqual({row["name"] for row in self.data()["rows"]},
+                         {"anna", "anna.safetensors", "bob"})
+        self.assertRegex(printed, r"(?m)^ +\d  anna\.safetensors +\d")
+
+    def test_no_output_inside_the_class_folder(self):
+        self.hand_in("fast", "anna.safetensors")
+        (self.folder / "link").symlink_to("class")
+        for folder, out in (("class", "class/out"), ("class/", "./class/a/b"), ("link", "class/out"),
+                            (".", "out"), ("class", "link/out")):
+            with self.subTest(folder=folder, out=out):
+                self.refuse(["grade", folder, *QUICK, "--out", out],
+                            f"--out: expected a folder outside {folder}, whose entries are graded, got {out}")
+        self.succeed("grade", "class", *QUICK, "--out", "class-out")
+
     def test_figures_are_those_of_eval(self):
         self.hand_in("ppo", "a.safetensors")
         self.succeed("grade", "class", "--episodes", 20, "--plants", 20, "--out", "out")

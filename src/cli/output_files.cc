@@ -39,7 +39,10 @@ void ExpectOther(const NamedFile& output, const NamedFile& other) {
   }
   // Other words are names: an agent, for example.
   if (!other.is_output || fs::exists(output.text, error)) return;
-  if (fs::weakly_canonical(output.text, error) == fs::weakly_canonical(other.text, error)) {
+  const auto place = [&](const std::string& text) {
+    return fs::weakly_canonical(fs::absolute(text), error);
+  };
+  if (place(output.text) == place(other.text)) {
     throw Lost(output, other, other.text);
   }
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <tuple>
 
@@ -132,7 +133,16 @@ void GradeEntry(const fs::path& folder, const GradeConfig& config, ThreadPool& p
   grade.motion = MotionOf(policy, nominal);
 }
 
-/// The entries of a folder, in the order of their names.
+/// Names entries that have the same name, such as anna.safetensors and the folder anna, by file.
+void TellNamesakesApart(std::vector<Grade>& grades) {
+  std::map<std::string, int> count;
+  for (const Grade& grade : grades) ++count[grade.name];
+  for (Grade& grade : grades) {
+    if (count[grade.name] > 1) grade.name = grade.file;
+  }
+}
+
+/// The entries of a folder, in the order of their files.
 std::vector<Grade> EntriesOf(const fs::path& folder) {
   std::error_code error;
   std::vector<Grade> grades;
@@ -149,6 +159,7 @@ std::vector<Grade> EntriesOf(const fs::path& folder) {
                           " policies in the folder, got ", grades.empty() ? "none" : "more"));
   }
   std::ranges::sort(grades, {}, &Grade::file);
+  TellNamesakesApart(grades);
   return grades;
 }
 

@@ -26,7 +26,7 @@ struct GradeConfig {
 
 /// The grade of one entry of the folder.
 struct Grade {
-  std::string name;     // of the student or team: the entry without .safetensors
+  std::string name;     // of the student or team: the entry, without .safetensors if that is unique
   std::string file;     // path of the policy within the folder
   std::string refused;  // why there is no grade; empty: there is one
   Evaluation nominal, random;
