@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -86,9 +88,24 @@ struct ComparisonRow {
   std::string policy, success, reward_sum, swing_up, variation;
 };
 
-void PrintRow(size_t width, const ComparisonRow& row) {
-  fmt::print("  {:<{}}  {:<20}  {:<28}  {:<23}  {}\n", row.policy, width, row.success,
-             row.reward_sum, row.swing_up, row.variation);
+/// The cells of a row, in the order of the columns.
+std::array<std::string, 5> CellsOf(const ComparisonRow& row) {
+  return {row.policy, row.success, row.reward_sum, row.swing_up, row.variation};
+}
+
+/// The width of each column of a table with these rows.
+std::array<size_t, 5> WidthsOf(std::span<const ComparisonRow> rows) {
+  std::array<size_t, 5> widths{0, 20, 28, 23, 0};  // the usual ones
+  for (const ComparisonRow& row : rows) {
+    const std::array<std::string, 5> cells = CellsOf(row);
+    for (size_t i = 0; i < cells.size(); ++i) widths[i] = std::max(widths[i], Columns(cells[i]));
+  }
+  return widths;
+}
+
+void PrintRow(const ComparisonRow& row, const std::array<size_t, 5>& widths) {
+  fmt::print("  {:<{}}  {:<{}}  {:<{}}  {:<{}}  {}\n", row.policy, widths[0], row.success,
+             widths[1], row.reward_sum, widths[2], row.swing_up, widths[3], row.variation);
 }
 
 ComparisonRow FiguresRow(const EvalReport& report) {
@@ -186,20 +203,20 @@ void PrintEvalTable(const EvalReport& report) {
 
 void PrintEvalComparison(std::span<const EvalReport> reports) {
   const EvalReport& first = reports.front();
-  size_t width = 0;
-  for (const EvalReport& report : reports) {
-    width = std::max(width, Printable(report.title).size());
-  }
+  std::vector<ComparisonRow> rows{
+      {"", "success [%]", "return", "swing-up [s]", "torque change [N·m/s]"}};
+  for (const EvalReport& report : reports) rows.push_back(FiguresRow(report));
+  for (const EvalReport& report : reports.subspan(1)) rows.push_back(DifferencesRow(report, first));
+  const std::array<size_t, 5> widths = WidthsOf(rows);
+
   fmt::print("The same {} for all\n", Counted(first.figures.episodes, "episode"));
   PrintConditions(first);
   for (const EvalReport& report : reports) PrintNotes(report, Printable(report.title) + ": ");
   fmt::print("\n");
-  PrintRow(width, {"", "success [%]", "return", "swing-up [s]", "torque change [N·m/s]"});
-  for (const EvalReport& report : reports) PrintRow(width, FiguresRow(report));
+  const size_t figures = 1 + reports.size();  // rows before those of the differences
+  for (const ComparisonRow& row : std::span(rows).first(figures)) PrintRow(row, widths);
   fmt::print("\n  minus {}, in the same episodes\n", Printable(first.title));
-  for (const EvalReport& report : reports.subspan(1)) {
-    PrintRow(width, DifferencesRow(report, first));
-  }
+  for (const ComparisonRow& row : std::span(rows).subspan(figures)) PrintRow(row, widths);
   fmt::print(
       "\n  ± is the standard deviation over the episodes; swing-up is a median.\n"
       "  Differences are means over the episodes, of swing-up over those in which both succeed.\n"

@@ -103,6 +103,15 @@ class EvalTest(ProgramTest):
                       table)
         self.assertEqual(rows.count("sac"), 1)
         self.assertIn("minus sac, in the same episodes", "\n".join(table))
+        # The columns stand in line, also below wide cells.
+        wide = self.succeed("eval", "fast", "mpc", "--episodes", 5, "--randomize", 0.1).splitlines()
+        header = next(line for line in wide if "success [%]" in line)
+        cells = [line for line in wide if line.startswith(("  fast ", "  mpc "))]
+        self.assertEqual(len(cells), 3)
+        for title in ("success", "return", "swing-up", "torque"):
+            at = header.index(title)
+            for line in cells:
+                self.assertRegex(line[at - 2:at + 1], r"  \S")
         # No episode in which both swing up has a difference.
         difference = next(line for line in reversed(table) if "lqr" in line)
         self.assertRegex(difference, r"  none  ")
