@@ -69,6 +69,14 @@ std::vector<std::string> Warnings(const Config& config) {
       std::ranges::all_of(config.reward.weight, [](double weight) { return weight == 0; })) {
     warnings.emplace_back("every reward weight is 0: the agent learns nothing");
   }
+  if (!built_in) {
+    const RewardConfig usual;
+    for (const Difference& change : Differences(OptionsOf(config.reward), OptionsOf(usual))) {
+      if (change.now.name == "reward") continue;
+      warnings.push_back(
+          Concat(change.now.name, " has no effect, because reward replaces the built-in terms"));
+    }
+  }
   const Options options = OptionsOf(config);
   const std::string asymmetry =
       options.Get("mirror")->text() == "false" ? RewardAsymmetry(config.Environments()) : "";

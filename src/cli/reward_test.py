@@ -36,6 +36,12 @@ class RewardTest(ProgramTest):
         self.succeed(*small(steps=4000, reward=REWARD, episode_seconds=1.5, out="never-stopped"))
         self.assert_same_run("run", "never-stopped")
 
+    def test_weights_of_the_built_in_terms_have_no_effect(self):
+        words = "Warning: energy_weight has no effect, because reward replaces the built-in terms\n"
+        self.assertIn(words, self.succeed(*small(steps=400, reward="E", energy_weight=2)))
+        self.assertNotIn(words, self.succeed(*small(steps=400, energy_weight=2, out="built-in")))
+        self.assertNotIn("has no effect", self.succeed(*small(steps=400, reward="E", out="own")))
+
     def mirrors(self, run):
         """Whether the settings of a run mirror its minibatches."""
         found = re.search(r"(?m)^mirror = (\w+)", (self.folder / run / "config.toml").read_text("utf-8"))
