@@ -95,8 +95,8 @@ struct FlagValue {
 /// Applies flags to the options. Throws BadInput.
 void SetFlags(const Options& options, const std::vector<FlagValue>& flags);
 
-/// Runs a check whose message begins with the name of a setting. The message then begins with the
-/// place that set it: the last of `flags` with this name, otherwise `where` and the name.
+/// Runs a check whose message begins with the name of a setting. If a flag of the command line set
+/// it, the message begins with the flag, otherwise with `where` and the name.
 void CheckNamingFlags(const std::vector<FlagValue>& flags, const std::string& where,
                       const std::function<void()>& check);
 

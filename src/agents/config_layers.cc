@@ -167,6 +167,15 @@ void FitToReward(const Options& options, const std::string& place, const Config&
       Concat(place, ": expected false with this reward, which is ", asymmetry, ", got true"));
 }
 
+/// Whether a flag sets this setting, as its name or an alias.
+bool StandsFor(const std::string& flag, const std::string& setting) {
+  if (flag == setting) return true;
+  const Options every = EverySetting();
+  return std::ranges::any_of(every.aliases(), [&](const auto& alias) {
+    return alias.name == flag && std::ranges::find(alias.members, setting) != alias.members.end();
+  });
+}
+
 }  // namespace
 
 Options KnownOptions(Config& config) {
@@ -200,7 +209,7 @@ void CheckNamingFlags(const std::vector<FlagValue>& flags, const std::string& wh
     const std::string what = error.what(), name = what.substr(0, what.find(':'));
     std::string place = Concat(where, where.empty() ? "" : ": ", name);
     for (const FlagValue& flag : flags) {
-      if (flag.name == name) place = flag.where.empty() ? FlagOf(name) : flag.where;
+      if (flag.where.empty() && StandsFor(flag.name, name)) place = FlagOf(flag.name);
     }
     throw Error(error.exit_code(), Concat(place, what.substr(name.size())));
   }

@@ -49,7 +49,11 @@ class FromTest(SmallRunTest):
                                  "updates_per_step": None, "envs": None}, "expected an agent of dqn or sac")):
             with self.subTest(changes=changes):
                 self.refuse(small(**changes, **{"from": "run"}, out="other"), words)
-        self.refuse(small(**{"from": "lqr"}, out="other"), "lqr: expected a policy.safetensors")
+        self.refuse(small(**{"from": "lqr"}, out="other"), "--from: lqr: expected a policy.safetensors")
+        self.refuse(small(start_policy="sac", out="other"), "upswing: --start-policy sac: expected a policy with")
+        self.refuse(small(start_policy="nosuch", out="other"),
+                    "upswing: --start-policy: nosuch: no such file; expected a policy.safetensors, a run folder "
+                    "or a shipped policy (any-pose, ", " sac)\n")
         self.assertFalse((self.folder / "other").exists())
 
 

@@ -17,14 +17,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The path in a setting PATH or PATH#CHECKSUM.
-std::string PathOfStart(const std::string& setting) {
-  const size_t mark = setting.rfind('#');
-  if (mark == std::string::npos) return setting;
-  constexpr size_t kDigits = 16;
-  return setting.size() - mark == 1 + kDigits ? setting.substr(0, mark) : setting;
-}
-
 /// The first names, as many as fit into a readable line: `a, b and 3 more`.
 std::string FirstOf(std::vector<std::string> names) {
   constexpr size_t kMostNames = 6;
@@ -34,12 +26,28 @@ std::string FirstOf(std::vector<std::string> names) {
   return Concat(Join(names, ", "), " and ", more, " more");
 }
 
+/// Loads the policy for start_policy. Throws BadInput that begins with the setting.
+std::shared_ptr<const Policy> PolicyToStart(const std::string& path) {
+  try {
+    return LoadPolicy(path).policy;
+  } catch (const Error& error) {
+    throw Error(error.exit_code(), Concat("start_policy: ", error.what()));
+  }
+}
+
 }  // namespace
+
+std::string PathOfStart(const std::string& setting) {
+  const size_t mark = setting.rfind('#');
+  if (mark == std::string::npos) return setting;
+  constexpr size_t kDigits = 16;
+  return setting.size() - mark == 1 + kDigits ? setting.substr(0, mark) : setting;
+}
 
 std::shared_ptr<const Policy> StartPolicy(Config& config) {
   if (config.start_policy.empty()) return nullptr;
   const std::string path = PathOfStart(config.start_policy);
-  auto policy = LoadPolicy(path).policy;
+  auto policy = PolicyToStart(path);
   Checksum sum;
   if (const auto* network = dynamic_cast<const NetworkPolicy*>(policy.get())) {
     sum.Update(std::as_bytes(std::span(network->parts().parameters)));
@@ -57,7 +65,7 @@ Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
   const std::string text = file.empty() ? "" : ReadInput(file.string());
   const std::string where = file.empty() ? "" : InputName(file.string());
   Config config = ParseConfig(text, where, WithPlantFile(flags));
-  (void)StartPolicy(config);  // adds the checksum
+  CheckNamingFlags(flags, where, [&] { (void)StartPolicy(config); });  // adds the checksum
   return config;
 }
 

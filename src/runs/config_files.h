@@ -17,6 +17,9 @@ namespace upswing {
 /// configuration file and the other flags.
 Config BuildConfig(const std::filesystem::path& file, const std::vector<FlagValue>& flags);
 
+/// The path in a setting PATH or PATH#CHECKSUM.
+std::string PathOfStart(const std::string& setting);
+
 /// Loads the policy of the setting start_policy, if there is one, and adds the checksum of its
 /// weights to the setting. Throws BadInput, also if the setting has another checksum.
 std::shared_ptr<const Policy> StartPolicy(Config& config);

@@ -16,6 +16,64 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// Adds runs with a policy in a folder, and in its folders down to `depth`, to `runs` until it has
+/// enough for a message.
+void FindRuns(const fs::path& folder, int depth, std::vector<std::string>& runs) {
+  constexpr size_t kEnough = 3;
+  std::error_code none;
+  std::set<fs::path> folders;  // sorted by name
+  for (const auto& entry : fs::directory_iterator(folder, none)) {
+    if (entry.is_directory(none)) folders.insert(entry.path());
+  }
+  for (const fs::path& each : folders) {
+    if (runs.size() == kEnough) return;
+    if (fs::exists(each / RunFolder::kPolicy, none)) {
+      runs.push_back(Printable(each.string()));
+    } else if (depth > 1) {
+      FindRuns(each, depth - 1, runs);
+    }
+  }
+}
+
+/// Why a folder without a policy is none.
+std::string WhyNoPolicy(const fs::path& folder) {
+  if (fs::exists(folder / RunFolder::kConfig)) return "one without; the first evaluation writes it";
+  std::vector<std::string> runs;
+  FindRuns(folder, 2, runs);  // a study's runs are in STUDY/VARIANT/seed1
+  if (!runs.empty()) return Concat("a folder of runs, such as ", Join(runs, ", "));
+  return "another folder, which comes before a policy of that name";
+}
+
+/// Loads a policy as LoadPolicy does. Messages offer controllers if the caller `takes_controllers`.
+LoadedPolicy LoadNamed(const fs::path& path, bool takes_controllers) {
+  if (const fs::path shipped = ShippedPolicy(path); !shipped.empty()) {
+    LoadedPolicy loaded = ReadPolicy(LoadTensors(shipped, kMostPolicyBytes));
+    loaded.name = path.string();
+    return loaded;
+  }
+  fs::path file = path;
+  if (fs::is_directory(path)) {
+    file = path / RunFolder::kPolicy;
+    if (!fs::exists(file)) {
+      throw BadInput(Concat(path.string(), ": expected a run with a policy.safetensors, got ",
+                            WhyNoPolicy(path)));
+    }
+  }
+  if (!fs::exists(file)) {
+    if (IsController(path.string())) {
+      throw BadInput(Concat(path.string(), ": expected a policy.safetensors, a run folder or a ",
+                            "shipped policy, got a controller"));
+    }
+    std::vector<std::string> names = ShippedPolicies();
+    if (takes_controllers) std::ranges::copy(ControllerNames(), std::back_inserter(names));
+    throw BadInput(Concat(
+        file.string(), ": no such file; expected a policy.safetensors, a run ", "folder",
+        takes_controllers ? ", a shipped policy or a controller (" : " or a shipped policy (",
+        Join(names, ", "), ")", DidYouMean(path.string(), names)));
+  }
+  return ReadPolicy(LoadTensors(file, kMostPolicyBytes));
+}
+
 /// The controller that a setting belongs to.
 std::string SectionOf(const FlagValue& flag) {
   ControllerConfig config;
@@ -107,7 +165,7 @@ LoadedPolicy GetForOwnPlant(const PolicyArguments& a) {
                           a.name, " means the file; rename the file to use the controller"));
   }
   if (is_controller) return DesignNamed(a);
-  LoadedPolicy loaded = LoadPolicy(a.name);
+  LoadedPolicy loaded = LoadNamed(a.name, true);
   if (a.control_period == 0 || a.control_period == loaded.control_period()) return loaded;
   throw BadInput(Concat("--control-period: expected ", FormatNumber(loaded.control_period()),
                         " s, the control period of ", Printable(loaded.name), ", got ",
@@ -186,35 +244,7 @@ LoadedPolicy DesignController(const std::string& name, const ControllerConfig& c
           .swing_up = config.swing_up_policy};
 }
 
-LoadedPolicy LoadPolicy(const fs::path& path) {
-  if (const fs::path shipped = ShippedPolicy(path); !shipped.empty()) {
-    LoadedPolicy loaded = ReadPolicy(LoadTensors(shipped, kMostPolicyBytes));
-    loaded.name = path.string();
-    return loaded;
-  }
-  fs::path file = path;
-  if (fs::is_directory(path)) {
-    file = path / RunFolder::kPolicy;
-    if (!fs::exists(file)) {
-      const bool is_run = fs::exists(path / RunFolder::kConfig);
-      throw BadInput(Concat(path.string(), ": expected a run with a policy.safetensors, got ",
-                            is_run ? "one without; the first evaluation writes it"
-                                   : "another folder, which comes before a policy of that name"));
-    }
-  }
-  if (!fs::exists(file)) {
-    if (IsController(path.string())) {
-      throw BadInput(Concat(path.string(), ": expected a policy.safetensors, a run folder or a ",
-                            "shipped policy, got a controller"));
-    }
-    std::vector<std::string> names = ShippedPolicies();
-    std::ranges::copy(ControllerNames(), std::back_inserter(names));
-    throw BadInput(Concat(file.string(), ": no such file; expected a policy.safetensors, a run ",
-                          "folder, a shipped policy or a controller (", Join(names, ", "), ")",
-                          DidYouMean(path.string(), names)));
-  }
-  return ReadPolicy(LoadTensors(file, kMostPolicyBytes));
-}
+LoadedPolicy LoadPolicy(const fs::path& path) { return LoadNamed(path, false); }
 
 std::string ShortTitle(const LoadedPolicy& loaded) {
   fs::path title = loaded.name;

@@ -50,7 +50,8 @@ std::unique_ptr<TrainingRun> TrainingRun::Make(const fs::path& out, Config confi
   const fs::path usual = Concat("runs/", config.agent, "-seed", config.train.seed);
   const fs::path path = out.empty() ? FreePath(usual) : out;
   std::unique_ptr<TrainingRun> run(new TrainingRun(path, config, std::move(make_foreign)));
-  if (start) run->training_.StartFrom(*start, Concat("--from ", config.start_policy));
+  if (start)
+    run->training_.StartFrom(*start, Concat("--start-policy ", PathOfStart(config.start_policy)));
   Tensors checkpoint = run->training_.Checkpoint();
   run->lock_.emplace(
       RunFolder::Create(path, ConfigToml(run->training_.config(), false), checkpoint));
