@@ -133,7 +133,7 @@ class Environments(unittest.TestCase):
             env.reset(seed=0, options={"state": [0, 0, 0, 0]})
             env.step(np.array([1.0]))
             np.testing.assert_array_equal(np.sign(env.state[2:]), signs)
-        with self.assertRaisesRegex(ValueError, "actuated_joint: expected a multiple of 1"):
+        with self.assertRaisesRegex(ValueError, "actuated_joint: expected 1 or 2"):
             gym.make(ID, actuated_joint=1.5)
 
     def test_a_plant_comes_from_a_file(self):

@@ -160,6 +160,18 @@ std::string NamesHint(const std::vector<std::string_view>& cells, std::string_vi
   return other ? ": separate cells by commas, semicolons or tabs" : "";
 }
 
+/// `"NAME" in ` for the cell that may be the name of a missing column; empty if there is none. The
+/// cells of the `wanted` columns are not.
+std::string SimilarIn(const std::vector<std::string_view>& cells, const std::string& missing,
+                      const std::vector<std::string>& wanted) {
+  for (const std::string_view cell : cells) {
+    const std::string name = TextOf(cell);
+    if (cells.size() == 1 || std::ranges::count(wanted, name) > 0) continue;
+    if (!DidYouMean(name, {missing}).empty()) return Concat("\"", name, "\" in ");
+  }
+  return "";
+}
+
 /// A text as a cell: Printable, which keeps the row on one line, and in quotes if necessary.
 std::string CellOf(std::string_view given) {
   std::string text = Printable(given);
@@ -192,12 +204,9 @@ std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::str
     const auto found = std::ranges::find(cells, name, TextOf);
     if (found == cells.end()) {
       const std::string hint = NamesHint(cells, line.text);
-      std::vector<std::string> others;  // besides the wanted ones
-      for (const std::string_view cell : cells) {
-        if (std::ranges::count(names, TextOf(cell)) == 0) others.push_back(TextOf(cell));
-      }
-      throw line.Bad(Concat("expected a column \"", name, "\", got \"", line.text.substr(0, 200),
-                            "\"", hint.empty() ? DidYouMean(name, others) : hint));
+      throw line.Bad(Concat("expected a column \"", name, "\", got ",
+                            hint.empty() ? SimilarIn(cells, name, names) : "", "\"",
+                            line.text.substr(0, 200), "\"", hint));
     }
     const auto times = std::ranges::count(cells, name, TextOf);
     if (times > 1) {

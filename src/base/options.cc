@@ -43,6 +43,15 @@ std::string RangeText(Range range) {
   return "";
 }
 
+/// What a number must be, such as `a multiple of 0.02 in [0, 1]` or `1 or 2`.
+std::string NumberText(Range range, double step) {
+  if (step == 1 && range.high == range.low + 1) {
+    return Concat(FormatNumber(range.low), " or ", FormatNumber(range.high));
+  }
+  if (step == 1) return "an integer" + RangeText(range);
+  return Concat(step == 0 ? "a number" : "a multiple of " + FormatNumber(step), RangeText(range));
+}
+
 /// `0 to 1` or `0 to 1 in steps of 0.02`; empty if all numbers are allowed.
 std::string RangeInWords(Range range, double step) {
   if (!std::isfinite(range.low) || !std::isfinite(range.high)) return "";
@@ -67,10 +76,10 @@ bool IsMultiple(double value, double step) {
 }
 
 /// Hint such as `; the nearest are 0.04 and 0.06` for a number in the range that is not a multiple
-/// of `step`. Empty otherwise.
+/// of `step`. Empty otherwise, and for integers.
 std::string NearestText(std::string_view text, Range range, double step) {
   const auto value = ParseNumber(text);
-  if (!value || !range.Contains(*value) || IsMultiple(*value, step)) return "";
+  if (step == 1 || !value || !range.Contains(*value) || IsMultiple(*value, step)) return "";
   const auto multiple = [&](double count) {
     constexpr double kDigits = 1e12;  // 35 × 0.02 is 0.7, not 0.7000000000000001
     return FormatNumber(std::round(count * step * kDigits) / kDigits);
@@ -137,22 +146,19 @@ std::string Option::about_with_default() const {
 }
 
 std::string Option::expected() const {
-  return std::visit(
-      Overloaded{
-          [](const bool*) -> std::string { return "true or false"; },
-          [&](const int64_t*) { return Concat("an integer", RangeText(range)); },
-          [&](const double*) {
-            return Concat(step == 0 ? "a number" : "a multiple of " + FormatNumber(step),
-                          RangeText(range));
-          },
-          [&](const std::string*) -> std::string {
-            return choices.empty() ? "a text" : Concat("one of ", Join(choices, ", "));
-          },
-          [&](const std::vector<int64_t>*) {
-            return Concat("a list of integers", RangeText(range));
-          },
-      },
-      target);
+  return std::visit(Overloaded{
+                        [](const bool*) -> std::string { return "true or false"; },
+                        [&](const int64_t*) { return Concat("an integer", RangeText(range)); },
+                        [&](const double*) { return NumberText(range, step); },
+                        [&](const std::string*) -> std::string {
+                          return choices.empty() ? "a text"
+                                                 : Concat("one of ", Join(choices, ", "));
+                        },
+                        [&](const std::vector<int64_t>*) {
+                          return Concat("a list of integers", RangeText(range));
+                        },
+                    },
+                    target);
 }
 
 void Option::Set(std::string_view text, const std::string& where) const {

@@ -144,8 +144,8 @@ uint64_t ReadSafetensorsLength(std::span<const std::byte> first_bytes, uint64_t 
     throw BadInput(Concat("header length: expected at most ", kMaxHeader, ", got ", length));
   }
   if (length > file_size - sizeof(length)) {
-    throw BadInput(
-        Concat("header: expected ", length, " bytes, got a file of ", file_size, " bytes"));
+    throw BadInput(Concat("header: expected ", length, " bytes after the first ", sizeof(length),
+                          ", got ", file_size - sizeof(length)));
   }
   return length;
 }

@@ -5,6 +5,7 @@ is lost."""
 import gzip
 import math
 import os
+import shutil
 import subprocess
 import unittest
 
@@ -35,6 +36,9 @@ class CommandLineTest(ProgramTest):
         self.refuse(["train", "--gama=0.9"], "--gama", "did you mean --gamma?")
         self.refuse(["eval", "x", "--episode", "3"], "--episode", "did you mean --episodes?")
         self.refuse(["simulate", "--secs", "3"], "--secs")
+        for words in (["--set", "mass2=1.1"], ["--set=mass2=1.1"]):
+            self.refuse(["train", *words],
+                        "unknown flag --set: expected a flag for each setting, such as --mass2 1.1")
 
     def test_unknown_subcommand(self):
         self.refuse(["trian"], "trian", "did you mean train?")
@@ -274,6 +278,23 @@ class OutputFileTest(SmallRunTest):
             self.succeed("eval", "run", "--episodes", 2, "--episodes-csv", "run/mine.csv")
 
 
+class PolicyNameTest(SmallRunTest):
+    def test_a_folder_of_runs(self):
+        for place in ("runs/a", "runs/study/b/seed1"):
+            shutil.copytree(self.made, self.folder / place)
+        for command in (["eval", "runs"], ["export", "runs", "--onnx", "x"]):
+            self.refuse(command, "runs: expected a run with a policy.safetensors, got a folder of runs, such as runs/a")
+        self.refuse(["eval", "runs/study"], "got a folder of runs, such as runs/study/b/seed1")
+        (self.folder / "empty").mkdir()
+        self.refuse(["eval", "empty"], "got another folder")
+
+    def test_controllers_are_offered_only_where_they_are_taken(self):
+        self.refuse(["eval", "nosuch"], "a shipped policy or a controller (any-pose, ", "tvlqr)")
+        self.refuse(["eval", "hybrid", "--swing-up", "nosuch"],
+                    "a run folder or a shipped policy (any-pose, ", " sac)\n")
+        self.refuse(["export", "nosuch", "--page", "page"], "a run folder or a shipped policy (any-pose, ", " sac)\n")
+
+
 class TorqueFileTest(SmallRunTest):
     def refuse_torques(self, text, *words):
         self.write("torques.csv", text)
@@ -283,7 +304,7 @@ class TorqueFileTest(SmallRunTest):
         self.refuse(["simulate", "--torque", "none.csv"], "none.csv", "No such file")
 
     def test_missing_column(self):
-        self.refuse_torques("t,torqe\n0,1\n", "torques.csv:1:", '"torque"', "t,torqe")
+        self.refuse_torques("t,torqe\n0,1\n", "torques.csv:1:", 'expected a column "torque", got "torqe" in "t,torqe"')
         self.refuse_torques("# first\n0,1\n", "torques.csv:2:", '"torque"')
 
     def test_rows_of_another_length(self):

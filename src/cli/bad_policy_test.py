@@ -156,8 +156,23 @@ class PolicyFileTest(SmallRunTest):
         for key in ("format", "format_version", "output", "network", "plant"):
             with self.subTest(missing=key):
                 self.change(drop=[key])
-                self.refuse(["eval", "run"], f'"{key}"')
+                words = 'metadata "plant": no mass1' if key == "plant" else f'no metadata "{key}"'
+                self.refuse(["eval", "run"], f"upswing: run/policy.safetensors: {words}")
                 self.restore()
+
+    def test_sizes_and_actions_are_told_apart(self):
+        data = self.policy.read_bytes()
+        length = int.from_bytes(data[:8], "little")
+        self.policy.write_bytes(data[:length])
+        self.refuse(["eval", "run"], f"header: expected {length} bytes after the first 8, got {length - 8}")
+        self.restore()
+        metadata, tensors = read_tensors(self.policy)
+        kind, shape, torques = tensors["sample.torque"]
+        first, = struct.unpack_from("<d", torques)
+        wrong = math.nextafter(first, math.inf)
+        tensors["sample.torque"] = (kind, shape, struct.pack("<d", wrong) + torques[8:])
+        write_tensors(self.policy, metadata, tensors)
+        self.refuse(["eval", "run"], f"self-check: expected action {wrong!r}, got {first:g} (sample 0)")
 
     def test_unknown_parameters_of_the_plant(self):
         metadata, _ = read_tensors(self.policy)

@@ -198,7 +198,8 @@ std::string ExplainMissing(const CLI::App& app) {
   if (HasCommands(app)) return ExplainCommands(app, "none");
   for (const CLI::Option* option : app.get_options()) {
     if (!option->get_required() || option->count() > 0) continue;
-    return Concat(FullName(app), ": expected ", option->get_type_name(), " (",
+    const std::string flag = option->nonpositional() ? option->get_name() + " " : "";
+    return Concat(FullName(app), ": expected ", flag, option->get_type_name(), " (",
                   option->get_description(), "), got none");
   }
   return Concat(FullName(app), ": expected another argument, got none");
@@ -231,6 +232,9 @@ std::string ExplainUnknown(const CLI::App& app) {
   const std::vector<std::string> unknown = app.remaining();
   if (unknown.empty()) return "";
   const std::string word = unknown.front().substr(0, unknown.front().find('='));
+  if (word == "--set" && app.get_option_no_throw("--mass2") != nullptr) {
+    return "unknown flag --set: expected a flag for each setting, such as --mass2 1.1";
+  }
   if (word.starts_with("-")) return Concat("unknown flag ", word, ExplainFlag(app, word));
   std::string meant = DidYouMean(word, KnownWords(app));
   if (HasCommands(app)) return ExplainCommands(app, Concat("\"", Printable(word), "\"", meant));

@@ -234,7 +234,7 @@ class SettingsTest(ProgramTest):
         self.refuse(small(batch=128, replay=100, learning_starts=50),
                     "batch: expected at most 100 transitions", "(replay)", "got 128")
         self.refuse(small(replay=1), "batch: expected at most 1 transitions", "(replay)")
-        self.refuse(small(replay=200, learning_starts=201), "learning_starts: expected at most 200",
+        self.refuse(small(replay=200, learning_starts=201), "--learning-starts: expected at most 200",
                     "(replay)", "got 201")
         self.write("s.toml", "[agent]\nreplay = 100\n")
         self.refuse(["train", "--config", "s.toml"], "s.toml: batch: expected at most")
@@ -375,6 +375,7 @@ class LauncherTest(ProgramTest):
         self.assert_one_line(self.launch("--nosetup", "info"), 2, "unknown flag --nosetup",
                              "expected --no-setup or a command")
         self.assertEqual(self.launch("--no-setup", "info", "x").stdout, "ran: info x\n")
+        self.assertEqual(self.launch("--no-setup", "--no-setup", "info").stdout, "ran: info\n")
         self.assert_one_line(self.launch("--no-setup", "run", "lqr"), 1, "upswing-machine is not built",
                              "./upswing run --help once without --no-setup")
 

@@ -84,7 +84,7 @@ class Lqr(ProgramTest):
             self.refuse(["eval", law, "--made-for", "actuated_joint=2"], f"{law}: ", "motor at joint 1")
         for joint in ("0", "1.5", "3"):
             self.refuse(["eval", "lqr", "--set", f"actuated_joint={joint}"], "actuated_joint",
-                        "a multiple of 1 in [1, 2]")
+                        f'expected 1 or 2, got "{joint}"')
 
     def test_map_of_where_it_catches(self):
         result = json.loads(self.succeed("map", "lqr", "--x", "q1=150:210:61", "--y", "q2=-30:30:61",

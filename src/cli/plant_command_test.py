@@ -368,13 +368,14 @@ class Strangers(PlantCommandTest):
     def test_arguments(self):
         self.write("model.xml", model())
         for arguments, *words in (
-                (["model.xml"], "expected FILE (plant file"),
+                (["model.xml"], "plant: expected --out FILE (plant file"),
                 (["--out", "x.toml"], "expected FILE.xml|FILE.urdf"),
                 (["model.xml", "--out", "no/x.toml"], "--out no/x.toml", "No such file"),
                 (["model.xml", "--out", "x.toml", "--drop", "spring"], "--drop: expected one of stiffness", '"spring"'),
                 (["model.xml", "--out", "x.toml", "--drop", "frictionloss", "--convert-friction"],
                  "--convert-friction: expected no --drop frictionloss with it"),
-                (["model.xml", "--out", "x.toml", "--motor", "3"], "--motor"),
+                (["model.xml", "--out", "x.toml", "--motor", "3"], '--motor: expected 1 or 2, got "3"'),
+                (["model.xml", "--out", "x.toml", "--motor", "j1"], '--motor: expected 1 or 2, got "j1"'),
                 (["model.xml", "--out", "x.toml", "--length2", "0"], "--length2")):
             with self.subTest(arguments):
                 self.refuse(["plant", *arguments], *words, env=self.ENVIRONMENT)

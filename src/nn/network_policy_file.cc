@@ -49,8 +49,9 @@ std::string ShapeToJson(const NetworkShape& shape, const ActionRuleFacts& rule) 
 NetworkShape ShapeFromJson(const Tensors& file, const std::string& key, const ActionRuleFacts& rule,
                            int outputs) {
   constexpr int64_t kMax = NetworkShape::kMaxWidth;
+  const std::string& text = file.Metadata(key);
   try {
-    const json j = ParseJsonObject(file.Metadata(key));
+    const json j = ParseJsonObject(text);
     NetworkShape shape;
     shape.inputs = static_cast<int>(JsonInteger(j, "inputs", 1, kMax));
     shape.outputs = outputs;
@@ -326,8 +327,8 @@ void NetworkPolicy::CheckSamples(const Tensors& file) {
             : near(parts_.action_limit[i % A])) {
       continue;
     }
-    throw BadInput(Concat(file.where(), ": self-check: expected action ", stored[i], ", got ", got,
-                          " (sample ", i / A, ")"));
+    throw BadInput(Concat(file.where(), ": self-check: expected action ", FormatNumber(stored[i]),
+                          ", got ", FormatNumber(got), " (sample ", i / A, ")"));
   }
   if (critic_) CheckOutputs(file, "sample.value", results.value_rows, "value", self_check_);
 }

@@ -62,7 +62,8 @@ LearnConfig LearnConfigOf(const LearnArguments& a) {
 std::unique_ptr<MachineLink> OpenLink(const std::string& link, uint64_t seed) {
   const LinkAddress address = ParseLink(link, /*listens=*/false);
   if (address.transport == LinkAddress::Transport::kTwin) {
-    return std::make_unique<TwinLink>(ReadTwin(address.place, "--link"), PendulumState(), seed);
+    return std::make_unique<TwinLink>(ReadTwin(address.place, "--link", kLinkForms),
+                                      PendulumState(), seed);
   }
   return std::make_unique<ChannelLink>(Channel::Connect(address));
 }

@@ -157,7 +157,8 @@ int RunRun(const RunArguments& a) {
   const bool in_process = address.transport == LinkAddress::Transport::kTwin;
   std::optional<Twin> twin;
   if (in_process || !a.twin.empty())
-    twin = a.twin.empty() ? ReadTwin(address.place, "--link") : ReadTwin(a.twin, "--twin");
+    twin =
+        a.twin.empty() ? ReadTwin(address.place, "--link", kLinkForms) : ReadTwin(a.twin, "--twin");
   if (in_process && !a.twin.empty()) {
     throw BadInput("--twin: expected a link by UDP or a serial line with it, got a twin as --link");
   }

@@ -27,6 +27,9 @@ inline constexpr int kUsualBaud = 921600;
 /// `--link`.
 LinkAddress ParseLink(const std::string& text, bool listens);
 
+/// What --link takes besides a plant, for ReadTwin.
+inline constexpr const char* kLinkForms = "udp:HOST:PORT, serial:DEVICE, ";
+
 /// An open UDP socket or terminal. No call waits except Wait.
 class Channel {
  public:

@@ -164,8 +164,8 @@ Twin ParseTwin(std::string_view text, const std::string& where) {
   return twin;
 }
 
-Twin ReadTwin(const std::string& name, const std::string& flag) {
-  const auto [toml, where] = ReadPlantDocument(name, flag);
+Twin ReadTwin(const std::string& name, const std::string& flag, const std::string& else_taken) {
+  const auto [toml, where] = ReadPlantDocument(name, flag, else_taken);
   Twin twin = ParseTwin(toml, Printable(where));
   if (twin.name.empty()) twin.name = std::filesystem::path(name).stem().string();
   return twin;

@@ -102,8 +102,8 @@ Twin InSession(const Twin& twin, const MachineLog& log);
 Twin ParseTwin(std::string_view text, const std::string& where);
 
 /// Reads a twin from a plant file, or the shipped plant called `name`. A twin without a name gets
-/// the file's. `flag` names the argument in messages. Throws BadInput.
-Twin ReadTwin(const std::string& name, const std::string& flag);
+/// the file's. Messages name the argument `flag`, and what else it takes. Throws BadInput.
+Twin ReadTwin(const std::string& name, const std::string& flag, const std::string& else_taken = "");
 
 /// The twin as a TOML document that ParseTwin reads. It is a plant file too (runs/plant_file.h),
 /// whose table [disturbance] has the sensors of the control loop as Disturbance describes them.
