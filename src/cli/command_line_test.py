@@ -403,7 +403,7 @@ class LauncherTest(ProgramTest):
             with self.subTest(words=words):
                 self.assert_one_line(self.launch("--no-setup", "test", *words), 2, "test: unknown flag -",
                                      "expected --preset, --cluster, --benchmarks or flags of ctest")
-        # Those that ctest knows get further: nothing is built here.
+        # Flags of ctest pass this check and reach the next one: nothing is built here.
         for words in ("-R dqn", "-R --foo", "-LE slow -j4 -V", "-j 4 --parallel 2 -I 1,3", "--tests-regex=dqn",
                       "-N", "--show-only=json-v1", "--no-tests=ignore", "--timeout 5 -E -x", "-FA x -U",
                       "--repeat until-fail:2 --stop-on-failure --rerun-failed --output-on-failure"):
