@@ -100,7 +100,7 @@ describe('a policy', () => {
     const policy = new Policy(
       changed(({ header }) => {
         const about = header.__metadata__ as Record<string, string>;
-        about.plant = JSON.stringify({ ...plant, other: 7 }); // on no slider
+        about.plant = JSON.stringify({ ...plant, gear_ratio: 7 }); // on no slider
         about.config =
           'randomize_mass1 = 1e300\nrandomize_gravity = 0.5\nrandomize_delay = 1e9\ndelay = -3\n';
       }),
