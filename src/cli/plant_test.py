@@ -5,6 +5,7 @@ machines whose links are not solid capsules."""
 import csv
 import io
 import json
+import re
 import unittest
 
 from testing import ProgramTest, read_tensors, small
@@ -70,6 +71,61 @@ class PlantTest(ProgramTest):
                         *(["eval", "lqr", "--plant", plant, "--episodes", "1", "--randomize", "0.25"]
                           for plant in ("realaigym", "realaigym-c1", "realaigym-twin"))):
             self.succeed(*command)
+
+    def write_size(self, length, mass):
+        """Writes size.toml, a plant of the nominal shape, and returns its natural time [s]."""
+        time = length ** 0.5
+        units = {"mass": mass, "length": length, "center": length, "inertia": mass * length ** 2,
+                 "damping": mass * length ** 2 / time, "torque": mass * length ** 2 / time ** 2}
+        nominal = {"mass1": 1, "mass2": 1, "length1": 0.5, "length2": 0.5, "center1": 0.25,
+                   "center2": 0.25, "inertia1": 0.0242, "inertia2": 0.0242, "damping1": 0.2,
+                   "damping2": 0.2, "torque_limit": 5}
+        numbers = {name: value * next(unit for word, unit in units.items() if name.startswith(word))
+                   for name, value in nominal.items()}
+        numbers["armature"] = 0.01 * units["inertia"]
+        self.write("size.toml", "[plant]\n" + "".join(f"{k} = {v!r}\n" for k, v in numbers.items()))
+        return time
+
+    def test_policies_and_controllers_act_on_every_size(self):
+        for length, mass in ((0.1, 0.01), (10, 1000), (0.1, 1)):
+            time = self.write_size(length, mass)
+            for policy in ("sac", "d3qn", "any-pose", "tvlqr"):
+                with self.subTest(policy, length=length, mass=mass):
+                    done = self.run_here("eval", policy, "--plant", "size.toml", "--goal", "up-up",
+                                         "--physics", "closed-form", "--episodes", 20, "--json")
+                    self.assertEqual(done.returncode, 0, done)
+                    self.assertEqual(json.loads(done.stdout)["successes"], 20)
+                    period = float(re.search(r"a decision every (\S+) s", done.stderr)[1])
+                    self.assertAlmostEqual(period / (0.02 * time), 1, delta=0.02)
+
+    def test_a_training_on_a_small_plant_is_that_on_the_nominal_one(self):
+        self.write_size(0.1, 0.01)
+        config = self.succeed("train", "--agent", "fast", "--plant", "size.toml", "--print-config")
+        for name, value in (("control_period", 0.00632), ("episode_seconds", 1.265),
+                            ("random_start_velocity", 15.8), ("torque_scale", 1e-3)):
+            got = float(re.search(rf"(?m)^{name} = (\S+)", config)[1])
+            self.assertAlmostEqual(got / value, 1, delta=0.02, msg=name)
+        # What the user gives stays, and gamma looks as far ahead.
+        config = self.succeed("train", "--agent", "fast", "--plant", "size.toml", "--print-config",
+                              "--control-period", 0.005, "--random-start-velocity", 3)
+        self.assertRegex(config, r"(?m)^control_period = 0.005 ")
+        self.assertRegex(config, r"(?m)^random_start_velocity = 3 ")
+        self.assertRegex(config, r"(?m)^gamma = 0.992")
+
+    def test_the_control_period(self):
+        rows = self.table("--control-period", 0.005, "--seconds", 0.02)
+        self.assertEqual([row[0] for row in rows], [0, 0.005, 0.01, 0.015, 0.02])
+        self.refuse(["eval", "sac", "--control-period", 0.01],
+                    "--control-period: expected 0.02 s, the control period of sac, got 0.01")
+        self.refuse(["simulate", "--control-period", 0.2], "--control-period", "[0.001, 0.1]")
+        for period in (0.005, 0.01):
+            self.assertIn("20 of 20", self.succeed(
+                "eval", "tvlqr", "--control-period", period, "--episodes", 20, "--physics",
+                "closed-form"))
+        self.succeed("train", "--agent", "sac-fast", "--control-period", 0.01, "--physics",
+                     "closed-form", "--out", "run", "--steps", 20000)
+        self.assertIn("every 0.01 s", self.succeed("info", "run"))
+        self.assertIn("decisions      every 0.01 s", self.succeed("eval", "run", "--episodes", 2))
 
     def test_a_file_is_the_settings_that_it_has(self):
         for physics in ("mujoco", "closed-form"):

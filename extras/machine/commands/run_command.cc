@@ -81,50 +81,81 @@ void PrintSummary(const LoopSummary& s, const LinkCounts& counts, const Supervis
              supervisor.clipped(), 1e3 * s.longest_act);
 }
 
+/// The supervisor with the limits of the run and the motors of the machine.
+Supervisor SupervisorOf(const RunArguments& a, const LoadedPolicy& policy,
+                        const std::optional<Twin>& twin) {
+  const int joint = static_cast<int>(RobotOf(policy));
+  Joints motor{a.passive_torque, a.passive_torque};
+  motor[joint - 1] = twin ? twin->plant.torque_limit : a.limits.torque;
+  const MachineSensors sensors = twin ? twin->sensors : a.sensors;
+  return Supervisor({.limits = a.limits,
+                     .start = ParsePendulumStart(a.start),
+                     .motor_limit = motor,
+                     .actuated_joint = joint,
+                     .angle_range = sensors.angle_range,
+                     .quantum = sensors.quantum,
+                     .period = 1 / a.hz});
+}
+
+/// Opens the link to the twin or the machine, as g_link.
+void OpenLink(const RunArguments& a, const std::optional<Twin>& twin, const LinkAddress& address) {
+  if (address.transport != LinkAddress::Transport::kTwin) {
+    g_link = std::make_unique<ChannelLink>(Channel::Connect(address));
+    return;
+  }
+  const auto seed = static_cast<uint64_t>(a.seed);
+  Rng rng(seed, "loop: machine");
+  g_link = std::make_unique<TwinLink>(a.draw ? DrawTwin(*twin, rng) : *twin,
+                                      ParsePendulumStart(a.start), seed);
+}
+
+/// Prints what drives the machine, and how a policy was changed for it.
+void PrintDriver(const RunArguments& a, const LoadedPolicy& policy) {
+  fmt::print("{} on {}, {} Hz, {}\n", Printable(policy.name), Printable(a.link), a.hz,
+             NameOf(RobotOf(policy)));
+  if (policy.carried_over != Scale()) {
+    fmt::print("  carried over to a machine of another size: times × {:.4g}, torques × {:.4g}\n",
+               policy.carried_over.time, policy.carried_over.torque);
+  }
+  const double decides =
+      static_cast<double>(CyclesIn(policy.control_period(), std::llround(a.hz))) / a.hz;
+  if (std::abs(decides - policy.control_period()) > 1e-6) {
+    fmt::print(
+        "  decides every {:.4g} s, a whole number of cycles; the policy was made for {:.4g} s\n",
+        decides, policy.control_period());
+  }
+}
+
+/// The exit code of a run. Throws Failure if the supervisor ended it, or if the links are not
+/// upright.
+int ExitCodeOf(const RunArguments& a, const Supervisor& supervisor, const LoopSummary& summary) {
+  if (!supervisor.reason().empty()) throw Failure(supervisor.reason());
+  if (StopSignal() != 0) return 128 + StopSignal();
+  // Without torque the loop only reads.
+  if (a.limits.torque > 0 && summary.upright == 0) {
+    throw Failure("the links were not upright at the end of the run");
+  }
+  return 0;
+}
+
 int Drive(const RunArguments& a, const MachinePolicy& policy, const std::optional<Twin>& twin,
           const LinkAddress& address) {
-  const PendulumState start = ParsePendulumStart(a.start);
-  const int joint = static_cast<int>(RobotOf(*policy));
-  const auto hz = std::llround(a.hz);
-  const double period = 1 / a.hz;
-  const double decides = static_cast<double>(CyclesIn(policy->control_period(), hz)) * period;
   // A first call of another controller touches memory that is not there yet.
   ControllerOf(policy)(0, {});
   MachineController controller = ControllerOf(policy);
   const StateSource source = a.differences ? StateSource::kDifferences : StateSource::kTwin;
+  const double period = 1 / a.hz;
   Estimator estimator = twin ? Estimator(*twin, period, source) : Estimator(a.sensors, period);
-
-  Joints motor{a.passive_torque, a.passive_torque};
-  motor[joint - 1] = twin ? twin->plant.torque_limit : a.limits.torque;
-  const MachineSensors sensors = twin ? twin->sensors : a.sensors;
-  Supervisor supervisor({.limits = a.limits,
-                         .start = start,
-                         .motor_limit = motor,
-                         .actuated_joint = joint,
-                         .angle_range = sensors.angle_range,
-                         .quantum = sensors.quantum,
-                         .period = period});
-
-  LoopConfig config{
-      .hz = hz, .seconds = a.seconds, .actuated_joint = joint, .compensation = a.compensation};
-  config.stop = [] { return StopSignal() != 0; };
-
-  if (address.transport == LinkAddress::Transport::kTwin) {
-    const auto seed = static_cast<uint64_t>(a.seed);
-    Rng rng(seed, "loop: machine");
-    g_link = std::make_unique<TwinLink>(a.draw ? DrawTwin(*twin, rng) : *twin, start, seed);
-  } else {
-    g_link = std::make_unique<ChannelLink>(Channel::Connect(address));
-  }
+  Supervisor supervisor = SupervisorOf(a, *policy, twin);
+  const LoopConfig config{.hz = std::llround(a.hz),
+                          .seconds = a.seconds,
+                          .actuated_joint = static_cast<int>(RobotOf(*policy)),
+                          .compensation = a.compensation,
+                          .stop = [] { return StopSignal() != 0; }};
+  OpenLink(a, twin, address);
   MachineLink& link = *g_link;
   LogWriter log(a.log);
-  fmt::print("{} on {}, {} Hz, {}\n", Printable(policy->name), Printable(a.link), a.hz,
-             NameOf(RobotOf(*policy)));
-  if (std::abs(decides - policy->control_period()) > 1e-6) {
-    fmt::print(
-        "  decides every {:.4g} s, a whole number of cycles; the policy was made for {:.4g} s\n",
-        decides, policy->control_period());
-  }
+  PrintDriver(a, *policy);
   if (!link.simulated()) {
     const std::string missing = EnterRealTime();
     if (!missing.empty()) fmt::print("  not permitted: {}; cycles may be late\n", missing);
@@ -137,13 +168,7 @@ int Drive(const RunArguments& a, const MachinePolicy& policy, const std::optiona
   PrintSummary(loop.summary(), link.counts(), supervisor, link.simulated());
   if (log.dropped() > 0) fmt::print("  log      {} rows left out\n", log.dropped());
   if (!a.log.empty()) fmt::print("written {}\n", Printable(a.log));
-  if (!supervisor.reason().empty()) throw Failure(supervisor.reason());
-  if (StopSignal() != 0) return 128 + StopSignal();
-  // Without torque the loop only reads.
-  if (a.limits.torque > 0 && loop.summary().upright == 0) {
-    throw Failure("the links were not upright at the end of the run");
-  }
-  return 0;
+  return ExitCodeOf(a, supervisor, loop.summary());
 }
 
 int RunRun(const RunArguments& a) {
