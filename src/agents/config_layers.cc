@@ -9,6 +9,7 @@
 #include "agents/toml_settings.h"
 #include "base/error.h"
 #include "base/text.h"
+#include "pendulum/control_period.h"
 #include "pendulum/scale.h"
 
 namespace upswing {
@@ -156,6 +157,17 @@ void FitToPeriod(const Options& options, double usual,
             "control_period");
 }
 
+/// Rounds the times that the user does not give to whole control periods.
+void RoundToPeriods(const Options& options, const std::function<bool(const Option&)>& is_given,
+                    const Config& config) {
+  for (const char* name : {"episode_seconds", "delay", "randomize_delay"}) {
+    const Option& option = *options.Get(name);
+    if (is_given(option)) continue;
+    const auto periods = static_cast<double>(PeriodsIn(option.number(), config.control_period));
+    option.Set(FormatNumber(periods * config.control_period), "control_period");
+  }
+}
+
 /// Turns `mirror` off for a reward that is not symmetric. Throws BadInput if the user set it, at
 /// `place`.
 void FitToReward(const Options& options, const std::string& place, const Config& config) {
@@ -269,6 +281,7 @@ Config ParseConfig(std::string_view text, const std::string& where,
       FitToPlant(options, designed, is_given, config);
       const double usual = designed_period * CarryOver(designed, config.plant).time;
       if (is_given(*options.Get("control_period"))) FitToPeriod(options, usual, is_given, config);
+      if (config.control_period != designed_period) RoundToPeriods(options, is_given, config);
     }
     CheckSettings(config);
   });

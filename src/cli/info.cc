@@ -88,7 +88,7 @@ void PrintController(const LoadedPolicy& loaded) {
       modes.faster, modes.slower, modes.slower / modes.faster, modes.delta);
   if (const auto* regulator = dynamic_cast<const LqrPolicy*>(&policy)) {
     fmt::print("  region      of attraction, by simulation: x'Px < {:.4g}\n",
-               RegionOfAttraction(regulator->lqr(), loaded.plant));
+               RegionOfAttraction(regulator->lqr(), {loaded.plant, loaded.control_period()}));
   }
 }
 
@@ -110,7 +110,7 @@ void PrintActions(const LoadedPolicy& loaded, const NetworkPolicy* learned) {
   }
   std::string torques = "any within the torque limit";
   if (!levels.empty()) torques = fmt::format("{} N·m", fmt::join(levels, ", "));
-  fmt::print("  torques     {}, every {} s\n", torques, kControlPeriod);
+  fmt::print("  torques     {}, every {} s\n", torques, FormatNumber(loaded.control_period()));
 }
 
 void PrintPolicy(const LoadedPolicy& loaded) {

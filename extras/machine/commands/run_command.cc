@@ -109,7 +109,7 @@ void OpenLink(const RunArguments& a, const std::optional<Twin>& twin, const Link
                                       ParsePendulumStart(a.start), seed);
 }
 
-/// Prints what drives the machine, and how a policy was changed for it.
+/// Prints the policy, the machine and the rate, and how the policy was changed for the machine.
 void PrintDriver(const RunArguments& a, const LoadedPolicy& policy) {
   fmt::print("{} on {}, {} Hz, {}\n", Printable(policy.name), Printable(a.link), a.hz,
              NameOf(RobotOf(policy)));

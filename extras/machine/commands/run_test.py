@@ -252,7 +252,7 @@ class Protection(ProgramTest):
     def test_a_link_that_is_none(self):
         for command in (["run", "lqr"], ["machine", "learn", "--encoder-counts", 8192, "--out", "learnt"]):
             self.refuse([*command, "--link", "foo"], '--link: expected udp:HOST:PORT, serial:DEVICE, a plant file '
-                        '(TOML) or one of realaigym-c1, ', 'got "foo"')
+                        '(TOML) or one of cloudpendulum, ', 'got "foo"')
 
     def test_a_log_is_never_lost(self):
         run = ["run", "lqr", "--link", TWIN, "--start", "upright", "--seconds", 0.2, "--log"]

@@ -59,23 +59,23 @@ struct Choice {
 /// link.
 std::vector<Candidate> CandidatesFor(const Plant& plant) {
   constexpr double kUsualCompensation = 0.95;
-  // The settings are those for the size of RealAIGym's boards.
-  ControllerConfig usual;
-  usual.plant = WithoutDryFriction(plant);
+  // The numbers are for the size of RealAIGym's boards.
+  const Scale scale = TaskScaleOf(plant);
+  const ControllerConfig usual = ControllerConfig::For(WithoutDryFriction(plant));
 
   ControllerConfig stiff = usual;
   stiff.lqr.q1 = stiff.lqr.q2 = 100;
-  stiff.lqr.torque = 0.3;
+  stiff.lqr.torque = 0.3 / (scale.torque * scale.torque);
 
   ControllerConfig slow = usual;
-  slow.tvlqr = {.seconds = 6, .reserve = 0.1};
+  slow.tvlqr = {.seconds = 6 * scale.time, .reserve = 0.1};
 
   ControllerConfig quick = stiff;
-  quick.mpc.seconds = 0.3;
+  quick.mpc.seconds = 0.3 * scale.time;
   quick.mpc.angle_range = 9;
 
   ControllerConfig with_friction = usual;
-  with_friction.mpc.seconds = 1;
+  with_friction.mpc.seconds = scale.time;
   with_friction.plant.coulomb1 = plant.coulomb1;
   with_friction.plant.coulomb2 = plant.coulomb2;
 
@@ -98,8 +98,8 @@ std::vector<Candidate> CandidatesFor(const Plant& plant) {
 /// The arguments that turn the defaults into the candidate, as a user gives them. GetMachinePolicy
 /// designs on the twin's plant without dry friction, so changes of the plant are relative to that.
 PolicyArguments ArgumentsOf(const Candidate& candidate, const Plant& plant) {
-  const ControllerConfig usual;
   const Plant usual_plant = WithoutDryFriction(plant);
+  const ControllerConfig usual = ControllerConfig::For(usual_plant);
   PolicyArguments arguments;
   arguments.name = candidate.controller;
   for (const auto& [setting, before] : Differences(OptionsOf(candidate.config), OptionsOf(usual))) {
