@@ -1,0 +1,49 @@
+#!/usr/bin/env python3
+"""Successes of shipped policies and controllers on plants of the nominal shape and another size.
+
+Prints the table of docs/tutorials/your-own-plant.md:
+    python3 tools/results/sizes.py
+"""
+
+import json
+import subprocess
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+POLICIES = ("sac", "d3qn", "any-pose", "mpc", "tvlqr", "energy", "pfl")
+EPISODES = 100
+# The nominal plant with its inertias as numbers, in SI units.
+NOMINAL = {"mass1": 1, "mass2": 1, "length1": 0.5, "length2": 0.5, "center1": 0.25, "center2": 0.25,
+           "inertia1": 0.0242, "inertia2": 0.0242, "armature": 0.01, "damping1": 0.2,
+           "damping2": 0.2, "torque_limit": 5}
+
+
+def image(length: float, mass: float) -> str:
+    """A plant file: lengths times `length`, masses times `mass`, times times sqrt(length)."""
+    inertia, time = mass * length ** 2, length ** 0.5
+    units = {"mass": mass, "length": length, "center": length, "inertia": inertia,
+             "armature": inertia, "damping": inertia / time, "torque": inertia / time ** 2}
+    rows = [f"{name} = {value * units[name.rstrip('12').removesuffix('_limit')]!r}"
+            for name, value in NOMINAL.items()]
+    return "[plant]\n" + "\n".join(rows) + "\n"
+
+
+def main() -> None:
+    print(f"| length of a link | {' | '.join(POLICIES)} |")
+    print("|---|" + "---|" * len(POLICIES))
+    for length, mass in ((0.1, 0.01), (1, 1), (10, 1000)):
+        with tempfile.TemporaryDirectory() as folder:
+            plant = Path(folder) / "plant.toml"
+            plant.write_text(image(length, mass), encoding="utf-8")
+            done = subprocess.run(
+                [ROOT / "upswing", "eval", *POLICIES, "--plant", plant, "--goal", "up-up", "--physics",
+                 "closed-form", "--episodes", str(EPISODES), "--json"],
+                check=True, stdout=subprocess.PIPE, encoding="utf-8")
+        result = json.loads(done.stdout)
+        successes = [str(report["successes"]) for report in result["policies"]]
+        print(f"| {0.5 * length:g} m | {' | '.join(successes)} |")
+
+
+if __name__ == "__main__":
+    main()
