@@ -76,8 +76,9 @@ std::pair<std::string, std::string> EvaluateHandle(const PolicyHandle& policy,
   PythonProgress python_progress(progress);
   const nb::gil_scoped_release unlocked;
   ThreadPool pool(ResolveThreads(threads), threads == 0);
+  const LoadedPolicy loaded = UsedIn(trial, policy.loaded());
   const EvalReport report =
-      EvaluatePolicy(policy.loaded(), trial, episodes, pool, std::ref(python_progress));
+      EvaluatePolicy(loaded, trial, episodes, pool, std::ref(python_progress));
   return {EvalJson({&report, 1}), EpisodesCsv({&report, 1})};
 }
 
@@ -113,12 +114,12 @@ nb::tuple MapHandle(const PolicyHandle& policy, const SettingTexts& settings,
   std::string json;
   {
     const nb::gil_scoped_release unlocked;
-    map = PlanMap(a, policy.loaded());
+    const LoadedPolicy loaded = UsedIn(a.trial, policy.loaded());
+    map = PlanMap(a, loaded);
     const std::filesystem::path folder =
-        out.empty() ? std::filesystem::path()
-                    : FigureFolder(out, policy.loaded(), map.folder_name());
+        out.empty() ? std::filesystem::path() : FigureFolder(out, loaded, map.folder_name());
     ThreadPool pool(ResolveThreads(threads), threads == 0);
-    map.cells = RunMap(map.config, *policy.loaded().policy, pool, std::ref(python_progress));
+    map.cells = RunMap(map.config, *loaded.policy, pool, std::ref(python_progress));
     if (!out.empty()) {
       MakeNewFolder(folder);
       WriteMaps(maps, folder);

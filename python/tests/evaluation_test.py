@@ -151,6 +151,16 @@ class Evaluations(BadInputTest):
                 work()
             timer.join()
 
+    def test_a_policy_acts_on_a_plant_of_another_size(self):
+        small = {"mass1": 0.01, "mass2": 0.01, "length1": 0.05, "length2": 0.05, "armature": 1e-6,
+                 "damping1": 6e-5, "damping2": 6e-5, "torque_limit": 0.005}
+        with tempfile.TemporaryDirectory() as folder:
+            plant = Path(folder) / "small.toml"
+            plant.write_text("[plant]\n" + "".join(f"{k} = {v}\n" for k, v in small.items()))
+            for policy in ("sac", "tvlqr"):
+                result = upswing.evaluate(policy, plant=plant, episodes=10, physics="closed-form")
+                self.assertEqual(result["success_rate"], 1, policy)
+
     def test_bad_input(self):
         policy = upswing.load_policy(POLICY)
         for what, settings in {

@@ -80,7 +80,7 @@ LoadedPolicy PolicyOfEntry(const fs::path& file) {
   }
   LoadedPolicy loaded = ReadPolicy(LoadTensors(file, kMostBytes));
   ExpectPendulum(loaded);
-  return loaded;
+  return ForOtherSize(loaded, Plant()).value_or(loaded);
 }
 
 /// Environments of the built-in plant with the policy's observations, in the closed form: sines and

@@ -45,6 +45,11 @@ void UseIn(const TrialArguments& trial, PolicyArguments& policy) {
   if (!trial.plant.empty()) policy.used_on = ReadPlantFile(trial.plant).plant;
 }
 
+LoadedPolicy UsedIn(const TrialArguments& trial, const LoadedPolicy& loaded) {
+  if (trial.plant.empty() || loaded.is_foreign()) return loaded;
+  return ForOtherSize(loaded, ReadPlantFile(trial.plant).plant).value_or(loaded);
+}
+
 TrialConditions ConditionsOf(const std::vector<FlagValue>& flags) {
   TrialConditions conditions;
   SetFlags(OptionsOf(conditions), flags);

@@ -39,6 +39,9 @@ struct TrialArguments {
 /// period. Throws BadInput.
 void UseIn(const TrialArguments& trial, PolicyArguments& policy);
 
+/// A loaded policy for the plant file of the trial (ForOtherSize). Throws BadInput.
+LoadedPolicy UsedIn(const TrialArguments& trial, const LoadedPolicy& loaded);
+
 /// Disturbances of sensors and motor, and random plants.
 struct TrialConditions {
   Disturbance disturbance;
