@@ -122,8 +122,9 @@ class PlantTest(ProgramTest):
             self.assertIn("20 of 20", self.succeed(
                 "eval", "tvlqr", "--control-period", period, "--episodes", 20, "--physics",
                 "closed-form"))
-        self.succeed("train", "--agent", "sac-fast", "--control-period", 0.01, "--physics",
-                     "closed-form", "--out", "run", "--steps", 20000)
+        self.assertIn("\n  a decision every 0.01 s\n", self.succeed(
+            "train", "--agent", "sac-fast", "--control-period", 0.01, "--physics", "closed-form",
+            "--out", "run", "--steps", 20000))
         self.assertIn("every 0.01 s", self.succeed("info", "run"))
         self.assertIn("decisions      every 0.01 s", self.succeed("eval", "run", "--episodes", 2))
 

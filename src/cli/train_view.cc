@@ -40,6 +40,13 @@ class TrainView : public TrainObserver {
         FormatCount(training_.policy()->num_parameters()),
         Counted(config.train.envs, "environment"), Counted(training_.threads(), "thread"));
     if (config.physics != kMuJoCo.name) Say("  physics {}\n", config.physics);
+    if (!config.is_foreign() && config.scale() != Scale()) {
+      Say("  a plant of another size: times × {:.4g}, torques × {:.4g}\n", config.time_scale,
+          config.torque_scale);
+    }
+    if (!config.is_foreign() && config.control_period != kControlPeriod) {
+      Say("  a decision every {:.4g} s\n", config.control_period);
+    }
     const TrainingSize size = SizeOf(config);
     constexpr double kGigabyte = 1e9;
     if (size.memory > kGigabyte) {
