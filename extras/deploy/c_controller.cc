@@ -26,7 +26,7 @@ constexpr const char* kOnlyNearUpright = "; away from upright none of the simula
 /// The settings that the controller was made with.
 ControllerConfig ConfigOf(const LoadedPolicy& loaded) {
   ControllerConfig config;
-  config.plant = {loaded.plant, loaded.control_period()};
+  config.plant = loaded.design_plant();
   ApplyToml(OptionsOf(config), loaded.policy->info().config, loaded.name);
   return config;
 }
@@ -42,7 +42,7 @@ std::vector<double> Triangle(const Eigen::Matrix4d& P) {
 
 /// The first torque of an episode that begins in a state.
 double TorqueAt(const LoadedPolicy& loaded, const StateVector& x) {
-  const auto seen = Observe(loaded.plant, {x[0], x[1], x[2], x[3]}, loaded.scale);
+  const auto seen = Observe(loaded.plant, {x[0], x[1], x[2], x[3]}, loaded.scale());
   const std::vector<float> obs(seen.begin(), seen.end());
   double torque = 0;
   loaded.policy->Act({obs.data(), 1, static_cast<int>(obs.size())}, {&torque, 1, 1},
@@ -130,7 +130,7 @@ void AddCatch(const LoadedPolicy& loaded, const LqrCatch& upright, CParts& parts
       {"upright_cost", "of a deviation from upright", Floats(Triangle(upright.lqr().P))});
   parts.constants.push_back({"region", "of attraction", Floats(std::array{upright.region()})});
   parts.macros.emplace_back("LOOK_AHEAD", Concat(upright.steps(), " /* control periods */"));
-  const int steps = DesignPlant(plant, loaded.control_period()).physics_steps();
+  const int steps = loaded.design_plant().physics_steps();
   parts.macros.emplace_back("PHYSICS_STEPS", Concat(steps, " /* of a simulated period */"));
   parts.macros.emplace_back("ACTUATED_JOINT", Concat(plant.actuated_joint));
 }
@@ -240,7 +240,7 @@ const CController& CControllerCalled(const std::string& name) {
 /// Adds the description of a controller to the header: its file, origin, limits and plant.
 void DescribeController(const LoadedPolicy& loaded, const Plant& plant, const char* file,
                         CParts& parts) {
-  parts.task = PendulumTask(plant.actuated_joint, loaded.scale, 0);
+  parts.task = PendulumTask(plant.actuated_joint, loaded.scale(), 0);
   parts.task.file = file;
   parts.origin =
       Concat("It is ", CommentText(loaded.name), ": ", CommentText(loaded.policy->description()));
@@ -259,7 +259,7 @@ void AddSelfTest(const LoadedPolicy& loaded, const Plant& plant, bool simulates,
   parts.samples = {{"sample_states", "q1, q2, w1, w2", states}, {"sample_torques", "N m", torques}};
   if (simulates) {
     parts.samples.push_back({"sample_steps", "deviations a control period later",
-                             StepsFrom(states, torques, {plant, loaded.control_period()})});
+                             StepsFrom(states, torques, loaded.design_plant())});
   }
   parts.macros.emplace_back("SAMPLES", Concat(kLawSamples));
   parts.macros.emplace_back("TORQUE_TOLERANCE", CLiteral(static_cast<float>(tolerance)));

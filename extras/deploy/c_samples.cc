@@ -49,12 +49,12 @@ std::vector<double> Evaluate(const std::vector<LayerView>& layers, std::span<con
 std::vector<float> ObservationOf(const ExportedPolicy& policy, std::span<const double> s,
                                  std::span<const float> before, double torque) {
   if (policy.is_foreign()) return {s.begin(), s.end()};
-  const auto now = Observe(policy.loaded->plant, {s[0], s[1], s[2], s[3]}, policy.loaded->scale);
+  const auto now = Observe(policy.loaded->plant, {s[0], s[1], s[2], s[3]}, policy.loaded->scale());
   std::vector<float> obs(now.begin(), now.end());
   obs.resize(static_cast<size_t>(policy.obs_size()));
   const int steps = policy.loaded->memory();
   if (steps > 0 && !before.empty())
-    Remember(before, torque / policy.loaded->scale.torque, steps, obs);
+    Remember(before, torque / policy.loaded->scale().torque, steps, obs);
   return obs;
 }
 

@@ -174,7 +174,7 @@ PageAgent ReadAgent(const std::string& path, const std::string& given_id, int64_
                "and dry friction, with links that are solid capsules and an armature of ",
                kArmature, " kg·m², got another plant"));
   }
-  if (loaded.control_period() != kControlPeriod || loaded.scale != Scale()) {
+  if (loaded.control_period() != kControlPeriod || loaded.scale() != Scale()) {
     throw BadInput(Concat(where, ": expected a policy that decides every ", kControlPeriod,
                           " s, for a plant of about the page's size, got another"));
   }

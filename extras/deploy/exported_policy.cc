@@ -88,7 +88,7 @@ ExportedPolicy ViewForExport(const LoadedPolicy& loaded) {
   exported.loaded = &loaded;
   exported.task = loaded.is_foreign()
                       ? ForeignTaskOf(loaded)
-                      : PendulumTask(loaded.plant.actuated_joint, loaded.scale, loaded.memory());
+                      : PendulumTask(loaded.plant.actuated_joint, loaded.scale(), loaded.memory());
   exported.policy = dynamic_cast<const NetworkPolicy*>(loaded.policy.get());
   if (exported.policy == nullptr) {
     throw BadInput(Concat(loaded.name, ": expected a learned policy, got ",

@@ -81,8 +81,8 @@ class FunctionPolicy final : public Policy {
 LoadedPolicy MakeFunctionPolicy(nb::callable function, int memory) {
   const auto name = nb::cast<std::string>(
       nb::str(nb::getattr(nb::handle(function), "__name__", nb::str("a function in Python"))));
-  return {Printable(name), "",      std::make_shared<FunctionPolicy>(std::move(function), memory),
-          kDoublePendulum, Plant(), Scale()};
+  return {Printable(name), "", std::make_shared<FunctionPolicy>(std::move(function), memory),
+          kDoublePendulum, Plant()};
 }
 
 }  // namespace upswing

@@ -130,12 +130,11 @@ constexpr TimedSetting kTimedSettings[] = {
     {"velocity_filter", 1},
 };
 
-/// Multiplies the settings with units that only the named agent gives by the natural units of the
-/// plant over those of the agent's plant, `designed`. `is_given` tells which settings the user has
+/// Multiplies the settings with units that only the named agent gives by `ratio`: the natural units
+/// of the plant over those of the agent's plant. `is_given` tells which settings the user has
 /// given.
-void FitToPlant(const Options& options, const Plant& designed,
-                const std::function<bool(const Option&)>& is_given, const Config& config) {
-  const Scale ratio = CarryOver(designed, config.plant);
+void FitToPlant(const Options& options, const Scale& ratio,
+                const std::function<bool(const Option&)>& is_given) {
   if (ratio == Scale()) return;
   const auto multiply = [&](const char* name, double factor) {
     const Option& option = *options.Get(name);
@@ -278,8 +277,9 @@ Config ParseConfig(std::string_view text, const std::string& where,
       const auto is_given = [&](const Option& option) {
         return !FindEarly(option.section, option.name, table, where, flags).where.empty();
       };
-      FitToPlant(options, designed, is_given, config);
-      const double usual = designed_period * CarryOver(designed, config.plant).time;
+      const Scale ratio = CarryOver(designed, config.plant);
+      FitToPlant(options, ratio, is_given);
+      const double usual = designed_period * ratio.time;
       if (is_given(*options.Get("control_period"))) FitToPeriod(options, usual, is_given, config);
       if (config.control_period != designed_period) RoundToPeriods(options, is_given, config);
     }

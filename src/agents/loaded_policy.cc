@@ -31,7 +31,7 @@ void CheckObservation(const LoadedPolicy& loaded, const std::string& where) {
   }
   const auto& given = loaded.policy->info().observation;
   if (!given) throw BadInput(Concat(where, ": no metadata \"observation\""));
-  const ObservationInfo expected = ObservationInfoOf(loaded.scale, loaded.memory(),
+  const ObservationInfo expected = ObservationInfoOf(loaded.scale(), loaded.memory(),
                                                      loaded.identifies(), loaded.seeks_any_pose());
   const auto same = [](double a, double b) { return std::abs(a - b) <= 1e-12 * std::abs(b); };
   const auto same_memory = [&] {
@@ -117,7 +117,7 @@ LoadedPolicy ReadPolicy(const Tensors& file) {
   const auto policy = std::make_shared<const NetworkPolicy>(NetworkPolicy::From(file));
   const PolicyInfo& info = policy->info();
   const std::string task = info.task.empty() ? kDoublePendulum : info.task;
-  LoadedPolicy loaded{where, where, policy, task, Plant(), {info.time_scale, info.torque_scale}};
+  LoadedPolicy loaded{where, where, policy, task, Plant()};
   CheckTask(loaded, where);
   if (loaded.is_foreign()) return loaded;
   loaded.plant = TrainingPlant(info, where);
@@ -131,20 +131,18 @@ std::optional<LoadedPolicy> ForOtherSize(const LoadedPolicy& loaded, const Plant
   LoadedPolicy carried = loaded;
   carried.plant = plant;
   carried.carried_over = ratio;
-  carried.scale = loaded.scale * ratio;
-  if (network != nullptr) {
-    PolicyInfo info = network->info();
-    info.control_period = loaded.control_period() * ratio.time;
-    info.time_scale = carried.scale.time;
-    info.torque_scale = carried.scale.torque;
-    info.observation = ObservationInfoOf(carried.scale, loaded.memory(), loaded.identifies(),
-                                         loaded.seeks_any_pose());
-    carried.policy =
-        std::make_shared<const NetworkPolicy>(network->WithTorques(ratio.torque, std::move(info)));
-  } else {
+  if (network == nullptr) {
     carried.policy = loaded.design_for(plant);
-    carried.scale = TaskScaleOf(plant);
+    return carried;
   }
+  const Scale scale = loaded.scale() * ratio;
+  PolicyInfo info = network->info();
+  info.control_period = loaded.control_period() * ratio.time;
+  SetScale(scale, info);
+  info.observation =
+      ObservationInfoOf(scale, loaded.memory(), loaded.identifies(), loaded.seeks_any_pose());
+  carried.policy =
+      std::make_shared<const NetworkPolicy>(network->WithTorques(ratio.torque, std::move(info)));
   return carried;
 }
 
@@ -180,10 +178,9 @@ PolicyInfo InfoOf(const Config& config) {
   info.control_period = spec.step_seconds;
   if (config.is_foreign()) return info;
   for (const auto& [name, value] : PlantValues(config.plant)) info.plant[name] = value;
-  const Scale scale = config.scale();
-  info.time_scale = scale.time;
-  info.torque_scale = scale.torque;
-  info.observation = ObservationInfoOf(scale, config.memory, config.identify, config.any_pose);
+  SetScale(config.scale(), info);
+  info.observation =
+      ObservationInfoOf(config.scale(), config.memory, config.identify, config.any_pose);
   return info;
 }
 

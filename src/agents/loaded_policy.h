@@ -8,7 +8,8 @@
 #include "agents/config.h"
 #include "base/policy.h"
 #include "base/tensors.h"
-#include "pendulum/scale.h"
+#include "control/design_plant.h"
+#include "pendulum/observation.h"
 
 namespace upswing {
 
@@ -19,7 +20,6 @@ struct LoadedPolicy {
   std::shared_ptr<const Policy> policy;
   std::string task;         // kDoublePendulum, or that of an environment of Gymnasium
   Plant plant;              // of the training or of the design, for the double pendulum
-  Scale scale;              // units of its observations, and of the rewards and times of its task
   Scale carried_over = {};  // from the plant of its training or design (ForOtherSize)
   // Designs the controller for another plant; empty for a learned policy. Throws BadInput if no
   // such controller exists.
@@ -28,6 +28,10 @@ struct LoadedPolicy {
 
   /// Whether it is for an environment that only Python makes and steps.
   bool is_foreign() const { return IsForeign(task); }
+  /// Units of its observations, and of the rewards and times of its task.
+  Scale scale() const { return ScaleIn(policy->info()); }
+  /// Its plant with its control period, as for a design.
+  DesignPlant design_plant() const { return {plant, control_period()}; }
   /// Time for which the policy holds a torque, s.
   double control_period() const { return policy->info().control_period.value_or(kControlPeriod); }
   /// Number of past steps in its observations.
@@ -52,9 +56,6 @@ std::optional<LoadedPolicy> ForOtherSize(const LoadedPolicy& loaded, const Plant
 
 /// Throws BadInput unless the policy is for the double pendulum.
 void ExpectPendulum(const LoadedPolicy& loaded);
-
-/// The units in the metadata of a policy.
-inline Scale ScaleIn(const PolicyInfo& info) { return {info.time_scale, info.torque_scale}; }
 
 /// Metadata of a policy file on its agent and task.
 PolicyInfo InfoOf(const Config& config);

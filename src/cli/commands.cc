@@ -26,28 +26,25 @@ Options PlantFlags(Plant& plant) {
   return flags;
 }
 
-/// A number with four significant digits.
-std::string FormatShort(double number) { return fmt::format("{:.4g}", number); }
-
 /// Says how a policy is carried over to a plant of another size.
 void SayIfCarriedOver(const LoadedPolicy& loaded) {
-  if (loaded.carried_over == Scale()) return;
-  const std::string name = Printable(loaded.name);
-  const std::string period = FormatShort(loaded.control_period());
-  if (loaded.design_for) {
-    return SayError(
-        Concat(name, ": designed for the plant of --plant, with a decision every ", period, " s"));
+  const Scale& ratio = loaded.carried_over;
+  if (ratio == Scale()) return;
+  std::string how = "designed for the plant of --plant, with";
+  if (!loaded.design_for) {
+    how = fmt::format(
+        "carried over to a plant of another size, with times × {:.4g} and torques × {:.4g}:",
+        ratio.time, ratio.torque);
   }
-  SayError(Concat(name, ": carried over to a plant of another size, with times × ",
-                  FormatShort(loaded.carried_over.time), " and torques × ",
-                  FormatShort(loaded.carried_over.torque), ": a decision every ", period, " s"));
+  SayError(fmt::format("{}: {} a decision every {:.4g} s", Printable(loaded.name), how,
+                       loaded.control_period()));
 }
 
 }  // namespace
 
 LoadedPolicy GetPolicyIn(const TrialArguments& trial, PolicyArguments a) {
-  UseIn(trial, a);
-  LoadedPolicy loaded = GetPolicy(a);
+  a.control_period = trial.control_period;
+  const LoadedPolicy loaded = UsedIn(trial, GetPolicy(a));
   SayIfCarriedOver(loaded);
   return loaded;
 }
@@ -55,9 +52,12 @@ LoadedPolicy GetPolicyIn(const TrialArguments& trial, PolicyArguments a) {
 std::vector<LoadedPolicy> GetPoliciesIn(const TrialArguments& trial,
                                         const std::vector<std::string>& names,
                                         PolicyArguments controllers) {
-  UseIn(trial, controllers);
+  controllers.control_period = trial.control_period;
   std::vector<LoadedPolicy> policies = GetPolicies(names, controllers);
-  for (const LoadedPolicy& loaded : policies) SayIfCarriedOver(loaded);
+  for (LoadedPolicy& loaded : policies) {
+    loaded = UsedIn(trial, loaded);
+    SayIfCarriedOver(loaded);
+  }
   return policies;
 }
 

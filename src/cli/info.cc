@@ -88,7 +88,7 @@ void PrintController(const LoadedPolicy& loaded) {
       modes.faster, modes.slower, modes.slower / modes.faster, modes.delta);
   if (const auto* regulator = dynamic_cast<const LqrPolicy*>(&policy)) {
     fmt::print("  region      of attraction, by simulation: x'Px < {:.4g}\n",
-               RegionOfAttraction(regulator->lqr(), {loaded.plant, loaded.control_period()}));
+               RegionOfAttraction(regulator->lqr(), loaded.design_plant()));
   }
 }
 

@@ -6,9 +6,13 @@ import csv
 import io
 import json
 import re
+import sys
 import unittest
 
-from testing import ProgramTest, read_tensors, small
+from testing import ROOT, ProgramTest, read_tensors, small
+
+sys.path.insert(0, str(ROOT / "tools/results"))
+from sizes import image  # noqa: E402
 
 MACHINE = """[plant]
 mass1 = 0.8
@@ -74,17 +78,8 @@ class PlantTest(ProgramTest):
 
     def write_size(self, length, mass):
         """Writes size.toml, a plant of the nominal shape, and returns its natural time [s]."""
-        time = length ** 0.5
-        units = {"mass": mass, "length": length, "center": length, "inertia": mass * length ** 2,
-                 "damping": mass * length ** 2 / time, "torque": mass * length ** 2 / time ** 2}
-        nominal = {"mass1": 1, "mass2": 1, "length1": 0.5, "length2": 0.5, "center1": 0.25,
-                   "center2": 0.25, "inertia1": 0.0242, "inertia2": 0.0242, "damping1": 0.2,
-                   "damping2": 0.2, "torque_limit": 5}
-        numbers = {name: value * next(unit for word, unit in units.items() if name.startswith(word))
-                   for name, value in nominal.items()}
-        numbers["armature"] = 0.01 * units["inertia"]
-        self.write("size.toml", "[plant]\n" + "".join(f"{k} = {v!r}\n" for k, v in numbers.items()))
-        return time
+        self.write("size.toml", image(length, mass))
+        return length ** 0.5
 
     def test_policies_and_controllers_act_on_every_size(self):
         for length, mass in ((0.1, 0.01), (10, 1000), (0.1, 1)):

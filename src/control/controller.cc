@@ -18,7 +18,9 @@ PolicyInfo InfoOf(const std::string& kind, const Options& settings, const Design
   info.config = settings.Toml(false, [](const Option&) { return true; });
   for (const auto& [name, value] : PlantValues(plant)) info.plant[name] = value;
   info.control_period = plant.control_period;
-  info.observation = ObservationInfoOf(TaskScaleOf(plant), 0);
+  const Scale scale = TaskScaleOf(plant);
+  SetScale(scale, info);
+  info.observation = ObservationInfoOf(scale, 0);
   return info;
 }
 
@@ -48,9 +50,7 @@ std::string Rounded(double x) {
 
 ComputedPolicy::ComputedPolicy(const std::string& kind, const Options& settings,
                                const DesignPlant& plant)
-    : plant_(plant), info_(InfoOf(kind, settings, plant)) {
-  SetScale(TaskScaleOf(plant));
-}
+    : plant_(plant), info_(InfoOf(kind, settings, plant)) {}
 
 std::unique_ptr<Policy::Memory> PendulumController::Start(int /*num_envs*/) const {
   return std::make_unique<Memory>();

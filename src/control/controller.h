@@ -9,6 +9,7 @@
 
 #include "base/policy.h"
 #include "control/pendulum_model.h"
+#include "pendulum/observation.h"
 #include "pendulum/task.h"
 
 namespace upswing {
@@ -44,11 +45,11 @@ class ComputedPolicy : public Policy {
   ComputedPolicy(const std::string& kind, const Options& settings, const DesignPlant& plant);
 
   const DesignPlant& plant() const { return plant_; }
-  const Scale& scale() const { return scale_; }  // of observations
+  Scale scale() const { return ScaleIn(info_); }  // of observations
   /// Sets the observation, for parts that see more than one without memory, and its units.
   void SetObservation(const ObservationInfo& observation, const Scale& scale) {
     info_.observation = observation;
-    SetScale(scale);
+    SetScale(scale, info_);
   }
   /// A torque (N·m) cut at the motor's limit.
   double Limited(double u) const {
@@ -56,14 +57,7 @@ class ComputedPolicy : public Policy {
   }
 
  private:
-  void SetScale(const Scale& scale) {
-    scale_ = scale;
-    info_.time_scale = scale.time;
-    info_.torque_scale = scale.torque;
-  }
-
   DesignPlant plant_;
-  Scale scale_;
   PolicyInfo info_;
 };
 

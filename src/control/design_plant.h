@@ -12,10 +12,8 @@ struct DesignPlant : Plant {
   DesignPlant(const Plant& plant, double period = kControlPeriod)  // NOLINT: a plant is one
       : Plant(plant), control_period(period) {}
 
-  /// Number of physics steps in a control period, and their length (s). Throws BadInput if the
-  /// plant is too stiff.
+  /// Number of physics steps in a control period. Throws BadInput if the plant is too stiff.
   int physics_steps() const;
-  double timestep() const { return control_period / physics_steps(); }
 };
 
 }  // namespace upswing

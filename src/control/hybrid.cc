@@ -9,8 +9,7 @@ HybridPolicy::HybridPolicy(const std::string& kind, const Options& settings, con
                            std::shared_ptr<const Policy> swing_up, const DesignPlant& plant)
     : ComputedPolicy(kind, settings, plant), swing_up_(std::move(swing_up)), upright_(lqr, plant) {
   if (swing_up_->info().observation) {
-    const PolicyInfo& info = swing_up_->info();
-    SetObservation(*info.observation, {info.time_scale, info.torque_scale});
+    SetObservation(*swing_up_->info().observation, ScaleIn(swing_up_->info()));
   }
   const std::string& task = swing_up_->info().task;
   if ((task.empty() || task == kDoublePendulum) && swing_up_->action_size() == 1) return;

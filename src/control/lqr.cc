@@ -38,10 +38,13 @@ Eigen::Matrix4d WeightsOf(const LqrConfig& config) {
   return Eigen::Vector4d(config.q1, config.q2, config.w1, config.w2).asDiagonal();
 }
 
+LinearModel UprightModel(const DesignPlant& plant) {
+  const int steps = plant.physics_steps();
+  return Discretize(LinearizeUpright(plant), plant.control_period / steps, steps);
+}
+
 Lqr SolveLqr(const LqrConfig& config, const DesignPlant& plant) {
-  const LinearModel model =
-      Discretize(LinearizeUpright(plant), plant.timestep(), plant.physics_steps());
-  const auto lqr = SolveDiscreteLqr(model, WeightsOf(config), config.torque);
+  const auto lqr = SolveDiscreteLqr(UprightModel(plant), WeightsOf(config), config.torque);
   if (!lqr) throw NoGain(config, plant);
   return *lqr;
 }

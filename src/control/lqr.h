@@ -14,6 +14,10 @@ namespace upswing {
 /// The diagonal matrix Q.
 Eigen::Matrix4d WeightsOf(const LqrConfig& config);
 
+/// The plant about upright over one control period: the Jacobian of the simulation's steps. Throws
+/// BadInput if the plant is too stiff.
+LinearModel UprightModel(const DesignPlant& plant);
+
 /// Solves the regulator problem for a plant and the control period. Throws BadInput if the plant's
 /// motor cannot stabilise it, or if no gain from these weights does.
 Lqr SolveLqr(const LqrConfig& config, const DesignPlant& plant);

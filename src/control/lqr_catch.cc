@@ -23,8 +23,7 @@ constexpr double kLargestLean = std::numbers::pi / 3;
 /// Control periods in which the regulator's slowest mode makes the cost fall to kSettled, times
 /// 1.5. At least kLeastSettling and at most kMostSettling.
 int SettleSteps(const Lqr& lqr, const DesignPlant& plant) {
-  const LinearModel model =
-      Discretize(LinearizeUpright(plant), plant.timestep(), plant.physics_steps());
+  const LinearModel model = UprightModel(plant);
   const double slowest = SpectralRadius(model.A - model.B * lqr.K);
   const double second = TaskScaleOf(plant).time / plant.control_period;  // of the built-in plant
   return static_cast<int>(std::clamp(1.5 * std::log(kSettled) / (2 * std::log(slowest)),

@@ -45,10 +45,9 @@ void PendulumModel::Step(std::span<StateVector> x, std::span<const double> u) {
 void PendulumModel::Linearize(std::span<const StateVector> x, std::span<const double> u,
                               std::span<LinearModel> models) {
   Reserve(kPerturbed * x.size());
-  const Scale scale = TaskScaleOf(plant_);
-  const double velocity = kDifference * scale.velocity();
+  const double velocity = kDifference * scale_.velocity();
   const std::array<double, 5> steps{kDifference, kDifference, velocity, velocity,
-                                    kDifference * scale.torque};
+                                    kDifference * scale_.torque};
   for (size_t i = 0; i < x.size(); ++i) {
     for (size_t k = 0; k < kPerturbed; ++k) Set(batch_, kPerturbed * i + k, x[i], u[i]);
     ClosedFormBatch::Array* const varied[] = {&batch_.q1, &batch_.q2, &batch_.w1, &batch_.w2,

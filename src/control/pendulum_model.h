@@ -20,9 +20,10 @@ inline PendulumState StateOf(const StateVector& x) { return {x[0], x[1], x[2], x
 class PendulumModel {
  public:
   explicit PendulumModel(const DesignPlant& plant)
-      : plant_(plant), steps_(plant.physics_steps()), batch_(0) {}
+      : plant_(plant), scale_(TaskScaleOf(plant)), steps_(plant.physics_steps()), batch_(0) {}
 
   const DesignPlant& plant() const { return plant_; }
+  const Scale& scale() const { return scale_; }  // TaskScaleOf the plant
 
   /// Steps states (n) in place, each under its own torque (n). Does not limit the torque.
   void Step(std::span<StateVector> x, std::span<const double> u);
@@ -37,6 +38,7 @@ class PendulumModel {
   void Reserve(size_t n);
 
   DesignPlant plant_;
+  Scale scale_;
   int steps_;  // of the physics in a control period
   ClosedFormBatch batch_;
 };

@@ -119,7 +119,7 @@ bool TrajectoryOptimizer::Backward(const QuadraticCost& cost, const Trajectory& 
                                    double regularization) {
   const size_t steps = trajectory.u.size();
   const double limit = model_.plant().torque_limit;
-  const Scale scale = TaskScaleOf(model_.plant());
+  const Scale& scale = model_.scale();
   const double time2 = scale.time * scale.time, torque2 = scale.torque * scale.torque;
   const StateVector W(1, 1, time2, time2);
   k_.assign(steps, 0);

@@ -29,7 +29,7 @@ constexpr double kCheaper = 0.25;
 std::optional<Trajectory> GuessSwingUp(const LqrConfig& lqr, const LqrCatch& upright, int steps,
                                        Rng& rng, TrajectoryOptimizer& optimizer) {
   const DesignPlant& plant = optimizer.model().plant();
-  const Scale scale = TaskScaleOf(plant);
+  const Scale& scale = optimizer.model().scale();
   const double limit = plant.torque_limit, period = plant.control_period;
   const auto longest = static_cast<int>(std::lround(kLongestGuess * scale.time / period));
   const auto length = static_cast<size_t>(rng.Uniform(0.4, 1) * std::min(steps, longest));

@@ -40,11 +40,6 @@ PendulumState ParseStart(const std::string& text) {
 
 }  // namespace
 
-void UseIn(const TrialArguments& trial, PolicyArguments& policy) {
-  policy.control_period = trial.control_period;
-  if (!trial.plant.empty()) policy.used_on = ReadPlantFile(trial.plant).plant;
-}
-
 LoadedPolicy UsedIn(const TrialArguments& trial, const LoadedPolicy& loaded) {
   if (trial.plant.empty() || loaded.is_foreign()) return loaded;
   return ForOtherSize(loaded, ReadPlantFile(trial.plant).plant).value_or(loaded);
@@ -75,7 +70,7 @@ PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy*
   if (a.unknown_plant && loaded == nullptr) {
     throw BadInput("--unknown-plant: expected a policy with it, got none");
   }
-  env.scale = loaded != nullptr ? loaded->scale : TaskScaleOf(plant);
+  env.scale = loaded != nullptr ? loaded->scale() : TaskScaleOf(plant);
   env.episode_seconds = kEvaluationSeconds * env.scale.time;
   env.control_period = kControlPeriod * env.scale.time;
   if (a.control_period > 0) env.control_period = a.control_period;

@@ -9,7 +9,6 @@
 #include "agents/loaded_policy.h"
 #include "judge/rollout.h"
 #include "pendulum/pendulum_env.h"
-#include "runs/find_policy.h"
 
 /// The plant, sensors and motor for `eval`, `simulate` and `plot`. The same flags make the same
 /// episodes in all of them.
@@ -34,10 +33,6 @@ struct TrialArguments {
 
   bool is_of_eval() const { return episode >= 0; }
 };
-
-/// Completes the arguments of a policy by the trial: the plant on which it is used, and the control
-/// period. Throws BadInput.
-void UseIn(const TrialArguments& trial, PolicyArguments& policy);
 
 /// A loaded policy for the plant file of the trial (ForOtherSize). Throws BadInput.
 LoadedPolicy UsedIn(const TrialArguments& trial, const LoadedPolicy& loaded);

@@ -45,6 +45,13 @@ void WriteGoal(const Pose& goal, int memory, std::span<float> obs);
 ObservationInfo ObservationInfoOf(const Scale& scale, int64_t memory, bool identified = false,
                                   bool any_pose = false);
 
+/// The units in a policy's metadata, and their counterpart.
+inline Scale ScaleIn(const PolicyInfo& info) { return {info.time_scale, info.torque_scale}; }
+inline void SetScale(const Scale& scale, PolicyInfo& info) {
+  info.time_scale = scale.time;
+  info.torque_scale = scale.torque;
+}
+
 /// Builds the observations (D) of N environments from what their sensors measure:
 ///   8             of the measured state, see Observe
 ///   13            of the identified plant, if there is one

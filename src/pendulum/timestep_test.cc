@@ -24,6 +24,11 @@ std::string ProblemOf(const Plant& plant, double h = kPhysicsTimestep) {
   return "";
 }
 
+/// A random number from low to high, uniform on a logarithmic scale.
+double Spread(double low, double high, Rng& rng) {
+  return low * std::exp(std::log(high / low) * rng.Uniform());
+}
+
 /// Energy over that of hanging at rest, J.
 double EnergyOf(const Manipulator& body, const PendulumState& s) {
   return body.At(s).energy + 2 * (body.G1 + body.G2);
@@ -152,20 +157,17 @@ PendulumState After(const Manipulator& body, PendulumState s, int periods, int s
 
 TEST(Timestep, StepsAreShortEnoughOverNineDecadesOfFriction) {
   Rng rng(1, "test");
-  const auto spread = [&](double low, double high) {
-    return low * std::exp(std::log(high / low) * rng.Uniform());
-  };
   int refused = 0;
   double largest = 0;  // error of an angle, rad
   for (int n = 0; n < 200; ++n) {
     Plant plant;
-    plant.mass1 = spread(0.01, 10);
-    plant.mass2 = spread(0.01, 10);
-    plant.length1 = spread(0.1, 1);
-    plant.length2 = spread(0.1, 1);
-    plant.damping1 = spread(1e-6, 1e3);
-    plant.damping2 = spread(1e-6, 1e3);
-    plant.armature = spread(1e-5, 0.1);
+    plant.mass1 = Spread(0.01, 10, rng);
+    plant.mass2 = Spread(0.01, 10, rng);
+    plant.length1 = Spread(0.1, 1, rng);
+    plant.length2 = Spread(0.1, 1, rng);
+    plant.damping1 = Spread(1e-6, 1e3, rng);
+    plant.damping2 = Spread(1e-6, 1e3, rng);
+    plant.armature = Spread(1e-5, 0.1, rng);
     int steps = 0;
     try {
       steps = StepsFor(plant);
@@ -188,18 +190,15 @@ TEST(Timestep, RefusalAndNonsenseCoincide) {
   Rng rng(1, "test");
   int refused = 0, unstable = 0, wrong = 0;
   for (int n = 0; n < 300; ++n) {
-    const auto spread = [&](double low, double high) {
-      return low * std::exp(std::log(high / low) * rng.Uniform());
-    };
     Plant plant;
-    plant.mass1 = spread(0.05, 5);
-    plant.mass2 = spread(0.05, 5);
-    plant.length1 = spread(0.1, 1);
-    plant.length2 = spread(0.1, 1);
-    plant.damping1 = spread(1e-3, 5);
-    plant.damping2 = spread(1e-3, 5);
-    plant.gravity = spread(1, 30);
-    plant.armature = spread(1e-5, 0.1);
+    plant.mass1 = Spread(0.05, 5, rng);
+    plant.mass2 = Spread(0.05, 5, rng);
+    plant.length1 = Spread(0.1, 1, rng);
+    plant.length2 = Spread(0.1, 1, rng);
+    plant.damping1 = Spread(1e-3, 5, rng);
+    plant.damping2 = Spread(1e-3, 5, rng);
+    plant.gravity = Spread(1, 30, rng);
+    plant.armature = Spread(1e-5, 0.1, rng);
     const bool is_refused = !ProblemOf(plant).empty();
     const bool is_unstable = IsUnstable(plant, kPhysicsTimestep, rng);
     refused += is_refused ? 1 : 0;

@@ -156,22 +156,6 @@ void CheckSettings(const PolicyArguments& settings, const std::vector<std::strin
   }
 }
 
-/// The policy for its own plant.
-LoadedPolicy GetForOwnPlant(const PolicyArguments& a) {
-  CheckSettings(a, a.name.empty() ? std::vector<std::string>() : std::vector{a.name});
-  const bool is_controller = IsController(a.name), is_path = fs::exists(a.name);
-  if (is_controller && is_path) {
-    throw BadInput(Concat(a.name, ": expected a controller or a file, got the name of both; ./",
-                          a.name, " means the file; rename the file to use the controller"));
-  }
-  if (is_controller) return DesignNamed(a);
-  LoadedPolicy loaded = LoadNamed(a.name, true);
-  if (a.control_period == 0 || a.control_period == loaded.control_period()) return loaded;
-  throw BadInput(Concat("--control-period: expected ", FormatNumber(loaded.control_period()),
-                        " s, the control period of ", Printable(loaded.name), ", got ",
-                        FormatNumber(a.control_period)));
-}
-
 }  // namespace
 
 fs::path ShippedPolicy(const fs::path& name) {
@@ -199,7 +183,6 @@ std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
   for (const std::string& name : names) {
     PolicyArguments one{name, {}, {}};
     one.control_period = controllers.control_period;
-    one.used_on = controllers.used_on;
     if (IsController(name)) {
       one.made_for = controllers.made_for;
       std::ranges::copy_if(controllers.flags, std::back_inserter(one.flags),
@@ -218,9 +201,18 @@ std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
 }
 
 LoadedPolicy GetPolicy(const PolicyArguments& a) {
-  LoadedPolicy loaded = GetForOwnPlant(a);
-  if (!a.used_on || loaded.is_foreign()) return loaded;
-  return ForOtherSize(loaded, *a.used_on).value_or(loaded);
+  CheckSettings(a, a.name.empty() ? std::vector<std::string>() : std::vector{a.name});
+  const bool is_controller = IsController(a.name), is_path = fs::exists(a.name);
+  if (is_controller && is_path) {
+    throw BadInput(Concat(a.name, ": expected a controller or a file, got the name of both; ./",
+                          a.name, " means the file; rename the file to use the controller"));
+  }
+  if (is_controller) return DesignNamed(a);
+  LoadedPolicy loaded = LoadNamed(a.name, true);
+  if (a.control_period == 0 || a.control_period == loaded.control_period()) return loaded;
+  throw BadInput(Concat("--control-period: expected ", FormatNumber(loaded.control_period()),
+                        " s, the control period of ", Printable(loaded.name), ", got ",
+                        FormatNumber(a.control_period)));
 }
 
 LoadedPolicy DesignController(const std::string& name, const ControllerConfig& config,
@@ -232,14 +224,11 @@ LoadedPolicy DesignController(const std::string& name, const ControllerConfig& c
     static_cast<Plant&>(other.plant) = plant;
     return MakeController(name, other);
   };
-  const Scale scale = config.swing_up_policy == nullptr ? TaskScaleOf(config.plant)
-                                                        : ScaleIn(config.swing_up_policy->info());
   return {.name = title,
           .path = "",
           .policy = MakeController(name, config),
           .task = kDoublePendulum,
           .plant = config.plant,
-          .scale = scale,
           .design_for = design_for,
           .swing_up = config.swing_up_policy};
 }

@@ -17,9 +17,8 @@ struct PolicyArguments {
   std::vector<FlagValue> flags;  // settings of the controller
   // The controller's design plant: changes such as mass2=1.2, and at most one plant file.
   std::vector<std::string> made_for;
-  std::optional<Plant> plant = {};    // design plant before made_for; nothing: the task's
-  std::optional<Plant> used_on = {};  // plant of a file on which the policy is to be used
-  double control_period = 0;          // s; 0: the policy's own, or that of the size of the plant
+  std::optional<Plant> plant = {};  // design plant before made_for; nothing: the task's
+  double control_period = 0;        // s; 0: the policy's own, or that of the size of the plant
 
   bool has_settings() const { return !flags.empty() || !made_for.empty(); }
   bool empty() const { return name.empty() && !has_settings(); }
@@ -31,8 +30,7 @@ std::filesystem::path ShippedPolicy(const std::filesystem::path& name);
 /// Names of the policies that come with the program, sorted.
 std::vector<std::string> ShippedPolicies();
 
-/// Makes the controller with this name, or loads the policy as LoadPolicy does. If `used_on` has
-/// another size than the policy's plant, the policy is for `used_on` (ForOtherSize). Also throws
+/// Makes the controller with this name, or loads the policy as LoadPolicy does. Also throws
 /// BadInput if the name could mean a controller or a file, or if there are controller settings for
 /// a policy that is not a controller.
 LoadedPolicy GetPolicy(const PolicyArguments& a);

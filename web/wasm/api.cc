@@ -194,7 +194,7 @@ UPSWING_EXPORT(policy_open) Controller* PolicyOpen(const std::byte* file, size_t
     }
     CheckTimestep(controller->loaded.plant, "plant", kPhysicsTimestep);
     if (controller->loaded.control_period() != kControlPeriod ||
-        controller->loaded.scale != Scale()) {
+        controller->loaded.scale() != Scale()) {
       throw BadInput(
           "expected a policy that decides every 0.02 s, for a plant of about the page's size, got "
           "another");
@@ -210,7 +210,7 @@ UPSWING_EXPORT(policy_make) Controller* PolicyMake(const char* name, size_t size
   return Guarded([&] {
     const std::string called(name, size);
     auto controller = std::make_unique<Controller>(
-        LoadedPolicy{called, "", MakeController(called, {}), kDoublePendulum, Plant(), Scale()});
+        LoadedPolicy{called, "", MakeController(called, {}), kDoublePendulum, Plant()});
     SetText(About(*controller, PolicyMetadata(controller->loaded.policy->info())));
     return controller.release();
   });

@@ -40,7 +40,7 @@ LoadedPolicy TinyNetwork() {
   parts.parameters.assign(24, 0.1F);
   parts.action_limit = {5};
   const auto policy = std::make_shared<NetworkPolicy>(std::move(parts), InfoOf(Config()));
-  return {"network", "file", policy, kDoublePendulum, {}, {}};
+  return {"network", "file", policy, kDoublePendulum, {}};
 }
 
 /// Serves a machine over UDP from another thread.

@@ -20,7 +20,7 @@ class PolicyController {
         obs_(static_cast<size_t>(policy_->policy->obs_size())),
         before_(obs_.size()),
         memory_(policy_->policy->Start(1)),
-        builder_(1, policy_->scale, policy_->control_period(), policy_->memory(),
+        builder_(1, policy_->scale(), policy_->control_period(), policy_->memory(),
                  policy_->identifies() ? std::optional(policy_->plant) : std::nullopt) {}
 
   double Torque(int64_t step, const PendulumState& state) {
@@ -68,15 +68,16 @@ MachinePolicy GetMachinePolicy(PolicyArguments a, const std::string& robot,
   if (twin) {
     a.plant = WithoutDryFriction(twin->plant);
     if (asked) a.plant->actuated_joint = static_cast<int>(*asked);
-    a.used_on = a.plant;
     if (IsController(a.name) && a.control_period == 0) {
       const double period = kControlPeriod * TaskScaleOf(*a.plant).time;
       const double cycles = std::max(1.0, std::round(period * static_cast<double>(hz)));
       a.control_period = cycles / static_cast<double>(hz);
     }
   }
-  auto policy = std::make_shared<const LoadedPolicy>(GetPolicy(a));
-  ExpectPendulum(*policy);
+  LoadedPolicy loaded = GetPolicy(a);
+  ExpectPendulum(loaded);
+  if (twin) loaded = ForOtherSize(loaded, *a.plant).value_or(loaded);
+  auto policy = std::make_shared<const LoadedPolicy>(std::move(loaded));
   const Robot own = RobotOf(*policy);
   if (own == asked.value_or(own)) return policy;
   throw BadInput(Concat("--robot: expected ", NameOf(own), ", the robot of ",

@@ -34,6 +34,21 @@ double FirstGuessOf(const Option& option) {
   return option.name == "lag" && option.number() == 0 ? kFirstLag : option.number();
 }
 
+/// The natural units of a plant over those of RealAIGym's machine of design C.1; see
+/// FitParameters::scale.
+Scale ScaleOverUsual(const Plant& plant) {
+  const Plant usual{.mass1 = 0.52,
+                    .mass2 = 0.63,
+                    .length1 = 0.2,
+                    .length2 = 0.3,
+                    .center1 = 0.2,
+                    .center2 = 0.26,
+                    .inertia1 = 0.01,
+                    .inertia2 = 0.01,
+                    .armature = 0.003};
+  return CarryOver(usual, plant);
+}
+
 double NumberIn(Twin twin, const std::string& name) { return OptionsOf(twin).Get(name)->number(); }
 
 }  // namespace
@@ -55,7 +70,7 @@ LogSessions OneSession(std::span<const MachineLog> logs) {
 
 FitParameters::FitParameters(const Twin& first, const Structure& structure,
                              const LogSessions& sessions)
-    : base_(WithoutResults(first)), sessions_(sessions) {
+    : base_(WithoutResults(first)), scale_(ScaleOverUsual(base_.plant)), sessions_(sessions) {
   const Options options = OptionsOf(base_);
   std::vector<double> guess;
   for (const std::string& name : structure.values) {
@@ -75,19 +90,6 @@ FitParameters::FitParameters(const Twin& first, const Structure& structure,
 }
 
 double FitParameters::FirstNumber(const std::string& name) const { return NumberIn(base_, name); }
-
-Scale FitParameters::scale() const {
-  Plant usual;
-  usual.mass1 = 0.52;
-  usual.mass2 = 0.63;
-  usual.length1 = 0.2;
-  usual.length2 = 0.3;
-  usual.center1 = 0.2;
-  usual.center2 = 0.26;
-  usual.inertia1 = usual.inertia2 = 0.01;
-  usual.armature = 0.003;
-  return CarryOver(usual, base_.plant);
-}
 
 std::vector<int> FitParameters::IndicesOfMachine() const {
   std::vector<int> own;

@@ -61,7 +61,7 @@ class FitParameters {
 
   /// The natural units of the first guess over those of the machine that this program's priors were
   /// made for, design C.1 of RealAIGym; 1 for machines of about its size (CarryOver).
-  Scale scale() const;
+  const Scale& scale() const { return scale_; }
 
   /// Indices in θ of the machine's values.
   std::vector<int> IndicesOfMachine() const;
@@ -83,6 +83,7 @@ class FitParameters {
 
  private:
   Twin base_;  // the first guess, without covariance and sessions
+  Scale scale_;
   LogSessions sessions_;
   std::vector<FitValue> values_;
   Eigen::VectorXd guess_;
