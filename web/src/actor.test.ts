@@ -121,7 +121,8 @@ test('numbers that overflow give no torque', () => {
 test('describes a decision', () => {
   const text = (which: number) => {
     const policy = new Policy(actors[which]!);
-    return decisionText(policy.act(new Float32Array(policy.controller.inputs)), 0.1);
+    const decision = policy.act(new Float32Array(policy.controller.inputs));
+    return decisionText(decision, 0.1, { factor: 1, unit: 'N·m' });
   };
   expect(text(0)).toMatch(/^−?\d\.\d\d N·m, σ \d\.\d\d, V −?\d+\.\d$/);
   expect(text(1)).toMatch(/^−?\d\.\d\d N·m, σ \d\.\d\d$/);

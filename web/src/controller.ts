@@ -2,6 +2,7 @@ import { core } from './core';
 import type { Core } from './core';
 import type { Controller, Decision, Memory } from './decision';
 import { Fields } from './fields';
+import type { Parameter } from './pendulum';
 
 /// Description of a policy file by the core (web/wasm/api.cc).
 interface About {
@@ -14,6 +15,10 @@ interface About {
   memory: number; // steps
   identifies: boolean;
   any_pose: boolean; // whether it observes its goal
+  period: number; // between two decisions, s
+  plant: Readonly<Record<Parameter, number>>; // in which it counts
+  trained_size: number; // length of its training plant, in lengths of the built-in plant
+  trained_time: number; // the same as a ratio of natural times
   selfCheckError: number;
   metadata: Record<string, string>;
 }

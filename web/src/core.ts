@@ -38,13 +38,14 @@ interface Exports {
   field_table(): void;
   pendulum_at(): void;
   pendulum_check(): number;
+  physics_steps(period: number): number;
   pendulum_step(): void;
-  identifier_open(): number;
+  identifier_open(period: number): number;
   identifier_close(identifier: number): void;
   identifier_begin(identifier: number): void;
   identifier_update(identifier: number): void;
   identifier_observe(identifier: number): void;
-  sensors_open(): number;
+  sensors_open(period: number): number;
   sensors_close(sensors: number): void;
   sensors_begin(sensors: number): void;
   sensors_measure(sensors: number): void;

@@ -48,5 +48,5 @@ test("the core's own table", () => {
   const sizes = [PLANT_FIELDS, STATE_FIELDS, JUDGEMENT_FIELDS, IDENTIFIED_FIELDS].map(
     (f) => f.size,
   );
-  expect(sizes).toEqual([8, 4, OBSERVATION_SIZE + 5 + 5, 13]);
+  expect(sizes).toEqual([9, 4, OBSERVATION_SIZE + 5 + 5, 13]);
 });

@@ -1,7 +1,6 @@
 import { expect, test } from 'vitest';
 import { HANGING } from './pendulum';
 import { History } from './history';
-import { STEPS_PER_SECOND } from './world';
 
 const moment = (t: number) => ({ t, state: { ...HANGING }, torque: 1.25, energy: 0, height: -1 });
 
@@ -18,7 +17,7 @@ test('keeps the last seconds, oldest first', () => {
 test('a window includes its oldest moment, whenever it began', () => {
   for (let start = 0; start < 1000; start += 9) {
     const history = new History(60);
-    const time = (k: number) => (start + 4 * k) / STEPS_PER_SECOND; // as World.time
+    const time = (k: number) => (start + 4 * k) / 200; // as World.time
     for (let k = 0; k <= 4000; ++k) history.add(moment(time(k)));
     // Control steps 0.02 s apart: 65 in 1.3 s, and the first one.
     expect(history.from(time(4000) - 1.3).length, `${start}`).toBe(66);

@@ -1,8 +1,9 @@
-import { STEPS_PER_SECOND } from './world';
+import { Units } from './size';
 import type { Moment } from './world';
 
-// Half a physics step of margin, so that rounding does not decide about a moment on the edge.
-const MARGIN = 0.5 / STEPS_PER_SECOND; // s
+// So that rounding does not decide about a moment on the edge.
+const MARGIN = 1e-6; // s
+const DECIMALS = [2, 3, 4, 5] as const; // of times in a file; see decimalsFor()
 
 /// The last moments, oldest first.
 export class History {
@@ -39,13 +40,25 @@ export class History {
     this.first = 0;
   }
 
-  /// CSV as `upswing simulate` writes it, with all digits; time starts at 0.
-  csv(): string {
+  /// CSV as `upswing simulate` writes it, in SI units and with all digits; time starts at 0.
+  csv(units = new Units(1)): string {
     const kept = this.moments.slice(this.first);
-    const start = kept[0]?.t ?? 0;
-    const rows = kept.map(({ t, state: { q1, q2, w1, w2 }, torque }) =>
-      [(t - start).toFixed(2), q1, q2, w1, w2, torque].join(),
+    const times = kept.map(({ t }) => units.time * (t - kept[0]!.t));
+    const decimals = decimalsFor(times);
+    const { torque: newtonMetres, velocity } = units;
+    const rows = kept.map(({ state: { q1, q2, w1, w2 }, torque }, i) =>
+      [
+        times[i]!.toFixed(decimals),
+        ...[q1, q2, velocity * w1, velocity * w2, newtonMetres * torque],
+      ].join(),
     );
     return ['t,qpos0,qpos1,qvel0,qvel1,torque', ...rows].join('\n') + '\n';
   }
+}
+
+/// The fewest decimals that times need; 6 where none are enough.
+function decimalsFor(times: readonly number[]): number {
+  const fits = (decimals: number) =>
+    times.every((t) => Math.abs(Number(t.toFixed(decimals)) - t) < MARGIN);
+  return DECIMALS.find(fits) ?? 6;
 }

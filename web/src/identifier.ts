@@ -12,11 +12,12 @@ const forgotten = new FinalizationRegistry<() => void>((close) => close());
 export class Identifier {
   private readonly at: number;
 
-  constructor(nominal: Plant) {
+  /// `period`: of control, s.
+  constructor(nominal: Plant, period: number) {
     const { exports } = core();
     let at = 0;
     core().formula(PLANT_FIELDS.numbers(nominal), () => {
-      at = exports.identifier_open();
+      at = exports.identifier_open(period);
     });
     this.at = at;
     forgotten.register(this, () => exports.identifier_close(at));

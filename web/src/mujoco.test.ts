@@ -4,7 +4,7 @@ import { join } from 'node:path';
 import loadMujoco from '@mujoco/mujoco';
 import type { MainModule } from '@mujoco/mujoco';
 import { beforeAll, expect, test } from 'vitest';
-import { HANGING, mjcf, NOMINAL, PHYSICS_STEPS } from './pendulum';
+import { HANGING, mjcf, NOMINAL, PARAMETERS } from './pendulum';
 import type { Plant, State } from './pendulum';
 import { Mujoco } from './mujoco';
 import type { Push } from './simulator';
@@ -36,11 +36,11 @@ test("changing the model's plant equals a new model", () => {
   simulator.state = START;
   simulator.plant = OTHER;
   expectSame(simulator.state, START, 1e-15);
-  for (let k = 0; k < 10 * 50 * PHYSICS_STEPS; ++k) {
+  for (let k = 0; k < 10 * 50 * 4; ++k) {
     const torque = 6 * Math.sin(k / 100); // beyond the limit of 4 too
     data.ctrl[0] = torque;
     mujoco.mj_step(model, data);
-    expect(simulator.step(torque, null)).toBe(true);
+    expect(simulator.step(torque, null, 0.005)).toBe(true);
   }
   const [q, w] = [data.qpos, data.qvel];
   expectSame(simulator.state, { q1: q[0], q2: q[1], w1: w[0], w2: w[1] }, 1e-9);
@@ -53,7 +53,7 @@ function native(plant: Plant, { q1, q2, w1, w2 }: State, torques: readonly numbe
   const folder = mkdtempSync(join(tmpdir(), 'upswing-'));
   const file = join(folder, 'torques.csv');
   writeFileSync(file, ['torque', ...torques].join('\n') + '\n');
-  const changes = Object.entries(plant).flatMap(([name, value]) => ['--set', `${name}=${value}`]);
+  const changes = PARAMETERS.flatMap((name) => ['--set', `${name}=${plant[name]}`]);
   const flags = ['--torque', file, `--start=${q1},${q2},${w1},${w2}`, '--physics', 'mujoco'];
   const rows = simulate(...flags, ...changes);
   rmSync(folder, { recursive: true });
@@ -67,7 +67,7 @@ function inPage(plant: Plant, start: State, torques: readonly number[]): State[]
   simulator.state = start;
   return torques.map((torque) => {
     const before = simulator.state;
-    for (let i = 0; i < PHYSICS_STEPS; ++i) expect(simulator.step(torque, null)).toBe(true);
+    for (let i = 0; i < 4; ++i) expect(simulator.step(torque, null, 0.005)).toBe(true);
     return before;
   });
 }
@@ -124,7 +124,7 @@ test.each([
   const after = (acting: Push | null) => {
     const simulator = new Mujoco(mujoco);
     simulator.state = START;
-    simulator.step(0, acting);
+    simulator.step(0, acting, 0.005);
     return simulator.state;
   };
   // Our push keeps its direction within a step; mj_applyFT's keeps the one of the step's beginning.
@@ -139,7 +139,7 @@ test('a state that blows up is reported, and the pendulum hangs again', () => {
   const simulator = new Mujoco(mujoco);
   simulator.state = { q1: 0, q2: 0, w1: 1e9, w2: -1e9 };
   let sound = true;
-  for (let k = 0; sound && k < 200; ++k) sound = simulator.step(0, null);
+  for (let k = 0; sound && k < 200; ++k) sound = simulator.step(0, null, 0.005);
   expect(sound).toBe(false);
   expectSame(simulator.state, { q1: 0, q2: 0, w1: 0, w2: 0 }, 1e-12);
 });

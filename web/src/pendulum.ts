@@ -1,19 +1,23 @@
 import { core } from './core';
 import { Fields } from './fields';
+import { inSi } from './size';
 
 /// The double pendulum and its task as formulas: those of src/pendulum/task.cc, in the core. Its
 /// constants, which a test compares with the program's, are needed before there is a core.
 ///
 /// Symbols: q1, q2 joint angles (rad; both 0 hanging, q2 relative to link 1), w1, w2 their velocities
 /// (rad/s), m mass (kg), l length (m), g gravity (m/s²), tau torque at joint 1 (N·m).
+///
+/// Units are those of the pendulum of size 1 (size.ts), where they are SI units.
 
-export const CONTROL_PERIOD = 0.02; // s between two actions
-export const PHYSICS_STEPS = 4; // in a control period
+export const CONTROL_PERIOD = 0.02; // s between two actions by default; see Policy.period
 export const CAPSULE_RADIUS = 0.04; // of both links, m
+export const ARMATURE = 0.01; // of both joints, kg·m²
 
-/// The plant's parameters. The capsules keep their radius; inertia and centre of mass follow mass
-/// and length.
+/// The plant's parameters, and its size. The capsules keep their radius; inertia and centre of mass
+/// follow mass and length.
 export interface Plant {
+  size: number; // factor of all lengths
   mass1: number; // kg
   mass2: number;
   length1: number; // m
@@ -24,7 +28,7 @@ export interface Plant {
   torque_limit: number; // N·m
 }
 
-export type Parameter = keyof Plant;
+export type Parameter = Exclude<keyof Plant, 'size'>;
 
 export const PARAMETERS = [
   'mass1',
@@ -41,7 +45,8 @@ export const PARAMETERS = [
 export type Range = readonly [number, number];
 
 /// Allowed values in the page, which the program takes, too.
-export const PLANT_LIMITS: Readonly<Record<Parameter, Range>> = {
+export const PLANT_LIMITS: Readonly<Record<keyof Plant, Range>> = {
+  size: [0.05, 10],
   mass1: [0.01, 100],
   mass2: [0.01, 100],
   length1: [0.1, 10],
@@ -53,6 +58,7 @@ export const PLANT_LIMITS: Readonly<Record<Parameter, Range>> = {
 };
 
 export const NOMINAL: Readonly<Plant> = {
+  size: 1,
   mass1: 1,
   mass2: 1,
   length1: 0.5,
@@ -73,9 +79,10 @@ export interface State {
 export const COORDINATES = ['q1', 'q2', 'w1', 'w2'] as const satisfies readonly (keyof State)[];
 
 // The core's structs (web/wasm/fields.h).
-export const PLANT_FIELDS = new Fields('plant', PARAMETERS);
+export const PLANT_NAMES = [...PARAMETERS, 'size'] as const satisfies readonly (keyof Plant)[];
+export const PLANT_FIELDS = new Fields('plant', PLANT_NAMES);
 export const STATE_FIELDS = new Fields('state', COORDINATES);
-const JUDGED_FIELDS = new Fields('judged', PARAMETERS, COORDINATES, ['torque', 'goal1', 'goal2']);
+const JUDGED_FIELDS = new Fields('judged', PLANT_NAMES, COORDINATES, ['torque', 'goal1', 'goal2']);
 const CAPSULE_FIELDS = new Fields('capsule', ['mass', 'radius', 'length']);
 const CAPSULE_INERTIA_FIELDS = new Fields('capsule_inertia', ['across', 'along']);
 const JUDGEMENT_NAMES = [
@@ -142,9 +149,10 @@ function judged(name: Judgement, plant: Plant, state: State): number {
   return JUDGEMENT_FIELDS.read(judge(plant, state), name);
 }
 
-/// The plant's parameters of an object with more keys.
-export function plantIn(given: Plant): Plant {
-  return Object.fromEntries(PARAMETERS.map((name) => [name, given[name]])) as unknown as Plant;
+/// The plant of size 1 with the parameters of an object, which may have more keys.
+export function plantIn(given: Readonly<Record<Parameter, number>>): Plant {
+  const parameters = PARAMETERS.map((name) => [name, given[name]]);
+  return { ...NOMINAL, ...Object.fromEntries(parameters) } as Plant;
 }
 
 /// Mechanical energy (J), with thin-rod inertias m l²/12 and heights counted from the pivot.
@@ -217,9 +225,16 @@ export function plantProblem(plant: Plant): string {
   return stable === 0 ? core().text : '';
 }
 
-/// The model as MJCF, with all digits of the plant's numbers. Contacts and constraints are off: a
-/// step takes less time and the trajectory is the same.
+/// Number of physics steps in a control period (s), as in the program. Throws BadInput.
+export function physicsSteps(plant: Plant, period: number): number {
+  let steps = 0;
+  core().formula(PLANT_FIELDS.numbers(plant), () => (steps = core().exports.physics_steps(period)));
+  return core().expect(steps);
+}
+
+/// The model as MJCF in SI units, with all digits of the plant's numbers. Contacts and constraints
+/// are off: a step takes less time and the trajectory is the same.
 export function mjcf(plant: Plant): string {
-  core().formula(PLANT_FIELDS.numbers(plant), core().exports.pendulum_mjcf);
+  core().formula(PLANT_FIELDS.numbers(inSi(plant)), core().exports.pendulum_mjcf);
   return core().text;
 }

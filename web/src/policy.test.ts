@@ -8,6 +8,8 @@ import { BadInput } from './bad_input';
 
 /// Files from strangers are refused with a reason.
 
+const { size: _, ...parameters } = NOMINAL;
+
 const DATA = new Uint8Array(new Float32Array([1, 2, 3, 4]).buffer);
 const tensor = (shape: unknown, offsets: unknown, dtype: unknown = 'F32') => ({
   x: { dtype, shape, data_offsets: offsets },
@@ -64,7 +66,8 @@ describe('a policy', () => {
     ['format', 'other'],
     ['format_version', '2'],
     ['output', 'mean'],
-    ['control_period', '0.05'],
+    ['control_period', '0.2'],
+    ['control_period', '0.0005'],
     ['model', '<mujoco/>'],
     ['network', 'x'],
     ['network', 'null'],
@@ -82,11 +85,11 @@ describe('a policy', () => {
       (name) =>
         [0, -1, 1e9, 1e-300].map((value): [string, string] => [
           'plant',
-          JSON.stringify({ ...NOMINAL, [name]: value }),
+          JSON.stringify({ ...parameters, [name]: value }),
         ]),
     ),
-    ['plant', JSON.stringify({ ...NOMINAL, damping1: -0.1 })],
-    ['plant', JSON.stringify(NOMINAL).replace('9.81', '1e999')],
+    ['plant', JSON.stringify({ ...parameters, damping1: -0.1 })],
+    ['plant', JSON.stringify(parameters).replace('9.81', '1e999')],
     ['observation', '{"max_velocity":[1,1]}'],
     ['observation', 'null'],
     ['reward_scale', '-1'],
@@ -96,7 +99,7 @@ describe('a policy', () => {
   });
 
   test('is read with a plant beyond the sliders, and marks stay within what can be set', () => {
-    const plant = { ...NOMINAL, mass1: 5, damping1: 0 };
+    const plant = { ...parameters, mass1: 5, damping1: 0 };
     const policy = new Policy(
       changed(({ header }) => {
         const about = header.__metadata__ as Record<string, string>;
@@ -105,7 +108,7 @@ describe('a policy', () => {
           'randomize_mass1 = 1e300\nrandomize_gravity = 0.5\nrandomize_delay = 1e9\ndelay = -3\n';
       }),
     );
-    expect(policy.plant).toEqual(plant);
+    expect(policy.plant).toEqual({ ...plant, size: 1 });
     expect(policy.trainedRange('mass1')).toEqual([0.01, 100]);
     expect(policy.trainedRange('gravity')).toEqual([0.5 * 9.81, 1.5 * 9.81]);
     expect(policy.trainedDisturbance('delay')).toEqual([0, 50]);

@@ -2,7 +2,7 @@ import { CoreController } from './controller';
 import type { Controller, Decision, Memory } from './decision';
 import { DISTURBANCE_LIMITS } from './disturbance';
 import type { Disturbance } from './disturbance';
-import { CONTROL_PERIOD, PLANT_LIMITS, plantIn } from './pendulum';
+import { PLANT_LIMITS, plantIn } from './pendulum';
 import type { Parameter, Plant, Range } from './pendulum';
 import { Neurons } from './neurons';
 import { BadInput } from './bad_input';
@@ -20,12 +20,18 @@ export class Policy {
   readonly identifies: boolean;
   /// Whether an observation contains the pose to reach. Otherwise that is upright.
   readonly seeksAnyPose: boolean;
-  /// The training plant, or a controller's design plant.
+  /// The training plant, or a controller's design plant. Of a policy for another size, the built-in
+  /// plant, to which it was carried over.
   readonly plant: Plant;
+  /// Length of its training plant if that has another size, in lengths of the built-in plant; else 1.
+  readonly trainedSize: number;
+  /// Time between two decisions, s.
+  readonly period: number;
   /// Factor of the rewards, and so of its values, during training.
   readonly rewardScale: number;
   /// Its file, or the name of a controller.
   readonly source: ArrayBuffer | string;
+  private readonly trainedTime: number; // the same as a ratio of natural times
   private _neurons: Neurons | null | undefined; // undefined: not read yet
 
   /// Reads and checks a file, as the program does, or designs the controller with this name. Throws
@@ -38,13 +44,16 @@ export class Policy {
       this.memory = controller.about.memory;
       this.identifies = controller.about.identifies;
       this.seeksAnyPose = controller.about.any_pose;
+      this.plant = plantIn(controller.about.plant);
+      this.trainedSize = controller.about.trained_size;
+      this.trainedTime = controller.about.trained_time;
+      this.period = controller.about.period;
       this.metadata = new Map(Object.entries(controller.about.metadata));
     } catch (error) {
       if (!(error instanceof BadInput)) throw error;
       // The page names the source itself.
       throw new BadInput(printable(error.message.replace(/^the file: /, ''), LONGEST_REASON));
     }
-    this.plant = plantIn(JSON.parse(this.about('plant')) as Plant);
     this.rewardScale = Number(this.metadata.get('reward_scale') ?? 1);
   }
 
@@ -91,10 +100,16 @@ export class Policy {
 
   /// The range of an error of sensors or motor during training, in the units of Disturbance.
   trainedDisturbance(name: keyof Disturbance): Range {
-    const unit = name === 'delay' ? CONTROL_PERIOD : 1;
+    const unit = this.disturbanceUnit(name);
     const least = this.setting(name) / unit;
     const most = least + this.setting(`randomize_${name}`) / unit;
     return within(DISTURBANCE_LIMITS[name], least, most);
+  }
+
+  /// The unit of an error of sensors or motor in the training's configuration.
+  private disturbanceUnit(name: keyof Disturbance): number {
+    if (name === 'delay') return this.period * this.trainedTime;
+    return name === 'sensor_noise' || name === 'encoder_counts' ? 1 : this.trainedTime;
   }
 
   /// A positive number of the training's configuration; 0 if it is missing.

@@ -21,9 +21,10 @@ const forgotten = new FinalizationRegistry<() => void>((close) => close());
 export class Sensors {
   private readonly at: number;
 
-  constructor() {
+  /// `period`: of control, s.
+  constructor(period: number) {
     const { exports } = core();
-    const at = exports.sensors_open();
+    const at = exports.sensors_open(period);
     this.at = at;
     forgotten.register(this, () => exports.sensors_close(at));
   }

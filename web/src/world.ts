@@ -10,7 +10,8 @@ import {
   NOMINAL,
   normalizedEnergy,
   observe,
-  PHYSICS_STEPS,
+  PARAMETERS,
+  physicsSteps,
   relativeHeight,
   remember,
 } from './pendulum';
@@ -20,15 +21,15 @@ import type { Policy } from './policy';
 import { Sensors } from './sensors';
 import type { Reading } from './sensors';
 import type { Push, Simulator, Vec } from './simulator';
-
-export const STEPS_PER_SECOND = PHYSICS_STEPS / CONTROL_PERIOD; // of physics
+import { Units } from './size';
 
 const SPRING = 60; // N/m, of the hand that drags
 const DAMPER = 5; // N·s/m
 const STRONGEST = 15; // N
 const SHOVE = 0.4; // N, sideways at the tip; repeated shoves add up
 const STRONGEST_SHOVE = 6; // N
-const SHOVE_STEPS = 20; // 0.1 s
+const SHOVE_SECONDS = 0.1;
+const ROUNDING = 1e-9; // s, of sums of times
 
 /// One moment, at each control step.
 export interface Moment {
@@ -39,7 +40,14 @@ export interface Moment {
   height: number; // of the tip over l1 + l2
 }
 
+/// A control period: its length (s) and the number of its physics steps.
+interface Rate {
+  period: number;
+  steps: number;
+}
+
 /// The pendulum with its motor, its agent, and the hand that disturbs it. Independent of the page.
+/// All numbers are in units of size 1 (size.ts).
 export class World {
   simulator: Simulator;
   readonly disturbance: Disturbance = { ...PERFECT };
@@ -63,6 +71,7 @@ export class World {
   decision: Decision | null = null;
 
   private _plant: Plant = { ...NOMINAL };
+  private _units = new Units(1);
   private _policy: Policy | null = null;
   private _goal: Goal = GOALS['up-up'];
   private observation: Float32Array | null = null; // at the last control step; null at the start
@@ -72,13 +81,18 @@ export class World {
   private identifier: Identifier | null = null;
   private identifies = false;
   private readonly motor = new DelayLine();
-  private readonly sensors = new Sensors();
+  private sensors = new Sensors(CONTROL_PERIOD);
   private reading: Reading | null = null; // at the last control step; null at the start
-  private steps = 0; // physics steps since the page was opened
-  private uprightSince: number | null = null; // physics step; null if the links are not in the goal
+  private rate: Rate = { period: CONTROL_PERIOD, steps: 4 }; // of this control period
+  private nextRate = this.rate; // of the next one
+  private rateSince = 0; // s, the time at which this rate began
+  private steps = 0; // physics steps since then
+  private uprightSince: number | null = null; // s; null if the links are not in the goal
   private untilControl = 0; // steps until the agent chooses again
-  private begun = 0; // physics step of the start
-  private shove = { force: 0, steps: 0 };
+  private begun = 0; // s, time of the start
+  private before: State = HANGING; // before the last step
+  private behind = 0; // s, of a twin's time behind the first one's
+  private shove = { force: 0, seconds: 0 };
 
   constructor(simulator: Simulator) {
     this.simulator = simulator;
@@ -89,21 +103,37 @@ export class World {
     return this._plant;
   }
   set plant(plant: Plant) {
+    const isOther = PARAMETERS.some((name) => plant[name] !== this._plant[name]);
     this._plant = { ...plant };
+    this._units = new Units(plant.size);
     this.simulator.plant = plant;
-    this.identifies = false;
+    if (isOther) this.identifies = false;
+    this.findRate();
     if (this.twin) this.twin.plant = plant;
     this.onChange();
+  }
+
+  /// The units of its size, for numbers that are shown.
+  get units(): Units {
+    return this._units;
   }
 
   get policy(): Policy | null {
     return this._policy;
   }
   set policy(policy: Policy | null) {
+    const { period: before } = this;
     this._policy = policy;
     this.observation = null;
-    this.identifier = policy?.identifies ? new Identifier(policy.plant) : null;
+    const { period } = this;
+    this.identifier = policy?.identifies ? new Identifier(policy.plant, period) : null;
     this.identifies = false;
+    if (period !== before) {
+      this.sensors = new Sensors(period);
+      this.sensors.begin(this.state);
+      this.reading = null;
+      this.findRate();
+    }
     this.forget();
     this.judge();
     this.look();
@@ -143,14 +173,60 @@ export class World {
     this.simulator = simulator;
   }
 
+  /// Time (s) between two decisions of its policy; also of the visitor's torques.
+  get period(): number {
+    return this._policy?.period ?? CONTROL_PERIOD;
+  }
+
+  /// Number of physics steps in a second, now.
+  private get stepsPerSecond(): number {
+    return this.rate.steps / this.rate.period;
+  }
+
+  /// Duration (s) of the next physics step.
+  get timestep(): number {
+    const { period, steps } = this.isAtControl ? this.nextRate : this.rate;
+    return period / steps;
+  }
+
+  private findRate(): void {
+    const { _plant: plant, period } = this;
+    this.nextRate = { period, steps: physicsSteps(plant, period) };
+  }
+
   /// Time (s) since the page was opened; a reset does not set it back.
   get time(): number {
-    return this.steps / STEPS_PER_SECOND;
+    return this.rateSince + this.steps / this.stepsPerSecond;
   }
 
   /// Time (s) since the start.
   get elapsed(): number {
-    return (this.steps - this.begun) / STEPS_PER_SECOND;
+    return rounded(this.time - this.begun);
+  }
+
+  /// The state `seconds` ago, within the last physics step.
+  stateAgo(seconds: number): State {
+    const { before, state, stepsPerSecond } = this;
+    const share = Math.min(Math.max(1 - seconds * stepsPerSecond, 0), 1);
+    const between = (a: number, b: number) => a + share * (b - a);
+    return {
+      q1: between(before.q1, state.q1),
+      q2: between(before.q2, state.q2),
+      w1: between(before.w1, state.w1),
+      w2: between(before.w2, state.w2),
+    };
+  }
+
+  /// The twin's state `seconds` ago; null without a twin.
+  twinStateAgo(seconds: number): State | null {
+    const { twin } = this;
+    return twin && twin.stateAgo(seconds - twin.behind);
+  }
+
+  /// Forgets the last step, after the state was set or advanced step by step.
+  settle(): void {
+    this.before = this.state;
+    this.twin?.settle();
   }
 
   /// Whether the next physics step begins with a new torque.
@@ -159,16 +235,16 @@ export class World {
   }
 
   /// How long (s) both links have been in the goal, usually upright, without a break; null if they
-  /// are not. Counted in steps, so that 1 s is exact.
+  /// are not. Rounded, so that 1 s is exact.
   get uprightFor(): number | null {
-    return this.uprightSince === null ? null : (this.steps - this.uprightSince) / STEPS_PER_SECOND;
+    return this.uprightSince === null ? null : rounded(this.time - this.uprightSince);
   }
 
   /// Whether it hangs still, and nothing will move it.
   get resting(): boolean {
     const { state, agentOn, byHand, torque, drag, shove, twin } = this;
     const { q1, q2, w1, w2 } = state;
-    if (agentOn || drag || shove.steps > 0 || twin?.resting === false) return false;
+    if (agentOn || drag || shove.seconds > 0 || twin?.resting === false) return false;
     return [q1, q2, w1, w2, byHand, torque].every((x) => x === 0);
   }
 
@@ -182,11 +258,13 @@ export class World {
     this.identifies = false;
     this.forget();
     this.untilControl = 0;
-    this.begun = this.steps;
+    this.begun = this.time;
+    this.before = state;
+    this.behind = 0;
     this.torque = 0;
     this.push = null;
     this.shoved = null;
-    this.shove.steps = 0;
+    this.shove.seconds = 0;
     this.uprightSince = null;
     this.judge();
     this.look();
@@ -194,37 +272,54 @@ export class World {
   }
 
   shoveTo(direction: -1 | 1): void {
-    const before = this.shove.steps > 0 ? this.shove.force : 0;
+    const before = this.shove.seconds > 0 ? this.shove.force : 0;
     const force = before + SHOVE * direction;
     const limited = Math.min(Math.max(force, -STRONGEST_SHOVE), STRONGEST_SHOVE);
-    this.shove = { force: limited, steps: SHOVE_STEPS };
+    this.shove = { force: limited, seconds: SHOVE_SECONDS };
     this.twin?.shoveTo(direction);
   }
 
-  /// One physics step; every fourth begins with a decision of the agent. Returns false if the state
-  /// blew up and the pendulum hangs again.
+  /// One physics step; the first one of a control period begins with a decision of the agent.
+  /// Returns false if the state blew up and the pendulum hangs again.
   advance(): boolean {
     if (this.untilControl === 0) {
+      this.takeRate();
       this.control();
-      this.untilControl = PHYSICS_STEPS;
+      this.untilControl = this.rate.steps;
     }
+    const { timestep } = this;
     this.push = this.hand() ?? this.shoving();
-    const valid = this.simulator.step(this.torque, this.push);
-    this.shove.steps = Math.max(0, this.shove.steps - 1);
+    this.before = this.state;
+    const valid = this.simulator.step(this.torque, this.push, timestep);
+    this.shove.seconds = Math.max(0, rounded(this.shove.seconds - timestep));
     ++this.steps;
     --this.untilControl;
-    if (valid) this.advanceTwin();
+    if (valid) this.advanceTwin(timestep);
     else this.reset();
     if (!this.resting) this.onChange();
     return valid;
   }
 
-  private advanceTwin(): void {
+  /// Begins a control period at the rate of policy and plant.
+  private takeRate(): void {
+    const { rate, nextRate } = this;
+    if (rate.period === nextRate.period && rate.steps === nextRate.steps) return;
+    this.rateSince = this.time;
+    this.steps = 0;
+    this.rate = nextRate;
+  }
+
+  /// The twin's steps may have another length.
+  private advanceTwin(seconds: number): void {
     const { twin, agentOn, byHand, drag } = this;
     if (!twin) return;
     Object.assign(twin, { agentOn, byHand, drag });
     Object.assign(twin.disturbance, this.disturbance);
-    twin.advance();
+    twin.behind += seconds;
+    for (let step = twin.timestep; twin.behind >= step - ROUNDING; step = twin.timestep) {
+      twin.behind = rounded(twin.behind - step);
+      if (!twin.advance()) break;
+    }
   }
 
   /// Steps to the agent's next decision.
@@ -258,7 +353,7 @@ export class World {
   /// Counts the time in the goal.
   private judge(): void {
     if (!inverted(this.state, this.target)) this.uprightSince = null;
-    else this.uprightSince ??= this.steps;
+    else this.uprightSince ??= this.time;
   }
 
   /// The observation of a measured state without memory. A policy that identifies the plant gets
@@ -332,12 +427,16 @@ export class World {
   }
 
   private shoving(): Push | null {
-    if (this.shove.steps === 0) return null;
+    if (this.shove.seconds === 0) return null;
     const force = { x: this.shove.force, z: 0 };
     const push: Push = { link: 2, along: this.plant.length2, force };
     this.shoved = { push, at: this.time };
     return push;
   }
+}
+
+function rounded(seconds: number): number {
+  return Math.round(seconds / ROUNDING) / Math.round(1 / ROUNDING);
 }
 
 /// Position (m) and velocity (m/s) of the point `along` m from a link's hinge.

@@ -2,6 +2,7 @@ import type { Plant } from '../src/pendulum';
 
 /// A plant that differs from the nominal one in every value.
 export const OTHER: Plant = {
+  size: 1,
   mass1: 1.3,
   mass2: 0.7,
   length1: 0.45,

@@ -52,8 +52,9 @@ int SetText(const json& value) {
 
 /// A policy and its memory.
 struct Controller {
-  explicit Controller(LoadedPolicy policy)
+  explicit Controller(LoadedPolicy policy, double trained_at = 1)
       : loaded(std::move(policy)),
+        trained_size(trained_at),
         learned(dynamic_cast<const NetworkPolicy*>(&*loaded.policy)),
         memory(loaded.policy->Start(1)) {}
 
@@ -77,6 +78,7 @@ struct Controller {
   }
 
   LoadedPolicy loaded;
+  double trained_size = 1;                 // length of its training plant over the built-in one's
   const NetworkPolicy* learned;            // null: computed controller
   std::unique_ptr<Policy::Memory> memory;  // of policies without plans
 };
@@ -99,6 +101,7 @@ const char* KindOf(const Controller& c) {
 
 json About(const Controller& c, const std::map<std::string, std::string>& metadata) {
   const Policy& policy = *c.loaded.policy;
+  const auto plant = PlantValues(c.loaded.plant);
   return {{"kind", KindOf(c)},
           {"text", policy.description()},
           {"inputs", policy.obs_size()},
@@ -108,6 +111,10 @@ json About(const Controller& c, const std::map<std::string, std::string>& metada
           {"memory", c.loaded.memory()},
           {"identifies", c.loaded.identifies()},
           {"any_pose", c.loaded.seeks_any_pose()},
+          {"period", c.loaded.control_period()},
+          {"plant", std::map<std::string, double>(plant.begin(), plant.end())},
+          {"trained_size", c.trained_size},
+          {"trained_time", 1 / c.loaded.carried_over.time},
           {"selfCheckError", c.self_check_error()},
           {"metadata", metadata}};
 }
@@ -170,35 +177,42 @@ UPSWING_EXPORT(bytes_size) size_t BytesSize() { return bytes.size(); }
 // ----------------------------------------------------------------------------------------------
 // Policies.
 
-/// Reads and checks a policy file. Leaves its description as JSON.
+namespace {
+
+/// Throws BadInput for a policy of a plant that the page does not have. `other_size`: the page's own
+/// plant replaces its training plant.
+void ExpectPageCanShow(const Plant& plant, bool other_size) {
+  if (plant.actuated_joint != 1) {
+    throw BadInput("expected a policy for a motor at joint 1, as in the page, got one for joint 2");
+  }
+  if (plant.rotor_inertia != 0 || plant.has_dry_friction()) {
+    throw BadInput(
+        "expected a policy for a plant without rotors and dry friction, as in the page, got one "
+        "with them");
+  }
+  if (!other_size && (plant.has_own_links() || plant.armature != kArmature)) {
+    throw BadInput(
+        "expected a policy for links that are solid capsules and the usual armature, as in the "
+        "page, got others");
+  }
+}
+
+double Reach(const Plant& plant) { return plant.length1 + plant.length2; }
+
+}  // namespace
+
+/// Reads and checks a policy file. Leaves its description as JSON. A policy for another size is
+/// carried over to the built-in plant, because the page computes in that plant's units.
 UPSWING_EXPORT(policy_open) Controller* PolicyOpen(const std::byte* file, size_t size) {
   return Guarded([&]() -> Controller* {
     const Tensors tensors = ReadSafetensors({file, file + size}, "the file");
-    auto controller = std::make_unique<Controller>(ReadPolicy(tensors));
-    ExpectPendulum(controller->loaded);
-    if (controller->loaded.plant.actuated_joint != 1) {
-      throw BadInput(
-          "expected a policy for a motor at joint 1, as in the page, got one for joint 2");
-    }
-    if (controller->loaded.plant.rotor_inertia != 0 ||
-        controller->loaded.plant.has_dry_friction()) {
-      throw BadInput(
-          "expected a policy for a plant without rotors and dry friction, as in the page, got one "
-          "with them");
-    }
-    if (controller->loaded.plant.has_own_links() ||
-        controller->loaded.plant.armature != kArmature) {
-      throw BadInput(
-          "expected a policy for links that are solid capsules and the usual armature, as in the "
-          "page, got others");
-    }
+    const LoadedPolicy read = ReadPolicy(tensors);
+    ExpectPendulum(read);
+    const std::optional<LoadedPolicy> carried = ForOtherSize(read, Plant());
+    ExpectPageCanShow(read.plant, carried.has_value());
+    const double trained_size = carried ? Reach(read.plant) / Reach(Plant()) : 1;
+    auto controller = std::make_unique<Controller>(carried.value_or(read), trained_size);
     CheckTimestep(controller->loaded.plant, "plant", kPhysicsTimestep);
-    if (controller->loaded.control_period() != kControlPeriod ||
-        controller->loaded.scale() != Scale()) {
-      throw BadInput(
-          "expected a policy that decides every 0.02 s, for a plant of about the page's size, got "
-          "another");
-    }
     SetText(About(*controller, tensors.metadata));
     return controller.release();
   });
@@ -311,7 +325,7 @@ UPSWING_EXPORT(pendulum_at) void PendulumAt() {
   Output(out);
 }
 
-/// Input: PlantFields. 1 if the physics is stable for it.
+/// Input: PlantFields, at size 1. 1 if the physics is stable for it.
 UPSWING_EXPORT(pendulum_check) int PendulumCheck() {
   return Guarded([] {
     CheckTimestep(Input<PlantFields>().plant, "plant", kPhysicsTimestep);
@@ -319,16 +333,22 @@ UPSWING_EXPORT(pendulum_check) int PendulumCheck() {
   });
 }
 
+/// Input: PlantFields, at size 1. Number of physics steps in a control period of `period` seconds.
+/// 0 if the plant is too stiff for them.
+UPSWING_EXPORT(physics_steps) int PhysicsSteps(double period) {
+  return Guarded([&] { return PhysicsStepsFor(Input<PlantFields>().plant, period, "plant"); });
+}
+
 /// One physics step. Input: PushedFields. Output: StateFields after it.
 UPSWING_EXPORT(pendulum_step) void PendulumStep() {
   const auto in = Input<PushedFields>();
   const Push push{static_cast<int>(in.link), in.along, in.x, in.z};
-  Output(StateFields{Step(in.plant, in.state, in.torque, push)});
+  Output(StateFields{Step(in.Built(), in.state, in.torque, push, in.timestep)});
 }
 
-/// An estimator of the plant of one pendulum, from its nominal PlantFields.
-UPSWING_EXPORT(identifier_open) Identifier* IdentifierOpen() {
-  return std::make_unique<Identifier>(Input<PlantFields>().plant, kControlPeriod, 1).release();
+/// An estimator of the plant of one pendulum, from its nominal PlantFields and control period (s).
+UPSWING_EXPORT(identifier_open) Identifier* IdentifierOpen(double period) {
+  return std::make_unique<Identifier>(Input<PlantFields>().plant, period, 1).release();
 }
 
 UPSWING_EXPORT(identifier_close) void IdentifierClose(Identifier* identifier) { delete identifier; }
@@ -353,10 +373,10 @@ UPSWING_EXPORT(identifier_observe) void IdentifierObserve(const Identifier* iden
   Output(out);
 }
 
-/// The sensors of one pendulum.
-UPSWING_EXPORT(sensors_open) Sensors* SensorsOpen() {
+/// The sensors of one pendulum with this control period (s).
+UPSWING_EXPORT(sensors_open) Sensors* SensorsOpen(double period) {
   const SensorModel slowest{kLongestLatency, 0, kLongestWindow, kSlowestFilter};
-  return std::make_unique<Sensors>(1, kControlPeriod, slowest).release();
+  return std::make_unique<Sensors>(1, period, slowest).release();
 }
 
 UPSWING_EXPORT(sensors_close) void SensorsClose(Sensors* sensors) { delete sensors; }
@@ -384,7 +404,7 @@ UPSWING_EXPORT(capsule_inertia) void CapsuleInertiaOf() {
 }
 
 /// Input: PlantFields. Leaves the model as MJCF.
-UPSWING_EXPORT(pendulum_mjcf) void PendulumMjcf() { text = Mjcf(Input<PlantFields>().plant); }
+UPSWING_EXPORT(pendulum_mjcf) void PendulumMjcf() { text = Mjcf(Input<PlantFields>().Built()); }
 
 // ----------------------------------------------------------------------------------------------
 // Learners.

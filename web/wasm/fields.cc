@@ -1,5 +1,7 @@
 #include "web/wasm/fields.h"
 
+#include <cmath>
+
 #include "base/text.h"
 
 namespace upswing {
@@ -27,6 +29,19 @@ void PlantFields::Visit(FieldVisitor& field) {
   for (const PlantParameter& parameter : std::span(kPlantParameters).first(kMainParameters)) {
     field(parameter.name, plant.*parameter.value);
   }
+  field("size", size);
+}
+
+Plant PlantFields::Built() const {
+  if (size == 1) return plant;
+  const auto inertia = [&](double mass, double length) {
+    return CapsuleInertia(mass, size * kCapsuleRadius, length).across;
+  };
+  Plant built = plant;
+  built.inertia1 = inertia(plant.mass1, plant.length1);
+  built.inertia2 = inertia(plant.mass2, plant.length2);
+  built.armature = std::pow(size, 5) * kArmature;  // masses grow with size³
+  return built;
 }
 
 void StateFields::Visit(FieldVisitor& field) {
@@ -44,6 +59,7 @@ void PendulumFields::Visit(FieldVisitor& field) {
 
 void PushedFields::Visit(FieldVisitor& field) {
   PendulumFields::Visit(field);
+  field("timestep", timestep);
   field("link", link);
   field("along", along);
   field("x", x);

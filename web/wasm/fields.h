@@ -29,7 +29,11 @@ class FieldVisitor {
 };
 
 struct PlantFields {
-  Plant plant;  // its first kMainParameters
+  Plant plant;      // its first kMainParameters
+  double size = 1;  // of the pendulum, as a multiple of the built-in plant's
+
+  /// The plant, with armature and capsules of its size. At size 1 these are the usual ones.
+  Plant Built() const;
   void Visit(FieldVisitor& field);
 };
 
@@ -45,6 +49,7 @@ struct PendulumFields : PlantFields, StateFields {
 };
 
 struct PushedFields : PendulumFields {
+  double timestep = 0;                       // s
   double link = 0, along = 0, x = 0, z = 0;  // see Push
   void Visit(FieldVisitor& field);
 };

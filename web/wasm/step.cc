@@ -40,7 +40,8 @@ struct Forces {
 
 }  // namespace
 
-PendulumState Step(const Plant& plant, const PendulumState& s, double tau, const Push& push) {
+PendulumState Step(const Plant& plant, const PendulumState& s, double tau, const Push& push,
+                   double h) {
   const Manipulator manipulator = ManipulatorOf(plant);
   Forces forces{plant, std::clamp(tau, -plant.torque_limit, plant.torque_limit), push, 0};
   if (push.link != 0) {
@@ -50,7 +51,7 @@ PendulumState Step(const Plant& plant, const PendulumState& s, double tau, const
   const auto acceleration = [&](const PendulumState& at, double /*share*/) {
     return manipulator.Acceleration(at, forces.At(at));
   };
-  return RungeKuttaStep(s, acceleration(s, 0), kPhysicsTimestep, acceleration);
+  return RungeKuttaStep(s, acceleration(s, 0), h, acceleration);
 }
 
 }  // namespace upswing

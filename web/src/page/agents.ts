@@ -1,5 +1,4 @@
-import { NOMINAL } from '../pendulum';
-import type { Parameter } from '../pendulum';
+import { CONTROL_PERIOD, PARAMETERS } from '../pendulum';
 import { Recording } from '../learn/course';
 import { Policy } from '../policy';
 import { BadInput, largerThan, MAX_FILE_BYTES } from '../bad_input';
@@ -148,7 +147,7 @@ function plainly({ controller, seeksAnyPose }: Policy, agent: string): string {
 }
 
 function describe(policy: Policy): string {
-  const randomized = (Object.keys(NOMINAL) as Parameter[]).some((name) => {
+  const randomized = PARAMETERS.some((name) => {
     const [low, high] = policy.trainedRange(name);
     return low < high;
   });
@@ -158,7 +157,13 @@ function describe(policy: Policy): string {
     policy.memory > 0 ? `, remembers ${policy.memory} steps` : '',
     policy.identifies ? ', identifies its pendulum' : '',
     policy.seeksAnyPose ? ', observes the pose to reach' : '',
+    policy.period === CONTROL_PERIOD
+      ? ''
+      : `, decides every ${Number((1000 * policy.period).toPrecision(3))} ms`,
     randomized ? ', trained on random pendulums' : '',
+    policy.trainedSize === 1
+      ? ''
+      : `, trained on a pendulum of ${Number(policy.trainedSize.toPrecision(3))} m`,
     '.',
   ].join('');
 }

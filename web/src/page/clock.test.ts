@@ -1,14 +1,17 @@
 import { expect, test } from 'vitest';
 import { HANGING } from '../pendulum';
+import { Units } from '../size';
 import type { World } from '../world';
 import { Clock } from './clock';
 
-/// A world whose only number counts its steps.
-function counter() {
+/// A world whose only number counts its steps. It steps 200 times in a second of its own time.
+function counter(size = 1) {
   const world = {
+    units: new Units(size),
+    timestep: 0.005,
     steps: 0,
-    get state() {
-      return { ...HANGING, q1: this.steps };
+    stateAgo(seconds: number) {
+      return { ...HANGING, q1: this.steps - seconds / this.timestep };
     },
     advance() {
       ++this.steps;
@@ -23,6 +26,17 @@ test('one second is 200 steps, at any rate of frames', () => {
     const { world, clock } = counter();
     for (let k = 0; k < frames; ++k) clock.advance(1 / frames);
     expect(Math.abs(world.steps - 200)).toBeLessThanOrEqual(1);
+  }
+});
+
+test('a small pendulum is fast, and a large one slow', () => {
+  for (const [size, expected] of [
+    [0.04, 1000],
+    [9, 67],
+  ] as const) {
+    const { world, clock } = counter(size);
+    for (let k = 0; k < 60; ++k) clock.advance(1 / 60);
+    expect(Math.abs(world.steps - expected)).toBeLessThanOrEqual(1);
   }
 });
 

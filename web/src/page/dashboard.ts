@@ -10,6 +10,8 @@ import {
 } from '../pendulum';
 import type { State } from '../pendulum';
 import type { Decision } from '../decision';
+import { shownIn } from '../quantity';
+import type { Shown } from '../quantity';
 import { PhasePortrait, SECONDS_SHOWN, signed, Strip } from '../view/charts';
 import { withMinus } from '../text';
 import { DecisionChart } from '../view/decision';
@@ -50,9 +52,9 @@ export class Dashboard {
     if (turn % (5 * FRAMES) === 0) this.showNumbers(world);
   }
 
-  private drawWay(moments: readonly Moment[], { time: now, plant, target }: World): void {
+  private drawWay(moments: readonly Moment[], { time: now, plant, target, units }: World): void {
     const goal = restIn(target);
-    this.energy.draw(moments, now, {
+    this.energy.draw(moments, now, units, {
       low: -0.1,
       high: 1.6,
       target: normalizedEnergy(plant, goal),
@@ -61,7 +63,7 @@ export class Dashboard {
         [1, 'up'],
       ],
     });
-    this.height.draw(moments, now, {
+    this.height.draw(moments, now, units, {
       low: -1.1,
       high: 1.1,
       target: relativeHeight(plant, goal),
@@ -71,41 +73,53 @@ export class Dashboard {
         [1, 'up'],
       ],
     });
-    this.phase.draw(moments);
+    this.phase.draw(moments, units);
   }
 
   private drawTorque(moments: readonly Moment[], world: World): void {
-    const { time: now, plant, decision, policy } = world;
+    const { time: now, plant, decision, policy, units } = world;
     const limit = plant.torque_limit;
-    this.torque.draw(moments, now, {
-      unit: 'N·m',
+    const { factor, unit } = torqueIn(world);
+    this.torque.draw(moments, now, units, {
+      unit,
       mean: TORQUE_MEAN,
       low: -1.1 * limit,
       high: 1.1 * limit,
       labels: [
-        [-limit, signed(-limit)],
+        [-limit, signed(-factor * limit)],
         [0, '0'],
-        [limit, signed(limit)],
+        [limit, signed(factor * limit)],
       ],
     });
-    this.decision.draw(decision, policy?.rewardScale ?? 1);
+    this.decision.draw(decision, policy?.rewardScale ?? 1, torqueIn(world));
     if (this.neurons.canvas.shown) this.neurons.draw(policy?.neurons ?? null, world.seen);
   }
 
   /// A few times a second, so that the numbers can be read.
   private showNumbers(world: World): void {
-    const { plant, policy, decision, state, target } = world;
+    const { plant, policy, decision, state, target, units } = world;
     const goal = restIn(target);
     const of = target ? ', goal' : ' of';
-    tell('energy', `${fixed(energy(plant, state))} J${of} ${fixed(energy(plant, goal))} J`);
-    tell('height', `${fixed(tipHeight(plant, state))} m${of} ${fixed(tipHeight(plant, goal))} m`);
-    tell('torque', `${fixed(world.torque)} N·m`);
+    const both = (quantityOf: typeof energy, si: number, name: string) => {
+      const { factor, unit } = shownIn(quantityOf(plant, restIn(null)), si, name);
+      const text = (s: State) => `${fixed(factor * quantityOf(plant, s))} ${unit}`;
+      return `${text(state)}${of} ${text(goal)}`;
+    };
+    tell('energy', both(energy, units.torque, 'J'));
+    tell('height', both(tipHeight, units.size, 'm'));
+    const torque = torqueIn(world);
+    tell('torque', `${fixed(torque.factor * world.torque)} ${torque.unit}`);
     const name = decision ? NAMES[decision.kind] : 'Policy';
     write(element('q-name'), name);
     element('q').dataset.name = name;
-    tell('q', policy && decision ? decisionText(decision, policy.rewardScale) : '');
+    tell('q', policy && decision ? decisionText(decision, policy.rewardScale, torque) : '');
     write(element('reward'), rewardText(rewardTerms(plant, state, world.torque, target)));
   }
+}
+
+/// The unit of the world's torques.
+export function torqueIn({ plant, units }: World): Shown {
+  return shownIn(plant.torque_limit, units.torque, 'N·m');
 }
 
 /// Writes a number next to its chart, and into the chart's name for screen readers.
@@ -129,7 +143,8 @@ function rewardText(terms: number[]): string {
 }
 
 /// The decision's torque, and its value in units of the reward.
-export function decisionText(decision: Decision, rewardScale: number): string {
+export function decisionText(decision: Decision, rewardScale: number, shown: Shown): string {
+  const inUnit = (torque: number) => fixed(shown.factor * torque);
   const reward = (x: number) => withMinus((x / rewardScale).toFixed(1));
   const value = Number.isNaN(decision.value) ? '' : reward(decision.value);
   switch (decision.kind) {
@@ -141,10 +156,11 @@ export function decisionText(decision: Decision, rewardScale: number): string {
     }
     case 'gaussian': {
       const { torque, low, high } = decision;
-      return `${fixed(torque)} N·m, σ ${fixed((high - low) / 2)}${value && `, V ${value}`}`;
+      const spread = inUnit((high - low) / 2);
+      return `${inUnit(torque)} ${shown.unit}, σ ${spread}${value && `, V ${value}`}`;
     }
     case 'computed':
-      return `${fixed(decision.torque)} N·m`;
+      return `${inUnit(decision.torque)} ${shown.unit}`;
     case 'categorical': {
       const percent = (100 * decision.probabilities[decision.action]!).toFixed(0);
       return `likeliest ${percent}%${value && `, V ${value}`}`;
@@ -164,9 +180,9 @@ export function situation(world: World): { state: string; text: string; said: st
 }
 
 /// The state of a pendulum with another goal than upright.
-function onItsWay({ uprightFor: held, state }: World): { state: string; text: string } {
+function onItsWay({ uprightFor: held, state, units }: World): { state: string; text: string } {
   if (held !== null && held >= BALANCED)
-    return { state: 'balanced', text: `in the pose for ${held.toFixed(1)} s` };
+    return { state: 'balanced', text: `in the pose for ${(units.time * held).toFixed(1)} s` };
   if (held !== null && isSlow(state)) return { state: 'upright', text: 'in the pose' };
   return { state: 'swinging', text: 'on its way' };
 }
@@ -174,7 +190,10 @@ function onItsWay({ uprightFor: held, state }: World): { state: string; text: st
 function upOrNot(world: World): { state: string; text: string } {
   const upright = inverted(world.state) ? world.uprightFor : null;
   if (upright !== null && upright >= BALANCED)
-    return { state: 'balanced', text: `balanced for ${upright.toFixed(1)} s` };
+    return {
+      state: 'balanced',
+      text: `balanced for ${(world.units.time * upright).toFixed(1)} s`,
+    };
   if (upright !== null && isSlow(world.state)) return { state: 'upright', text: 'upright' };
   if (world.agentOn)
     return {

@@ -3,10 +3,12 @@ import { AXES, endsOf, isEven, rangeOfValues, ValueMap, valueAt } from '../map';
 import type { Axis, Quantity, Variable } from '../map';
 import type { State } from '../pendulum';
 import type { Policy } from '../policy';
+import { Units } from '../size';
 import { signed } from '../view/charts';
 import { MapChart } from '../view/map';
 import { Scale } from '../view/scale';
 import type { World } from '../world';
+import { torqueIn } from './dashboard';
 import { element } from './dom';
 
 const CELLS = 72; // along a side
@@ -33,6 +35,7 @@ export class MapPanel {
     y: element<HTMLSelectElement>('map-y'),
   };
   private policy: Policy | null = null; // of the map
+  private units = new Units(1); // of the pendulum
   private key = ''; // state and plant of the complete map
   private seen = false; // on the screen
   /// Whether the map still has to be computed for the present state.
@@ -80,7 +83,7 @@ export class MapPanel {
     const within = (share: number) => Math.min(Math.max(share, 0), 1);
     this.mark = [within(x + dx / MARKS), within(y + dy / MARKS)];
     const { map } = this;
-    const place = [map.x, map.y].map((axis, i) => placeText(axis, valueAt(axis, this.mark![i]!)));
+    const place = [map.x, map.y].map((axis, i) => placeText(axis, valueAt(axis, this.mark![i]!), this.units));
     element('map-mark').textContent = place.join(', ');
     return true;
   }
@@ -108,13 +111,14 @@ export class MapPanel {
     if (!this.seen || !world.policy) return;
     if (this.policy !== world.policy) this.clear();
     this.policy = world.policy;
+    this.units = world.units;
     if (!world.policy.isQuick) {
       element('map-value').textContent = 'not for one that plans';
       return;
     }
     if (++this.frame % FRAMES !== 0) return this.work(world);
     const way = history.from(world.time - WAY).map(({ state }) => state);
-    this.chart.draw(this.map, ...this.range, way, world.state, this.mark);
+    this.chart.draw(this.map, ...this.range, way, world.state, this.mark, world.units);
   }
 
   /// Computes, unless the map belongs to the present state already.
@@ -140,16 +144,21 @@ export class MapPanel {
     const [low, high] = (this.range = this.rangeOf(map.cells!, world));
     const known = Number.isFinite(high - low);
     element('map-value').textContent = known ? this.said(world) : 'not estimated';
-    const unit = map.quantity === 'torque' ? 1 : (world.policy?.rewardScale ?? 1);
+    const torque = torqueIn(world);
+    const factor = map.quantity === 'torque' ? torque.factor : 1 / (world.policy?.rewardScale ?? 1);
     for (const scale of this.scales)
-      scale.show(map.quantity, known ? [low / unit, high / unit] : null);
+      scale.show(map.quantity, known ? [low * factor, high * factor] : null, torque.unit);
   }
 
   /// The range of the colours, in words.
-  private said({ plant, policy }: World): string {
+  private said(world: World): string {
+    const { plant, policy } = world;
     const { cells, quantity } = this.map;
-    if (quantity === 'torque')
-      return `${signed(-plant.torque_limit)} to ${signed(plant.torque_limit)} N·m`;
+    if (quantity === 'torque') {
+      const { factor, unit } = torqueIn(world);
+      const limit = factor * plant.torque_limit;
+      return `${signed(-limit)} to ${signed(limit)} ${unit}`;
+    }
     const [low, high] = endsOf(cells!).map((end) => signed(end / (policy?.rewardScale ?? 1)));
     return isEven(cells!, policy?.rewardScale ?? 1)
       ? `${low} to ${high}: nearly even`
@@ -190,9 +199,9 @@ export class MapPanel {
 }
 
 /// A place on an axis, in words.
-function placeText({ name, turns }: Axis, value: number): string {
+function placeText({ name, turns }: Axis, value: number, units: Units): string {
   const link = name === 'q1' || name === 'w1' ? 'upper' : 'lower';
   return turns
     ? `${link} angle ${signed(Math.round((180 / Math.PI) * value))}°`
-    : `${link} velocity ${signed(value)} rad/s`;
+    : `${link} velocity ${signed(units.velocity * value)} rad/s`;
 }

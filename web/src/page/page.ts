@@ -166,7 +166,7 @@ export class Page {
     };
     listenToKeys(actions, () => router.keys);
     restoreOnScroll();
-    button('save', () => save(stage.history));
+    button('save', () => save(stage.history, world.units));
     nameSendButtons();
     listenToFilms(
       () => (world.twin ? [scene, twin.scene] : [scene]),

@@ -1,4 +1,5 @@
 import type { Range, State } from '../pendulum';
+import { quantity } from '../quantity';
 import type { World } from '../world';
 import { element } from './dom';
 import { Slider } from './sliders';
@@ -18,6 +19,7 @@ const ANGLE = {
   format: (value: number) => `${Math.round(value)}°`,
 } as const;
 
+/// At size 1; shown in SI units.
 const velocity = (fastest: number) => {
   const limits: Range = [-150, 150];
   return { unit: 'rad/s', min: -fastest, max: fastest, limits, step: 0.1, initial: 0 };
@@ -34,8 +36,9 @@ export class Pose {
 
   constructor(world: World, onPose: () => void) {
     this.world = world;
+    const format = (w: number) => quantity(w, world.units.velocity, 'rad/s');
     const slider = (name: Variable, label: string) => {
-      const spec = name === 'q1' || name === 'q2' ? ANGLE : VELOCITY[name];
+      const spec = name === 'q1' || name === 'q2' ? ANGLE : { ...VELOCITY[name], format };
       const made = new Slider({ ...spec, name: `pose-${name}`, label }, (value) => {
         const scale = spec === ANGLE ? Math.PI / 180 : 1;
         world.reset({ ...world.state, [name]: scale * value });

@@ -1,8 +1,9 @@
 import { DISTURBANCE_LIMITS } from '../disturbance';
 import type { Disturbance } from '../disturbance';
-import { CONTROL_PERIOD, NOMINAL, PLANT_LIMITS, plantProblem } from '../pendulum';
+import { NOMINAL, PLANT_LIMITS, plantProblem } from '../pendulum';
 import type { Parameter, Plant, Range } from '../pendulum';
 import type { Policy } from '../policy';
+import { quantity, sizeText } from '../quantity';
 import type { World } from '../world';
 import { element } from './dom';
 import { warn } from './message';
@@ -37,8 +38,15 @@ const PLANT: readonly Row[] = [
 ];
 
 const milliseconds = (seconds: number) => `${Number((1000 * seconds).toPrecision(4))} ms`;
+const digits = (value: number) => Number(value.toPrecision(4));
 
-const DISTURBANCE: readonly (SliderSpec & { name: keyof Disturbance })[] = [
+/// `format` gets the world, whose size gives the units.
+type DisturbanceRow = Omit<SliderSpec, 'format'> & {
+  name: keyof Disturbance;
+  format: (value: number, world: World) => string;
+};
+
+const DISTURBANCE: readonly DisturbanceRow[] = [
   {
     name: 'sensor_noise',
     label: 'Sensor noise (σ)',
@@ -48,6 +56,10 @@ const DISTURBANCE: readonly (SliderSpec & { name: keyof Disturbance })[] = [
     limits: DISTURBANCE_LIMITS.sensor_noise,
     step: 0.005,
     initial: 0,
+    format: (sigma, { units: { velocity } }) =>
+      velocity === 1
+        ? `${digits(sigma)} rad, rad/s`
+        : `${digits(sigma)} rad, ${digits(sigma * velocity)} rad/s`,
   },
   {
     name: 'delay',
@@ -58,7 +70,7 @@ const DISTURBANCE: readonly (SliderSpec & { name: keyof Disturbance })[] = [
     limits: DISTURBANCE_LIMITS.delay,
     step: 1,
     initial: 0,
-    format: (periods) => `${1000 * CONTROL_PERIOD * periods} ms`,
+    format: (periods, { period, units }) => milliseconds(units.time * period * periods),
   },
   {
     name: 'encoder_counts',
@@ -80,7 +92,7 @@ const DISTURBANCE: readonly (SliderSpec & { name: keyof Disturbance })[] = [
     limits: DISTURBANCE_LIMITS.velocity_window,
     step: 0.001,
     initial: 0,
-    format: (seconds) => (seconds === 0 ? 'exact' : milliseconds(seconds)),
+    format: (seconds, { units }) => (seconds === 0 ? 'exact' : milliseconds(units.time * seconds)),
   },
   {
     name: 'velocity_filter',
@@ -91,7 +103,7 @@ const DISTURBANCE: readonly (SliderSpec & { name: keyof Disturbance })[] = [
     limits: DISTURBANCE_LIMITS.velocity_filter,
     step: 0.001,
     initial: 0,
-    format: milliseconds,
+    format: (seconds, { units }) => milliseconds(units.time * seconds),
   },
   {
     name: 'sensor_latency',
@@ -102,7 +114,7 @@ const DISTURBANCE: readonly (SliderSpec & { name: keyof Disturbance })[] = [
     limits: DISTURBANCE_LIMITS.sensor_latency,
     step: 0.001,
     initial: 0,
-    format: milliseconds,
+    format: (seconds, { units }) => milliseconds(units.time * seconds),
   },
 ];
 
@@ -113,42 +125,74 @@ export const RANGES: ReadonlyMap<string, Range> = new Map<string, Range>([
   ['speed', [0.1, 2]],
 ]);
 
-/// The sliders of the plant, its sensors and its motor.
+/// The slider of the size moves along its logarithm, over sizes with two digits.
+const SIZE = { step: 0.05, min: -1.3, max: 1 } as const; // log10 of the size
+const sizeAt = (place: number) => Number((10 ** place).toPrecision(2));
+function placeOf(size: number): number {
+  const onStep = SIZE.step * Math.round(Math.log10(size) / SIZE.step);
+  return sizeAt(onStep) === size ? onStep : Math.log10(size);
+}
+
+/// The sliders of the plant, its sensors and its motor. Their values are in units of size 1; their
+/// texts are in SI units.
 export class Settings {
+  private readonly size: Slider;
   private readonly plant = new Map<Parameter, Slider>();
   private readonly world: World;
   private readonly disturbance = new Map<keyof Disturbance, Slider>();
+  private strongest = 0; // N·m, of the agent
 
   constructor(world: World, onChange: () => void) {
     this.world = world;
+    this.size = this.makeSize(onChange);
     for (const row of PLANT) {
-      const spec = { ...row, limits: PLANT_LIMITS[row.name], initial: NOMINAL[row.name] };
+      const { name, unit } = row;
+      const format = (value: number) => quantity(value, world.units.of(name), unit);
+      const spec = { ...row, format, limits: PLANT_LIMITS[name], initial: NOMINAL[name] };
       const slider = new Slider(spec, (value) => {
-        const plant = { ...world.plant, [row.name]: value };
+        const plant = { ...world.plant, [name]: value };
         const problem = plantProblem(plant);
         if (problem) {
-          slider.value = world.plant[row.name];
+          slider.value = world.plant[name];
           return warn(`${problem}.`);
         }
         world.plant = plant;
         onChange();
       });
-      this.plant.set(row.name, slider);
+      this.plant.set(name, slider);
       element('plant-sliders').append(slider.element);
     }
-    for (const spec of DISTURBANCE) {
+    for (const row of DISTURBANCE) {
+      const spec = { ...row, format: (value: number) => row.format(value, world) };
       const slider = new Slider(spec, (value) => {
-        world.disturbance[spec.name] = value;
+        world.disturbance[row.name] = value;
         onChange();
       });
-      this.disturbance.set(spec.name, slider);
+      this.disturbance.set(row.name, slider);
       element('disturbance-sliders').append(slider.element);
     }
   }
 
+  private makeSize(onChange: () => void): Slider {
+    const { world } = this;
+    const [low, high] = PLANT_LIMITS.size;
+    const limits = [Math.log10(low), Math.log10(high)] as const;
+    const format = (place: number) => sizeText(sizeAt(place));
+    const spec = { ...SIZE, name: 'size', label: 'Size', unit: 'm', limits, initial: 0, format };
+    const slider = new Slider(spec, (place) => {
+      world.plant = { ...world.plant, size: sizeAt(place) };
+      this.show();
+      onChange();
+    });
+    element('plant-sliders').append(slider.element);
+    return slider;
+  }
+
   setPlant(plant: Plant): void {
     this.world.plant = plant;
+    this.size.value = placeOf(plant.size);
     for (const [name, slider] of this.plant) slider.value = plant[name];
+    this.show();
   }
 
   setDisturbance(disturbance: Disturbance): void {
@@ -159,9 +203,18 @@ export class Settings {
   /// Marks on each slider the policy's range in training.
   mark(policy: Policy): void {
     for (const [name, slider] of this.plant) slider.trained = policy.trainedRange(name);
-    const { strongest } = policy.controller;
-    this.plant.get('torque_limit')!.label = `Limit of the motor (agent: ±${strongest})`;
+    this.strongest = policy.controller.strongest;
     element('trained-on').textContent = policy.isLearned ? 'range of the training' : 'design plant';
     for (const [name, slider] of this.disturbance) slider.trained = policy.trainedDisturbance(name);
+    this.show();
+  }
+
+  /// Shows all values in the units of the size.
+  private show(): void {
+    const { torque } = this.world.units;
+    const strongest =
+      torque === 1 ? String(digits(this.strongest)) : quantity(this.strongest, torque, 'N·m');
+    this.plant.get('torque_limit')!.label = `Limit of the motor (agent: ±${strongest})`;
+    for (const slider of [...this.plant.values(), ...this.disturbance.values()]) slider.show();
   }
 }

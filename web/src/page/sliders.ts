@@ -126,7 +126,8 @@ export class Slider {
     this.mark.style.setProperty('--share-to', share(marked[1]));
   }
 
-  private show(): void {
+  /// Shows its value; call after a change of what its text depends on.
+  show(): void {
     const { unit, format = (value) => `${Number(value.toPrecision(4))} ${unit}` } = this.spec;
     const text = withMinus(format(this.value));
     this.output.textContent = text;

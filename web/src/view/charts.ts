@@ -1,8 +1,10 @@
+import type { Units } from '../size';
 import { withMinus } from '../text';
 import type { Moment } from '../world';
 import { Canvas } from './canvas';
 
-export const SECONDS_SHOWN = 10;
+export const SECONDS_SHOWN = 10; // at size 1
+const MOST_POINTS = 1000; // of a line
 const TIMES = 16; // pixels, for the ends of the axis of time
 
 interface StripScale {
@@ -26,9 +28,10 @@ export class Strip {
     this.value = value;
   }
 
-  draw(moments: readonly Moment[], now: number, scale: StripScale): void {
+  draw(all: readonly Moment[], now: number, units: Units, scale: StripScale): void {
     const { canvas, value } = this;
     if (!canvas.shown) return;
+    const moments = thinned(all);
     canvas.clear();
     const left = 34;
     const y = (v: number) =>
@@ -58,7 +61,7 @@ export class Strip {
       );
       canvas.context.setLineDash([]);
     }
-    canvas.text(`${SECONDS_SHOWN} s ago`, left, canvas.height - 6);
+    canvas.text(`${signed(units.time * SECONDS_SHOWN)} s ago`, left, canvas.height - 6);
     canvas.text('now', canvas.width - 2, canvas.height - 6, 'right');
     if (scale.unit) canvas.text(scale.unit, left - 5, y(scale.high / 2), 'right');
     const values = moments.map((m) => Math.min(Math.max(value(m), scale.low), scale.high));
@@ -76,6 +79,12 @@ export class Strip {
   }
 }
 
+/// Every n-th moment, so that at most MOST_POINTS are left.
+function thinned(moments: readonly Moment[]): readonly Moment[] {
+  const n = Math.ceil(moments.length / MOST_POINTS);
+  return n <= 1 ? moments : moments.filter((_, i) => (moments.length - 1 - i) % n === 0);
+}
+
 /// The mean of each value and the values before it, `count` in all.
 function runningMean(values: number[], count: number): number[] {
   let sum = 0;
@@ -89,13 +98,14 @@ function runningMean(values: number[], count: number): number[] {
 export class PhasePortrait {
   readonly canvas = new Canvas('phase');
 
-  draw(moments: readonly Moment[]): void {
+  draw(all: readonly Moment[], units: Units): void {
     const { canvas } = this;
     if (!canvas.shown) return;
+    const moments = thinned(all);
     canvas.clear();
     const [cx, cy] = [canvas.width / 2, canvas.height / 2];
     const x = (angle: number) => cx + (angle / Math.PI) * (cx - 4);
-    const fastest = 12; // rad/s
+    const fastest = 12; // rad/s, at size 1
     const y = (w: number) => cy - (Math.min(Math.max(w, -fastest), fastest) / fastest) * (cy - 10);
     canvas.line(
       [
@@ -116,7 +126,7 @@ export class PhasePortrait {
     canvas.text('angle −180°', 2, canvas.height - 6);
     canvas.text('upright', cx, canvas.height - 6, 'center');
     canvas.text('180°', canvas.width - 2, canvas.height - 6, 'right');
-    canvas.text(`velocity ${fastest} rad/s`, cx + 4, 8);
+    canvas.text(`velocity ${signed(units.velocity * fastest)} rad/s`, cx + 4, 8);
     for (const [color, angleOf, rateOf] of LINKS) {
       let piece: [number, number][] = [];
       for (const { state } of moments) {

@@ -5,6 +5,7 @@ import type {
   GaussianDecision,
   QDecision,
 } from '../decision';
+import type { Shown } from '../quantity';
 import { Canvas } from './canvas';
 import { signed } from './charts';
 
@@ -22,10 +23,12 @@ export class DecisionChart {
   readonly canvas = new Canvas('q');
   private below = 0; // pixels for the name of the axis
   private room = 1; // points of reward, from the best Q-value to the bottom of the chart
+  private shown: Shown = { factor: 1, unit: 'N·m' }; // of torques
   private bars: number[] = []; // heights as drawn, in units of their values
 
-  /// A Q-value is `rewardScale` times a reward.
-  draw(decision: Decision | null, rewardScale: number): void {
+  /// A Q-value is `rewardScale` times a reward. `shown`: unit of the torques.
+  draw(decision: Decision | null, rewardScale: number, shown: Shown): void {
+    this.shown = shown;
     this.canvas.clear();
     if (!decision) return;
     this.nameAxis();
@@ -43,7 +46,12 @@ export class DecisionChart {
   private nameAxis(): void {
     const { canvas } = this;
     this.below = canvas.height < ROOMY ? 0 : NAME;
-    if (this.below > 0) canvas.text('torque, N·m', canvas.width / 2, canvas.height - 6, 'center');
+    const name = `torque, ${this.shown.unit}`;
+    if (this.below > 0) canvas.text(name, canvas.width / 2, canvas.height - 6, 'center');
+  }
+
+  private inUnit(torque: number): string {
+    return signed(this.shown.factor * torque);
   }
 
   private get bottom(): number {
@@ -114,7 +122,7 @@ export class DecisionChart {
       canvas.context.lineWidth = 1;
       canvas.context.strokeRect(...place);
       if (i % labelled === 0) {
-        canvas.text(signed(torque), left + (i + 0.5) * width, bottom + 9, 'center');
+        canvas.text(this.inUnit(torque), left + (i + 0.5) * width, bottom + 9, 'center');
       }
     });
   }
@@ -161,7 +169,7 @@ export class DecisionChart {
       1,
     );
     for (const torque of [-limit, 0, limit]) {
-      canvas.text(signed(torque), x(torque), bottom + 9, 'center');
+      canvas.text(this.inUnit(torque), x(torque), bottom + 9, 'center');
     }
     return { left, right, x };
   }

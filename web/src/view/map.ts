@@ -1,6 +1,7 @@
 import { shareOf } from '../map';
 import type { Axis, Quantity, ValueMap } from '../map';
 import type { State } from '../pendulum';
+import type { Units } from '../size';
 import { Canvas } from './canvas';
 import { signed } from './charts';
 
@@ -61,11 +62,12 @@ export class MapChart {
     way: readonly State[],
     now: State,
     mark: readonly [number, number] | null,
+    units: Units,
   ): void {
     const { canvas } = this;
     canvas.clear();
     const { width, height } = canvas;
-    this.nameAxes(map.x, map.y);
+    this.nameAxes(map.x, map.y, units);
     if (!map.cells) return canvas.text('computing …', width / 2, height / 2, 'center');
     if (Number.isNaN(low)) return canvas.text('not estimated', width / 2, height / 2, 'center');
     // An even map gets the middle colour.
@@ -158,14 +160,14 @@ export class MapChart {
     canvas.context.restore();
   }
 
-  private nameAxes(x: Axis, y: Axis): void {
+  private nameAxes(x: Axis, y: Axis, units: Units): void {
     const { canvas } = this;
     const { width, height } = canvas;
-    const [from, middle, to] = this.fitting(ends(x), width - LEFT);
+    const [from, middle, to] = this.fitting(ends(x, units), width - LEFT);
     canvas.text(from, LEFT, height - 8);
     canvas.text(middle, (LEFT + width) / 2, height - 8, 'center');
     canvas.text(to, width, height - 8, 'right');
-    const [low, centre, high] = this.fitting(ends(y), height - BOTTOM);
+    const [low, centre, high] = this.fitting(ends(y, units), height - BOTTOM);
     canvas.context.save();
     canvas.context.rotate(-Math.PI / 2);
     canvas.text(low, BOTTOM - height, 7);
@@ -199,9 +201,10 @@ function briefly(name: string): string {
 }
 
 /// The names of an axis.
-function ends({ name, reach }: Axis): Names {
+function ends({ name, reach }: Axis, units: Units): Names {
   if (name === 'q1') return ['hanging', 'upper link upright', 'hanging'];
   if (name === 'q2') return ['folded', 'lower link straight', 'folded'];
   const link = name === 'w1' ? 'upper' : 'lower';
-  return [signed(-reach), `velocity of the ${link} joint`, `${reach} rad/s`];
+  const fastest = units.velocity * reach;
+  return [signed(-fastest), `velocity of the ${link} joint`, `${signed(fastest)} rad/s`];
 }

@@ -2,7 +2,6 @@ import type { Quantity } from '../map';
 import { signed } from './charts';
 import { COLORS } from './map';
 
-const NAMES = { value: 'expected reward', torque: 'torque, N·m' } as const;
 
 /// The legend of the map: a bar of its colours between two numbers.
 export class Scale {
@@ -15,8 +14,8 @@ export class Scale {
     this.show('value', null);
   }
 
-  /// `ends`: smallest and largest value; null: unknown, and the legend is hidden.
-  show(quantity: Quantity, ends: readonly [number, number] | null): void {
+  /// `ends`: smallest and largest value; null: unknown, and the legend is hidden. `unit`: of torques.
+  show(quantity: Quantity, ends: readonly [number, number] | null, unit = 'N·m'): void {
     const [name, low, bar, high] = this.parts as [
       HTMLElement,
       HTMLElement,
@@ -25,7 +24,7 @@ export class Scale {
     ];
     const colors = COLORS[quantity].map((color) => `rgb(${color.join(' ')})`);
     bar.style.background = `linear-gradient(to right, ${colors.join()})`;
-    name.textContent = NAMES[quantity];
+    name.textContent = quantity === 'value' ? 'expected reward' : `torque, ${unit}`;
     [low.textContent, high.textContent] = (ends ?? [0, 0]).map(signed) as [string, string];
     this.place.style.visibility = ends ? '' : 'hidden';
   }

@@ -1,0 +1,63 @@
+import { withMinus } from './text';
+
+/// Physical quantities as text, with SI prefixes where a pendulum is far from the usual size.
+
+const PREFIXES: ReadonlyMap<number, string> = new Map([
+  [-9, 'n'],
+  [-6, 'µ'],
+  [-3, 'm'],
+  [0, ''],
+  [3, 'k'],
+  [6, 'M'],
+]);
+const PLAIN = [0.01, 1000] as const; // numbers that need no prefix
+
+/// A unit, and the factor of numbers that are shown in it.
+export interface Shown {
+  factor: number;
+  unit: string;
+}
+
+/// The unit for numbers up to `largest`. Both in `si` SI units; `unit` is the SI unit's name.
+export function shownIn(largest: number, si: number, unit: string): Shown {
+  const size = Math.abs(largest * si);
+  if (size === 0 || (size >= PLAIN[0] && size < PLAIN[1])) return { factor: si, unit };
+  const isMass = unit === 'kg'; // its name has a prefix
+  const power = 3 * Math.floor(Math.log10(size * (isMass ? 1000 : 1)) / 3 + 1e-9);
+  const within = Math.min(Math.max(power, -9), 6);
+  if (isMass && within >= 6) return { factor: si / 1000, unit: 't' };
+  const factor = (si * (isMass ? 1000 : 1)) / 10 ** within;
+  return { factor, unit: `${PREFIXES.get(within)!}${isMass ? 'g' : unit}` };
+}
+
+/// A value with its unit, to four digits.
+export function quantity(value: number, si: number, unit: string): string {
+  const shown = shownIn(value, si, unit);
+  return withMinus(`${Number((value * shown.factor).toPrecision(4))} ${shown.unit}`);
+}
+
+/// Things about as long as the whole pendulum (m).
+const LANDMARKS = [
+  [0.05, 'a matchbox'],
+  [0.1, 'a mug'],
+  [0.2, 'a pencil'],
+  [0.3, 'a ruler'],
+  [0.5, 'a chair'],
+  [0.75, 'a table'],
+  [1, 'a guitar'],
+  [2, 'a door'],
+  [3, 'a room'],
+  [5, 'a giraffe'],
+  [10, 'a house'],
+] as const;
+
+/// A length (m) in figures, and the thing whose length is nearest.
+export function sizeText(length: number): string {
+  const apart = (other: number) => Math.abs(Math.log(length / other));
+  const [, thing] = LANDMARKS.reduce((a, b) => (apart(b[0]) < apart(a[0]) ? b : a));
+  const figures =
+    length < 1
+      ? `${Number((100 * length).toPrecision(2))} cm`
+      : `${Number(length.toPrecision(2))} m`;
+  return `${figures}, ${thing}`;
+}
