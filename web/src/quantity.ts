@@ -10,7 +10,7 @@ const PREFIXES: ReadonlyMap<number, string> = new Map([
   [3, 'k'],
   [6, 'M'],
 ]);
-const PLAIN = [0.01, 1000] as const; // numbers that need no prefix
+const LARGEST = 1000; // number without a prefix
 
 /// A unit, and the factor of numbers that are shown in it.
 export interface Shown {
@@ -18,10 +18,11 @@ export interface Shown {
   unit: string;
 }
 
-/// The unit for numbers up to `largest`. Both in `si` SI units; `unit` is the SI unit's name.
-export function shownIn(largest: number, si: number, unit: string): Shown {
+/// The unit for numbers up to `largest`, in `si` SI units. `unit`: the SI unit's name, which needs no
+/// prefix from `least` on.
+export function shownIn(largest: number, si: number, unit: string, least = 0.1): Shown {
   const size = Math.abs(largest * si);
-  if (size === 0 || (size >= PLAIN[0] && size < PLAIN[1])) return { factor: si, unit };
+  if (size === 0 || (size >= least && size < LARGEST)) return { factor: si, unit };
   const isMass = unit === 'kg'; // its name has a prefix
   const power = 3 * Math.floor(Math.log10(size * (isMass ? 1000 : 1)) / 3 + 1e-9);
   const within = Math.min(Math.max(power, -9), 6);
@@ -32,8 +33,14 @@ export function shownIn(largest: number, si: number, unit: string): Shown {
 
 /// A value with its unit, to four digits.
 export function quantity(value: number, si: number, unit: string): string {
-  const shown = shownIn(value, si, unit);
+  const shown = shownIn(value, si, unit, 0.01);
   return withMinus(`${Number((value * shown.factor).toPrecision(4))} ${shown.unit}`);
+}
+
+/// `value` rounded down to 1, 2 or 5 times a power of ten.
+export function roundBelow(value: number): number {
+  const power = 10 ** Math.floor(Math.log10(value));
+  return power * (value >= 5 * power ? 5 : value >= 2 * power ? 2 : 1);
 }
 
 /// Things about as long as the whole pendulum (m).

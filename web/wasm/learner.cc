@@ -59,6 +59,7 @@ json Learner::Report() {
               {"bestStep", s.best_step},
               {"bestSuccess", s.best_success_rate},
               {"terms", training_.env().spec().term_names},
+              {"period", training_.env().spec().step_seconds},
               {"warnings", warnings_},
               {"episodes", std::move(episodes_)},
               {"evaluations", std::move(evaluations_)}};
@@ -91,7 +92,10 @@ std::vector<std::byte> Learner::Poses() const {
 
 void Learner::OnEpisode(const TrainState& state, const FinishedEpisode& episode) {
   episodes_.push_back(
-      {{"step", state.steps}, {"return", episode.reward_sum}, {"terms", episode.terms}});
+      {{"step", state.steps},
+       {"length", episode.length},
+       {"return", episode.reward_sum},
+       {"terms", episode.terms}});
 }
 
 void Learner::OnEvaluation(const TrainState& state, const Evaluation& evaluation) {

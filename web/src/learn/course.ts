@@ -9,8 +9,7 @@ export interface Checkpoint {
   after?: { trials: number; updates: number; seconds: number };
 }
 
-/// Control steps of a trial (4 s), and of a test (10 s).
-export const TRIAL_STEPS = 4 / CONTROL_PERIOD;
+/// Control steps of a shipped agent's test (10 s).
 const TEST_STEPS = 10 / CONTROL_PERIOD;
 
 export interface Episode {

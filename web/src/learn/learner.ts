@@ -11,8 +11,10 @@ export interface Report {
   bestStep: number; // of the best evaluation; 0: none
   bestSuccess: number;
   terms: string[]; // names of the reward's terms (K)
+  period: number; // between two control steps, s
   warnings: string[]; // about the settings
-  episodes: { step: number; return: number; terms: number[] }[]; // with the sum of each term
+  /// With the number of its steps and the sum of each term.
+  episodes: { step: number; length: number; return: number; terms: number[] }[];
   evaluations: Test[];
 }
 

@@ -1,7 +1,6 @@
 import { coreModule } from '../core';
 import type { LearnSettings, Report, Test, UpdateExample } from './learner';
 import type { Recipe } from './recipe';
-import { TRIAL_STEPS } from './course';
 import type { Checkpoint, Course, Episode } from './course';
 import type { News, Order } from './worker';
 
@@ -133,8 +132,8 @@ export class Session implements Course {
     if (example && isNew) this.examples.push({ ...example, update: report.updates });
     this.last = report;
     this.policy = policy;
-    for (const { step, return: sum } of report.episodes)
-      this.episodes.push({ step, reward: sum / TRIAL_STEPS });
+    for (const { step, length, return: sum } of report.episodes)
+      this.episodes.push({ step, reward: sum / length });
     this.sumTerms(report);
     this.evaluations.push(...report.evaluations);
     if (best) this.best = best;
@@ -154,8 +153,8 @@ export class Session implements Course {
     if (this.terms.length === 0) this.terms = terms.map((name) => ({ name, means: [] }));
     if (episodes.length === 0) return;
     this.terms.forEach(({ means }, k) => {
-      const sum = episodes.reduce((all, episode) => all + episode.terms[k]!, 0);
-      means.push(sum / episodes.length / TRIAL_STEPS);
+      const sum = episodes.reduce((all, { terms, length }) => all + terms[k]! / length, 0);
+      means.push(sum / episodes.length);
     });
   }
 

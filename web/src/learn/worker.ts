@@ -9,9 +9,8 @@ const REPORT_INTERVAL = 200; // ms between snapshots of the policy
 const PART = 4; // steps of all environments between looks at the clock
 const MARK = 48; // steps between the snapshots that every training with this seed makes
 // A slow start: the first trials run in real time, those after them twice as fast, and so on.
-const TRIAL = 200; // steps
+const TRIAL = 4; // s
 const DOUBLINGS = 6;
-const STEPS_PER_SECOND = 50;
 const TICK = 16; // ms
 
 export type Order =
@@ -49,10 +48,12 @@ let bestStep = 0;
 let ran = 0; // steps of all environments
 let slow = false;
 let due = 0; // steps in a slow start
+let period = 1; // s between two steps
 let tickedAt = 0; // ms, time of the last tick in a slow start
 
 function sendReport(isMark: boolean): void {
   const report = learner!.report();
+  period = report.period;
   const policy = learner!.policy();
   // The best policy, only when it is a new one.
   const best = report.bestStep > bestStep ? learner!.best() : null;
@@ -83,8 +84,8 @@ function advance(count: number): boolean {
 
 /// Makes the steps that are due in a slow start. False once the training is finished.
 function advanceSlowly(now: number): boolean {
-  const doublings = Math.floor(ran / TRIAL);
-  due += (Math.min(now - tickedAt, 2 * TICK) / 1000) * STEPS_PER_SECOND * 2 ** doublings;
+  const doublings = Math.floor((ran * period) / TRIAL);
+  due += (Math.min(now - tickedAt, 2 * TICK) / 1000 / period) * 2 ** doublings;
   tickedAt = now;
   let more = true;
   for (; more && due >= 1; --due) more = advance(1);

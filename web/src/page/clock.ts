@@ -3,11 +3,13 @@ import type { World } from '../world';
 
 const LONGEST_FRAME = 0.1; // s: a tab that comes back does not jump
 const ROUNDING = 1e-9; // s
-const BUSIEST = 200; // ms of computing in a frame, after which the pendulum lags behind real time
+const BUSIEST = 50; // ms of computing in a frame, after which the pendulum lags behind real time
 
 /// Advances the world in real time, slower or faster. A small pendulum is fast, and a large one slow.
 export class Clock {
   speed = 1;
+  /// Real time (s) that was left out because the agent takes longer than its control period.
+  lag = 0;
   /// Whether the next step can be made, or a controller in another thread still computes.
   ready: () => boolean = () => true;
   private readonly world: World;
@@ -26,7 +28,10 @@ export class Clock {
     let sound = true;
     for (let step = world.timestep; this.due >= step - ROUNDING; step = world.timestep) {
       if (!this.ready()) break;
-      if (performance.now() > end) this.due = step; // the last step of this frame
+      if (performance.now() > end) {
+        this.lag += (this.due - step) / speed;
+        this.due = step; // the last step of this frame
+      }
       sound = world.advance() && sound;
       this.due = Math.max(0, this.due - step);
     }

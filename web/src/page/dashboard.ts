@@ -119,7 +119,7 @@ export class Dashboard {
 
 /// The unit of the world's torques.
 export function torqueIn({ plant, units }: World): Shown {
-  return shownIn(plant.torque_limit, units.torque, 'N·m');
+  return shownIn(plant.torque_limit, units.torque, 'N·m', 1);
 }
 
 /// Writes a number next to its chart, and into the chart's name for screen readers.

@@ -1,5 +1,5 @@
 import type { History } from '../history';
-import { GOALS } from '../pendulum';
+import { GOALS, PLANT_LIMITS } from '../pendulum';
 import type { GoalName, State } from '../pendulum';
 import { quoted } from '../text';
 import { AgentPanel } from './agent_panel';
@@ -102,7 +102,9 @@ export class Laboratory {
   /// later request replaced it.
   async openFile(file: File, learned = false): Promise<boolean> {
     if (!(await this.agentPanel.open(file, learned))) return false;
-    this.settings.setPlant(this.agent!.policy.plant);
+    const { plant, trainedSize } = this.agent!.policy;
+    const [low, high] = PLANT_LIMITS.size;
+    this.settings.setPlant({ ...plant, size: Math.min(Math.max(trainedSize, low), high) });
     this.stage.changed();
     return true;
   }
@@ -169,7 +171,13 @@ export class Laboratory {
   /// Takes a file that the visitor opened or dropped, and says so.
   private async bring(file: File): Promise<void> {
     if (!(await this.openFile(file))) return;
-    note(`${quoted(this.agents.ownName!)} is the agent now. It stays in this browser.`);
+    const { trainedSize } = this.agent!.policy;
+    const length = Number(trainedSize.toPrecision(2));
+    const carried =
+      trainedSize === 1
+        ? ''
+        : ` It learned on a pendulum ${length} m long. Here it moves the page’s pendulum at that size.`;
+    note(`${quoted(this.agents.ownName!)} is the agent now. It stays in this browser.${carried}`);
   }
 
   private async forgetOwn(): Promise<void> {

@@ -83,7 +83,9 @@ export class MapPanel {
     const within = (share: number) => Math.min(Math.max(share, 0), 1);
     this.mark = [within(x + dx / MARKS), within(y + dy / MARKS)];
     const { map } = this;
-    const place = [map.x, map.y].map((axis, i) => placeText(axis, valueAt(axis, this.mark![i]!), this.units));
+    const place = [map.x, map.y].map((axis, i) =>
+      placeText(axis, valueAt(axis, this.mark![i]!), this.units),
+    );
     element('map-mark').textContent = place.join(', ');
     return true;
   }

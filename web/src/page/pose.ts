@@ -1,5 +1,6 @@
 import type { Range, State } from '../pendulum';
 import { quantity } from '../quantity';
+import type { Units } from '../size';
 import type { World } from '../world';
 import { element } from './dom';
 import { Slider } from './sliders';
@@ -32,10 +33,12 @@ type Variable = keyof State;
 /// Sliders for the state of a paused pendulum, for visitors who cannot drag it or click on the map.
 export class Pose {
   private readonly world: World;
+  private units: Units; // of the shown values
   private readonly sliders: readonly (readonly [Variable, Slider])[];
 
   constructor(world: World, onPose: () => void) {
     this.world = world;
+    this.units = world.units;
     const format = (w: number) => quantity(w, world.units.velocity, 'rad/s');
     const slider = (name: Variable, label: string) => {
       const spec = name === 'q1' || name === 'q2' ? ANGLE : { ...VELOCITY[name], format };
@@ -64,6 +67,10 @@ export class Pose {
 
   /// Shows a state. (180° and -180° are the same angle, at both ends of a slider.)
   follow(state: State): void {
+    if (this.units !== this.world.units) {
+      this.units = this.world.units;
+      for (const [, slider] of this.sliders) slider.show();
+    }
     for (const [name, slider] of this.sliders) {
       if (name === 'q1' || name === 'q2') {
         const apart = degrees(state[name] - (Math.PI / 180) * slider.value);

@@ -8,12 +8,13 @@ import { Badge } from './badge';
 import { Clock } from './clock';
 import { button, element } from './dom';
 import { Hand } from './hand';
-import { warn } from './message';
+import { note, warn } from './message';
 import { prefersStill } from './motion';
 import { Pose } from './pose';
 import { Twin } from './twin';
 
 const REMEMBERED = 60; // s of history
+const LAG = 2; // s left out until the visitor is told
 
 /// Callbacks of the stage.
 export interface StageListener {
@@ -86,9 +87,14 @@ export class PendulumStage {
 
   /// Advances the pendulum by `seconds` of real time, unless it is paused.
   advance(seconds: number): void {
-    if (this.paused || this.clock.advance(seconds)) return;
-    this.restarted();
-    warn('The pendulum spun too fast to be computed; it hangs again.');
+    if (this.paused) return;
+    if (!this.clock.advance(seconds)) {
+      this.restarted();
+      warn('The pendulum spun too fast to be computed; it hangs again.');
+    }
+    if (this.clock.lag < LAG) return;
+    this.clock.lag = -Infinity; // once
+    note('This pendulum is faster than the agent can be computed here, so you see it slowed down.');
   }
 
   setPaused(paused: boolean): void {

@@ -5,6 +5,7 @@ import type {
   GaussianDecision,
   QDecision,
 } from '../decision';
+import { roundBelow } from '../quantity';
 import type { Shown } from '../quantity';
 import { Canvas } from './canvas';
 import { signed } from './charts';
@@ -169,7 +170,11 @@ export class DecisionChart {
       1,
     );
     for (const torque of [-limit, 0, limit]) {
-      canvas.text(this.inUnit(torque), x(torque), bottom + 9, 'center');
+      const name = this.inUnit(torque);
+      canvas.context.font = canvas.font('12px'); // as of Canvas.text()
+      const half = canvas.context.measureText(name).width / 2;
+      const middle = Math.min(Math.max(x(torque), half), canvas.width - half);
+      canvas.text(name, middle, bottom + 9, 'center');
     }
     return { left, right, x };
   }
@@ -199,10 +204,4 @@ function isFinite(decision: Decision): boolean {
   if (decision.kind === 'categorical') return decision.probabilities.every(Number.isFinite);
   if (decision.kind === 'computed') return Number.isFinite(decision.torque);
   return Number.isFinite(decision.low + decision.high);
-}
-
-/// `value` rounded down to 1, 2 or 5 times a power of ten.
-function roundBelow(value: number): number {
-  const power = 10 ** Math.floor(Math.log10(value));
-  return power * (value >= 5 * power ? 5 : value >= 2 * power ? 2 : 1);
 }

@@ -2,7 +2,6 @@ import type { Quantity } from '../map';
 import { signed } from './charts';
 import { COLORS } from './map';
 
-
 /// The legend of the map: a bar of its colours between two numbers.
 export class Scale {
   private readonly place: HTMLElement;

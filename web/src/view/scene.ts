@@ -16,6 +16,7 @@ import {
   drawRod,
   drawTrace,
 } from './machine';
+import { drawSize } from './size';
 import { Sparks } from './sparks';
 
 export const TRAIL_SECONDS = 20; // of the world's time: a whole swing-up
@@ -45,7 +46,7 @@ export class Scene {
   /// Pixels per metre, and the place of the pivot on the canvas [px].
   private scale = 1;
   private pivot = { x: 0, y: 0 };
-  private box = { left: 0, right: 0, top: 0 }; // box around the pendulum on the canvas [px]
+  private box = { left: 0, right: 0, top: 0, bottom: 0 }; // box around the pendulum on the canvas [px]
 
   constructor(id: string) {
     this.canvas = new Canvas(id);
@@ -79,6 +80,7 @@ export class Scene {
       left: box.left - canvas.left,
       right: box.right - canvas.left,
       top: box.top - canvas.top,
+      bottom: box.bottom - canvas.top,
     };
   }
 
@@ -93,6 +95,9 @@ export class Scene {
     drawReach(canvas, this.at(PIVOT), this.scale * reach);
     this.drawGoal(world);
     drawRing(canvas, this.at(PIVOT), this.scale * reach, this.ring);
+    if (plant.size !== 1) {
+      drawSize(canvas, this.box, this.scale / plant.size, plant.size > 1);
+    }
     this.drawGhosts(plant);
     const tipOf = (s: State) => this.at(pointOn(plant, s, 2, plant.length2).position);
     const points = [...trail.map((moment) => tipOf(moment.state)), tipOf(state)];

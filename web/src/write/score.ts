@@ -10,8 +10,7 @@ import type { Asker } from './asker';
 /// links are upright throughout the last 10 s; its return is the sum of the rewards of the first
 /// 10 s.
 
-const STEPS = 20 / CONTROL_PERIOD;
-const HALF = STEPS / 2;
+const SECONDS = 20; // of an episode
 const SLICE = 25; // control steps between two reports
 
 /// Starts near hanging, drawn as those of the program: q1, q2 (rad), w1, w2 (rad/s).
@@ -49,17 +48,19 @@ export async function scoreOf(
   onProgress: (share: number) => void,
 ): Promise<Score> {
   const episodes = STARTS.map(([q1, q2, w1, w2]) => begin(controller, { q1, q2, w1, w2 }));
-  for (let k = 0; k < STEPS; ++k) {
+  const period = 'controller' in controller ? controller.period : CONTROL_PERIOD;
+  const steps = Math.round(SECONDS / period);
+  for (let k = 0; k < steps; ++k) {
     if (!('controller' in controller)) {
       const rows = new Float64Array(episodes.flatMap(({ world }) => [...rowOf(world)]));
       const torques = await controller.ask(rows);
       episodes.forEach(({ world }, i) => (world.byHand = torques[i]!));
     }
-    for (const episode of episodes) advance(episode, k);
-    if (k % SLICE === 0) onProgress(k / STEPS);
+    for (const episode of episodes) advance(episode, k, steps / 2);
+    if (k % SLICE === 0) onProgress(k / steps);
   }
   const ups = episodes.flatMap(({ upSince }) =>
-    upSince !== null && upSince <= HALF ? [upSince * CONTROL_PERIOD] : [],
+    upSince !== null && upSince <= steps / 2 ? [upSince * period] : [],
   );
   return {
     balanced: ups.length,
@@ -78,12 +79,12 @@ function begin(controller: Policy | Asker, start: State): Episode {
   return { world, sum: 0, upSince: null };
 }
 
-/// Control step `k` of an episode.
-function advance(episode: Episode, k: number): void {
+/// Control step `k` of an episode whose rewards count up to step `half`.
+function advance(episode: Episode, k: number, half: number): void {
   const { world } = episode;
   world.advanceToControl();
   const { plant, state, torque } = world;
-  if (k < HALF) for (const term of rewardTerms(plant, state, torque)) episode.sum += term;
+  if (k < half) for (const term of rewardTerms(plant, state, torque)) episode.sum += term;
   if (!inverted(state)) episode.upSince = null;
   else episode.upSince ??= k + 1;
 }
