@@ -27,6 +27,8 @@ export class Policy {
   readonly trainedSize: number;
   /// Time between two decisions, s.
   readonly period: number;
+  /// The same at its trained size.
+  readonly trainedPeriod: number;
   /// Factor of the rewards, and so of its values, during training.
   readonly rewardScale: number;
   /// Its file, or the name of a controller.
@@ -48,6 +50,7 @@ export class Policy {
       this.trainedSize = controller.about.trained_size;
       this.trainedTime = controller.about.trained_time;
       this.period = controller.about.period;
+      this.trainedPeriod = this.period * this.trainedTime;
       this.metadata = new Map(Object.entries(controller.about.metadata));
     } catch (error) {
       if (!(error instanceof BadInput)) throw error;
@@ -108,7 +111,7 @@ export class Policy {
 
   /// The unit of an error of sensors or motor in the training's configuration.
   private disturbanceUnit(name: keyof Disturbance): number {
-    if (name === 'delay') return this.period * this.trainedTime;
+    if (name === 'delay') return this.trainedPeriod;
     return name === 'sensor_noise' || name === 'encoder_counts' ? 1 : this.trainedTime;
   }
 

@@ -3,6 +3,7 @@ import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { expect, test } from 'vitest';
+import { withMetadata } from '../tests/file';
 import { readPolicy, simulate } from '../tests/program';
 import { OTHER } from '../tests/plant';
 import { core } from './core';
@@ -119,7 +120,7 @@ test.each([
     world.plant = { ...NOMINAL, size };
     world.policy = policyOf(id, learned);
     world.agentOn = true;
-    const all = moments(world, 15);
+    const all = moments(world, 10);
     return { all, heldFor: world.uprightFor };
   });
   for (const { all, heldFor } of ran) {
@@ -144,6 +145,18 @@ test('a size that changes during the motion keeps the pendulum upright', () => {
   expect(world.uprightFor).toBeCloseTo(held + 5, 6);
 });
 
+/// Runs `use` with a file of these bytes.
+function withFile(bytes: ArrayBuffer, use: (file: string) => void): void {
+  const folder = mkdtempSync(join(tmpdir(), 'upswing-'));
+  try {
+    const file = join(folder, 'policy.safetensors');
+    writeFileSync(file, new Uint8Array(bytes));
+    use(file);
+  } finally {
+    rmSync(folder, { recursive: true });
+  }
+}
+
 /// Runs `use` with a policy that a few steps of training give, and with the name of its file.
 function withTrained(
   settings: Record<string, string>,
@@ -152,14 +165,7 @@ function withTrained(
   const learner = new Learner(core(), 'fast', 1, settings);
   const bytes = learner.policy();
   learner.close();
-  const folder = mkdtempSync(join(tmpdir(), 'upswing-'));
-  try {
-    const file = join(folder, 'policy.safetensors');
-    writeFileSync(file, new Uint8Array(bytes));
-    use(new Policy(bytes), file);
-  } finally {
-    rmSync(folder, { recursive: true });
-  }
+  withFile(bytes, (file) => use(new Policy(bytes), file));
 }
 
 test.each(['0.005', '0.01', '0.04', '0.1', '0.001'])(
@@ -184,6 +190,34 @@ test.each(['0.005', '0.01', '0.04', '0.1', '0.001'])(
         expect(t).toBeCloseTo(at, 9);
         expect(apart(state, { q1, q2, w1, w2 })).toBeLessThan(1e-9);
         expect(torque).toBe(applied);
+      });
+    });
+  },
+);
+
+test.each(['d3qn', 'd3qn-adaptive', 'd3qn-randomized'])(
+  '%s at 0.005 s, with a late motor and encoders, acts as in `upswing simulate`',
+  (id) => {
+    const bytes = withMetadata(readPolicy(id), 'control_period', '0.005');
+    withFile(bytes, (file) => {
+      const world = new World(new ClosedForm());
+      world.plant = { ...NOMINAL, mass2: 1.1 };
+      world.policy = new Policy(bytes);
+      world.agentOn = true;
+      Object.assign(world.disturbance, {
+        ...{ delay: 2, sensor_latency: 0.005, encoder_counts: 4096 },
+        ...{ velocity_window: 0.01, velocity_filter: 0.004 },
+      });
+      world.reset({ ...HANGING, q1: 1 });
+      const page = moments(world, 2);
+      const flags = ['--seconds', '2', '--start=1,0,0,0', '--physics', 'closed-form'];
+      flags.push('--set', 'mass2=1.1', '--delay', '0.01', '--sensor-latency', '0.005');
+      flags.push('--encoder-counts', '4096', '--velocity-window', '0.01');
+      const program = simulate(file, ...flags, '--velocity-filter', '0.004');
+      expect(page.length).toBe(400);
+      page.forEach(({ state }, k) => {
+        const [, q1, q2, w1, w2] = program[k] as [number, number, number, number, number];
+        expect(apart(state, { q1, q2, w1, w2 })).toBeLessThan(1e-6);
       });
     });
   },

@@ -157,9 +157,9 @@ function describe(policy: Policy): string {
     policy.memory > 0 ? `, remembers ${policy.memory} steps` : '',
     policy.identifies ? ', identifies its pendulum' : '',
     policy.seeksAnyPose ? ', observes the pose to reach' : '',
-    policy.period === CONTROL_PERIOD
+    Math.abs(policy.trainedPeriod - CONTROL_PERIOD) < 1e-9
       ? ''
-      : `, decides every ${Number((1000 * policy.period).toPrecision(3))} ms`,
+      : `, decides every ${Number((1000 * policy.trainedPeriod).toPrecision(3))} ms`,
     randomized ? ', trained on random pendulums' : '',
     policy.trainedSize === 1
       ? ''

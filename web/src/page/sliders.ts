@@ -126,7 +126,7 @@ export class Slider {
     this.mark.style.setProperty('--share-to', share(marked[1]));
   }
 
-  /// Shows its value; call after a change of what its text depends on.
+  /// Shows its value. Call after the units of its text changed.
   show(): void {
     const { unit, format = (value) => `${Number(value.toPrecision(4))} ${unit}` } = this.spec;
     const text = withMinus(format(this.value));

@@ -1,7 +1,7 @@
 import { quantity, roundBelow } from '../quantity';
 import type { Canvas } from './canvas';
 
-/// What shows how large the pendulum is: a bar with its length, and a thing that everybody knows.
+/// Signs of how large the pendulum is: a bar with its length, and a matchbox or a person.
 
 const MARGIN = 14; // px to the edges of the box
 const LONGEST = 0.26; // length of the bar, in widths of the box
