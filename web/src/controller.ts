@@ -2,7 +2,6 @@ import { core } from './core';
 import type { Core } from './core';
 import type { Controller, Decision, Memory } from './decision';
 import { Fields } from './fields';
-import type { Parameter } from './pendulum';
 
 /// Description of a policy file by the core (web/wasm/api.cc).
 interface About {
@@ -10,15 +9,15 @@ interface About {
   text: string;
   inputs: number;
   columns: number; // of a decision's row
-  torques: number[]; // N·m
-  limit: number; // N·m; for policies without a table of torques
+  torques: number[]; // N·m, of its own plant
+  limit: number; // the same; for policies without a table of torques
   memory: number; // steps
   identifies: boolean;
   any_pose: boolean; // whether it observes its goal
-  period: number; // between two decisions, s
-  plant: Readonly<Record<Parameter, number>>; // in which it counts
-  trained_size: number; // length of its training plant, in lengths of the built-in plant
-  trained_time: number; // the same as a ratio of natural times
+  period: number; // between two decisions, s of its own plant
+  /// Units of the built-in plant in those of its own plant; 1 unless that has another size.
+  time_unit: number;
+  torque_unit: number;
   selfCheckError: number;
   metadata: Record<string, string>;
 }
@@ -49,7 +48,8 @@ class CoreMemory implements Memory {
   }
 }
 
-/// A policy in the core, with its buffers.
+/// A policy in the core, with its buffers. Its own plant may have another size; its torques here are
+/// those of the built-in plant.
 export class CoreController implements Controller {
   readonly about: Readonly<About>;
   /// Frees the memory now. Otherwise the garbage collector frees it later.
@@ -68,7 +68,7 @@ export class CoreController implements Controller {
         : [new Uint8Array(from), policy_open];
     this.policy = core().withBytes(bytes, (at, size) => core().expect(open(at, size)));
     this.about = JSON.parse(core().text) as About;
-    this.torques = Float64Array.from(this.about.torques);
+    this.torques = Float64Array.from(this.about.torques, (torque) => this.unit * torque);
     this.observation = core().reserve(4 * this.inputs);
     this.row = core().reserve(8 * this.about.columns);
     const close = closer(core(), this.policy, this.observation, this.row);
@@ -79,6 +79,9 @@ export class CoreController implements Controller {
     };
   }
 
+  private get unit(): number {
+    return this.about.torque_unit;
+  }
   get inputs(): number {
     return this.about.inputs;
   }
@@ -89,7 +92,7 @@ export class CoreController implements Controller {
     return this.about.selfCheckError;
   }
   get strongest(): number {
-    return this.torques.length > 0 ? Math.max(...this.torques) : this.about.limit;
+    return this.torques.length > 0 ? Math.max(...this.torques) : this.unit * this.about.limit;
   }
 
   get text(): string {
@@ -113,19 +116,21 @@ export class CoreController implements Controller {
 
   /// The decision in a row: DECISION_FIELDS, then the numbers of its kind (web/wasm/api.cc).
   private decision(row: Float64Array): Decision {
-    const { kind, limit } = this.about;
-    const { torques } = this;
-    const { torque, value } = DECISION_FIELDS.object(row);
+    const { kind } = this.about;
+    const { torques, unit } = this;
+    const limit = unit * this.about.limit;
+    const { torque: chosen, value } = DECISION_FIELDS.object(row);
+    const [torque, action] = [unit * chosen, this.about.torques.indexOf(chosen)];
     const rest = row.subarray(DECISION_FIELDS.size);
     switch (kind) {
       case 'q':
-        return { kind, torques, q: rest, action: torques.indexOf(torque), torque, value };
+        return { kind, torques, q: rest, action, torque, value };
       case 'categorical':
         return {
           kind,
           torques,
           probabilities: rest,
-          action: torques.indexOf(torque),
+          action,
           torque,
           value,
         };
@@ -137,7 +142,8 @@ export class CoreController implements Controller {
           core().numbers(pieces + 2, (at) =>
             core().exports.gaussian_probabilities(this.policy, mean, log_std, at, pieces + 2),
           );
-        return { kind, limit, low, high, probabilities, torque, value };
+        const [from, to] = [unit * low, unit * high];
+        return { kind, limit, low: from, high: to, probabilities, torque, value };
       }
     }
   }

@@ -2,7 +2,7 @@ import { CoreController } from './controller';
 import type { Controller, Decision, Memory } from './decision';
 import { DISTURBANCE_LIMITS } from './disturbance';
 import type { Disturbance } from './disturbance';
-import { PLANT_LIMITS, plantIn } from './pendulum';
+import { NOMINAL, PLANT_LIMITS, plantIn } from './pendulum';
 import type { Parameter, Plant, Range } from './pendulum';
 import { Neurons } from './neurons';
 import { BadInput } from './bad_input';
@@ -23,7 +23,8 @@ export class Policy {
   /// The training plant, or a controller's design plant. Of a policy for another size, the built-in
   /// plant, to which it was carried over.
   readonly plant: Plant;
-  /// Length of its training plant if that has another size, in lengths of the built-in plant; else 1.
+  readonly isCarried: boolean;
+  /// Length (m) of the plant of another size, which is the size of a plant like the built-in one.
   readonly trainedSize: number;
   /// Time between two decisions, s.
   readonly period: number;
@@ -33,7 +34,7 @@ export class Policy {
   readonly rewardScale: number;
   /// Its file, or the name of a controller.
   readonly source: ArrayBuffer | string;
-  private readonly trainedTime: number; // the same as a ratio of natural times
+  private readonly timeUnit: number; // of the built-in plant, in those of the training plant
   private _neurons: Neurons | null | undefined; // undefined: not read yet
 
   /// Reads and checks a file, as the program does, or designs the controller with this name. Throws
@@ -46,17 +47,20 @@ export class Policy {
       this.memory = controller.about.memory;
       this.identifies = controller.about.identifies;
       this.seeksAnyPose = controller.about.any_pose;
-      this.plant = plantIn(controller.about.plant);
-      this.trainedSize = controller.about.trained_size;
-      this.trainedTime = controller.about.trained_time;
-      this.period = controller.about.period;
-      this.trainedPeriod = this.period * this.trainedTime;
+      const { period, time_unit, torque_unit } = controller.about;
+      this.isCarried = time_unit !== 1 || torque_unit !== 1;
+      this.timeUnit = time_unit;
+      this.trainedPeriod = period;
+      this.period = period * time_unit;
       this.metadata = new Map(Object.entries(controller.about.metadata));
     } catch (error) {
       if (!(error instanceof BadInput)) throw error;
       // The page names the source itself.
       throw new BadInput(printable(error.message.replace(/^the file: /, ''), LONGEST_REASON));
     }
+    const trained = JSON.parse(this.about('plant')) as Plant;
+    this.plant = this.isCarried ? NOMINAL : plantIn(trained);
+    this.trainedSize = this.isCarried ? trained.length1 + trained.length2 : 1;
     this.rewardScale = Number(this.metadata.get('reward_scale') ?? 1);
   }
 
@@ -112,7 +116,7 @@ export class Policy {
   /// The unit of an error of sensors or motor in the training's configuration.
   private disturbanceUnit(name: keyof Disturbance): number {
     if (name === 'delay') return this.trainedPeriod;
-    return name === 'sensor_noise' || name === 'encoder_counts' ? 1 : this.trainedTime;
+    return name === 'sensor_noise' || name === 'encoder_counts' ? 1 : 1 / this.timeUnit;
   }
 
   /// A positive number of the training's configuration; 0 if it is missing.

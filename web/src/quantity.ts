@@ -2,14 +2,7 @@ import { withMinus } from './text';
 
 /// Physical quantities as text, with SI prefixes where a pendulum is far from the usual size.
 
-const PREFIXES: ReadonlyMap<number, string> = new Map([
-  [-9, 'n'],
-  [-6, 'µ'],
-  [-3, 'm'],
-  [0, ''],
-  [3, 'k'],
-  [6, 'M'],
-]);
+const PREFIXES = ['n', 'µ', 'm', '', 'k', 'M'] as const; // from 10⁻⁹ on
 const LARGEST = 1000; // number without a prefix
 
 /// A unit, and the factor of numbers that are shown in it.
@@ -23,12 +16,11 @@ export interface Shown {
 export function shownIn(largest: number, si: number, unit: string, least = 0.1): Shown {
   const size = Math.abs(largest * si);
   if (size === 0 || (size >= least && size < LARGEST)) return { factor: si, unit };
-  const isMass = unit === 'kg'; // its name has a prefix
-  const power = 3 * Math.floor(Math.log10(size * (isMass ? 1000 : 1)) / 3 + 1e-9);
-  const within = Math.min(Math.max(power, -9), 6);
-  if (isMass && within >= 6) return { factor: si / 1000, unit: 't' };
-  const factor = (si * (isMass ? 1000 : 1)) / 10 ** within;
-  return { factor, unit: `${PREFIXES.get(within)!}${isMass ? 'g' : unit}` };
+  if (unit === 'kg' && size >= LARGEST) return { factor: si / 1000, unit: 't' };
+  if (unit === 'kg') return shownIn(largest, 1000 * si, 'g');
+  const step = Math.floor(Math.log10(size) / 3 + 1e-9);
+  const within = Math.min(Math.max(step, -3), 2);
+  return { factor: si / 1000 ** within, unit: PREFIXES[within + 3] + unit };
 }
 
 /// A value with its unit, to four digits.
@@ -48,12 +40,10 @@ const LANDMARKS = [
   [0.05, 'a matchbox'],
   [0.1, 'a mug'],
   [0.2, 'a pencil'],
-  [0.3, 'a ruler'],
-  [0.5, 'a chair'],
+  [0.4, 'a chair'],
   [0.75, 'a table'],
   [1, 'a guitar'],
   [2, 'a door'],
-  [3, 'a room'],
   [5, 'a giraffe'],
   [10, 'a house'],
 ] as const;

@@ -27,8 +27,8 @@ const apart = (a: State, b: State) => Math.max(...NAMES.map((name) => Math.abs(a
 
 test('units are those of length and mass × size³ under the same gravity', () => {
   const units = new Units(4);
-  expect([units.time, units.velocity, units.mass, units.force]).toEqual([2, 0.5, 64, 64]);
-  expect([units.torque, units.damping, units.inertia]).toEqual([256, 512, 1024]);
+  expect([units.time, units.velocity, units.of('mass1'), units.force]).toEqual([2, 0.5, 64, 64]);
+  expect([units.torque, units.of('damping2'), units.inertia]).toEqual([256, 512, 1024]);
   expect(inSi(NOMINAL)).toEqual(NOMINAL);
   const { size, ...real } = inSi({ ...OTHER, size: 0.25 });
   for (const name of Object.keys(real) as (keyof typeof real)[]) {

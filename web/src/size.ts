@@ -5,72 +5,45 @@ import type { Parameter, Plant } from './pendulum';
 /// (src/pendulum/scale.h). The page's world, its policies and its controllers count in units of size
 /// 1, whose links have 0.5 m. Only the physics (Simulator) and what the page shows are in SI units.
 
+/// The power of the size with which a parameter grows.
+const POWERS: Readonly<Record<Parameter, number>> = {
+  mass1: 3,
+  mass2: 3,
+  length1: 1,
+  length2: 1,
+  damping1: 4.5,
+  damping2: 4.5,
+  gravity: 0,
+  torque_limit: 4,
+};
+
 /// Units of the pendulum of a size, as multiples of those of size 1.
 export class Units {
   readonly size: number;
   readonly time: number;
+  readonly velocity: number; // of angles
+  readonly force: number;
+  readonly torque: number; // and energy
+  readonly inertia: number;
 
   constructor(size: number) {
     this.size = size;
     this.time = Math.sqrt(size);
-  }
-
-  get mass(): number {
-    return this.size ** 3;
-  }
-  /// Of velocities of angles.
-  get velocity(): number {
-    return 1 / this.time;
-  }
-  get force(): number {
-    return this.size ** 3;
-  }
-  /// The same for energies.
-  get torque(): number {
-    return this.size ** 4;
-  }
-  get damping(): number {
-    return this.torque * this.time;
-  }
-  /// Of moments of inertia.
-  get inertia(): number {
-    return this.size ** 5;
+    this.velocity = 1 / this.time;
+    this.force = size ** 3;
+    this.torque = size ** 4;
+    this.inertia = size ** 5;
   }
 
   /// The unit of a parameter of the plant.
   of(parameter: Parameter): number {
-    switch (parameter) {
-      case 'mass1':
-      case 'mass2':
-        return this.mass;
-      case 'length1':
-      case 'length2':
-        return this.size;
-      case 'damping1':
-      case 'damping2':
-        return this.damping;
-      case 'torque_limit':
-        return this.torque;
-      case 'gravity':
-        return 1;
-    }
+    return this.size ** POWERS[parameter];
   }
 }
 
 /// The plant in SI units.
 export function inSi(plant: Readonly<Plant>): Plant {
-  const { size } = plant;
-  if (size === 1) return { ...plant };
-  const units = new Units(size);
-  return {
-    size,
-    mass1: units.mass * plant.mass1,
-    mass2: units.mass * plant.mass2,
-    length1: size * plant.length1,
-    length2: size * plant.length2,
-    damping1: units.damping * plant.damping1,
-    damping2: units.damping * plant.damping2,
-    gravity: plant.gravity,
-    torque_limit: units.torque * plant.torque_limit,
-  };
+  const real = { ...plant };
+  for (const name of Object.keys(POWERS) as Parameter[]) real[name] *= plant.size ** POWERS[name];
+  return real;
 }

@@ -47,7 +47,7 @@ test('one slider sets the size, and all values are true ones', async ({ stage: p
   await page.keyboard.press('Home');
   await expect(page.locator(text('size'))).toHaveText('5 cm, a matchbox');
   await expect(size).toHaveAttribute('aria-valuetext', '5 cm, a matchbox');
-  await expect(page.locator(text('mass2'))).toHaveText('150 mg');
+  await expect(page.locator(text('mass2'))).toHaveText('0.15 g');
   await expect(page.locator(text('length1'))).toHaveText('0.025 m');
   await expect(page.locator(text('torque_limit'))).toHaveText('31.25 µN·m');
   await expect(page.locator('#torque_limit')).toHaveAccessibleName(/agent: ±31\.25 µN·m/);
@@ -160,10 +160,12 @@ test('a policy for another size or period is taken, and the page says so', async
     expect((await run(page, 0.1)).length).toBe(20);
     await bring('small.safetensors', small);
     await expect(page.locator('#message')).toContainText(
-      'It learned on a pendulum 0.25 m long. Here it moves the page’s pendulum at that size.',
+      'It learned on another pendulum, 0.25 m long. It moves the page’s at that size.',
     );
-    await expect(page.locator(text('size'))).toHaveText('25 cm, a ruler');
-    await expect(page.locator('#agent-text')).toContainText('trained on a pendulum of 0.25 m');
+    await expect(page.locator(text('size'))).toHaveText('25 cm, a pencil');
+    await expect(page.locator('#agent-text')).toContainText(
+      'trained on another pendulum of 0.25 m',
+    );
     await expect(page).toHaveURL(/size=0\.25/);
     await bring('slow.safetensors', withMetadata(readPolicy('fast'), 'control_period', '0.2'));
     await expect(page.locator('#message')).toContainText('expected 0.001 to 0.1 s, got 0.2');

@@ -52,9 +52,9 @@ int SetText(const json& value) {
 
 /// A policy and its memory.
 struct Controller {
-  explicit Controller(LoadedPolicy policy, double trained_at = 1)
+  explicit Controller(LoadedPolicy policy)
       : loaded(std::move(policy)),
-        trained_size(trained_at),
+        units(CarryOver(loaded.plant, Plant())),
         learned(dynamic_cast<const NetworkPolicy*>(&*loaded.policy)),
         memory(loaded.policy->Start(1)) {}
 
@@ -71,6 +71,8 @@ struct Controller {
   }
   /// Whether it is computed from the equations of motion, and may plan.
   bool computed() const { return learned == nullptr; }
+  /// Whether its plant has another size than the built-in one.
+  bool carried() const { return units != Scale(); }
   double self_check_error() const { return computed() ? 0 : learned->self_check().error; }
   double limit() const {
     if (computed()) return loaded.plant.torque_limit;
@@ -78,7 +80,7 @@ struct Controller {
   }
 
   LoadedPolicy loaded;
-  double trained_size = 1;                 // length of its training plant over the built-in one's
+  Scale units;                             // of the built-in plant in those of its own plant
   const NetworkPolicy* learned;            // null: computed controller
   std::unique_ptr<Policy::Memory> memory;  // of policies without plans
 };
@@ -101,7 +103,6 @@ const char* KindOf(const Controller& c) {
 
 json About(const Controller& c, const std::map<std::string, std::string>& metadata) {
   const Policy& policy = *c.loaded.policy;
-  const auto plant = PlantValues(c.loaded.plant);
   return {{"kind", KindOf(c)},
           {"text", policy.description()},
           {"inputs", policy.obs_size()},
@@ -112,9 +113,8 @@ json About(const Controller& c, const std::map<std::string, std::string>& metada
           {"identifies", c.loaded.identifies()},
           {"any_pose", c.loaded.seeks_any_pose()},
           {"period", c.loaded.control_period()},
-          {"plant", std::map<std::string, double>(plant.begin(), plant.end())},
-          {"trained_size", c.trained_size},
-          {"trained_time", 1 / c.loaded.carried_over.time},
+          {"time_unit", c.units.time},
+          {"torque_unit", c.units.torque},
           {"selfCheckError", c.self_check_error()},
           {"metadata", metadata}};
 }
@@ -179,9 +179,10 @@ UPSWING_EXPORT(bytes_size) size_t BytesSize() { return bytes.size(); }
 
 namespace {
 
-/// Throws BadInput for a policy of a plant that the page does not have. `other_size`: the page's own
-/// plant replaces its training plant.
-void ExpectPageCanShow(const Plant& plant, bool other_size) {
+/// Throws BadInput for a policy of a plant that the page does not have. In the place of a plant of
+/// another size, the page shows its own at that size.
+void ExpectPageCanShow(const Controller& controller) {
+  const Plant& plant = controller.loaded.plant;
   if (plant.actuated_joint != 1) {
     throw BadInput("expected a policy for a motor at joint 1, as in the page, got one for joint 2");
   }
@@ -190,29 +191,25 @@ void ExpectPageCanShow(const Plant& plant, bool other_size) {
         "expected a policy for a plant without rotors and dry friction, as in the page, got one "
         "with them");
   }
-  if (!other_size && (plant.has_own_links() || plant.armature != kArmature)) {
+  if (controller.carried()) return;
+  if (plant.has_own_links() || plant.armature != kArmature) {
     throw BadInput(
         "expected a policy for links that are solid capsules and the usual armature, as in the "
         "page, got others");
   }
+  CheckTimestep(plant, "plant", kPhysicsTimestep);
 }
-
-double Reach(const Plant& plant) { return plant.length1 + plant.length2; }
 
 }  // namespace
 
-/// Reads and checks a policy file. Leaves its description as JSON. A policy for another size is
-/// carried over to the built-in plant, because the page computes in that plant's units.
+/// Reads and checks a policy file. Leaves its description as JSON. The page carries a policy for
+/// another size over to the built-in plant, in whose units it computes (as ForOtherSize).
 UPSWING_EXPORT(policy_open) Controller* PolicyOpen(const std::byte* file, size_t size) {
   return Guarded([&]() -> Controller* {
     const Tensors tensors = ReadSafetensors({file, file + size}, "the file");
-    const LoadedPolicy read = ReadPolicy(tensors);
-    ExpectPendulum(read);
-    const std::optional<LoadedPolicy> carried = ForOtherSize(read, Plant());
-    ExpectPageCanShow(read.plant, carried.has_value());
-    const double trained_size = carried ? Reach(read.plant) / Reach(Plant()) : 1;
-    auto controller = std::make_unique<Controller>(carried.value_or(read), trained_size);
-    CheckTimestep(controller->loaded.plant, "plant", kPhysicsTimestep);
+    auto controller = std::make_unique<Controller>(ReadPolicy(tensors));
+    ExpectPendulum(controller->loaded);
+    ExpectPageCanShow(*controller);
     SetText(About(*controller, tensors.metadata));
     return controller.release();
   });
@@ -334,9 +331,8 @@ UPSWING_EXPORT(pendulum_check) int PendulumCheck() {
 }
 
 /// Input: PlantFields, at size 1. Number of physics steps in a control period of `period` seconds.
-/// 0 if the plant is too stiff for them.
 UPSWING_EXPORT(physics_steps) int PhysicsSteps(double period) {
-  return Guarded([&] { return PhysicsStepsFor(Input<PlantFields>().plant, period, "plant"); });
+  return PhysicsStepsFor(Input<PlantFields>().plant, period, "plant");
 }
 
 /// One physics step. Input: PushedFields. Output: StateFields after it.

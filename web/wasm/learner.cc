@@ -59,7 +59,6 @@ json Learner::Report() {
               {"bestStep", s.best_step},
               {"bestSuccess", s.best_success_rate},
               {"terms", training_.env().spec().term_names},
-              {"period", training_.env().spec().step_seconds},
               {"warnings", warnings_},
               {"episodes", std::move(episodes_)},
               {"evaluations", std::move(evaluations_)}};

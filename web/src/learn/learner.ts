@@ -11,7 +11,6 @@ export interface Report {
   bestStep: number; // of the best evaluation; 0: none
   bestSuccess: number;
   terms: string[]; // names of the reward's terms (K)
-  period: number; // between two control steps, s
   warnings: string[]; // about the settings
   /// With the number of its steps and the sum of each term.
   episodes: { step: number; length: number; return: number; terms: number[] }[];
@@ -38,6 +37,9 @@ export interface UpdateExample {
   remembered: number; // steps
   capacity: number;
 }
+
+/// Time between two steps by default, s; the setting control_period.
+export const CONTROL_PERIOD = 0.02;
 
 /// Settings by their names in the program, such as { learning_rate: '1e-3' }.
 export type LearnSettings = Readonly<Record<string, string>>;

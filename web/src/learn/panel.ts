@@ -230,7 +230,7 @@ export class LearnPanel {
     const example = session.examples.at(-1);
     const random = example && slow ? `${Math.round(100 * example.epsilon)}% random torques` : '';
     const trial = `Trial ${(episodeCount + (slow ? 1 : 0)).toLocaleString('en')}`;
-    const count = `${trial}, ${random || swinging(session.steps, session.last?.period)}`;
+    const count = `${trial}, ${random || swinging(session.steps, session.settings.control_period)}`;
     return { count, milestone: milestone(session) };
   }
 
@@ -534,8 +534,8 @@ function brief({ state, last, seconds }: Session): string {
 }
 
 /// The simulated time of `steps` control steps, `period` seconds apart.
-function swinging(steps: number, period = CONTROL_PERIOD): string {
-  const minutes = (steps * period) / 60;
+function swinging(steps: number, period: string | number = CONTROL_PERIOD): string {
+  const minutes = (steps * Number(period)) / 60;
   return minutes < 1 ? 'less than a minute of swinging' : `${minutes.toFixed(0)} min of swinging`;
 }
 
@@ -574,6 +574,6 @@ function sentence(session: Session): string {
   const steps = last.steps.toLocaleString('en');
   if (!last.solved) return `Not solved within ${steps} steps.`;
   const own = Object.keys(settings).length > 0 ? ', with your settings' : '';
-  const took = `${swinging(last.steps, last.period)} computed in ${seconds.toFixed(1)} s`;
+  const took = `${swinging(last.steps, settings.control_period)} computed in ${seconds.toFixed(1)} s`;
   return `Solved after ${steps} steps${own}: ${took}.`;
 }

@@ -1,4 +1,5 @@
 import { Core } from '../core';
+import { CONTROL_PERIOD } from './learner';
 import { Learner } from './learner';
 import type { LearnSettings, Report, UpdateExample } from './learner';
 
@@ -48,12 +49,11 @@ let bestStep = 0;
 let ran = 0; // steps of all environments
 let slow = false;
 let due = 0; // steps in a slow start
-let period = 1; // s between two steps
+let period = CONTROL_PERIOD; // s
 let tickedAt = 0; // ms, time of the last tick in a slow start
 
 function sendReport(isMark: boolean): void {
   const report = learner!.report();
-  period = report.period;
   const policy = learner!.policy();
   // The best policy, only when it is a new one.
   const best = report.bestStep > bestStep ? learner!.best() : null;
@@ -142,6 +142,7 @@ onmessage = async ({ data }: MessageEvent<Order>): Promise<void> => {
   }
   const { module, agent, seed, settings } = data;
   slow = data.slow;
+  period = Number(settings.control_period ?? CONTROL_PERIOD);
   try {
     learner = new Learner(await Core.start(module), agent, seed, settings);
     resumedAt = performance.now();

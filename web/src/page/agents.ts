@@ -161,9 +161,9 @@ function describe(policy: Policy): string {
       ? ''
       : `, decides every ${Number((1000 * policy.trainedPeriod).toPrecision(3))} ms`,
     randomized ? ', trained on random pendulums' : '',
-    policy.trainedSize === 1
-      ? ''
-      : `, trained on a pendulum of ${Number(policy.trainedSize.toPrecision(3))} m`,
+    policy.isCarried
+      ? `, trained on another pendulum of ${Number(policy.trainedSize.toPrecision(3))} m`
+      : '',
     '.',
   ].join('');
 }

@@ -171,12 +171,11 @@ export class Laboratory {
   /// Takes a file that the visitor opened or dropped, and says so.
   private async bring(file: File): Promise<void> {
     if (!(await this.openFile(file))) return;
-    const { trainedSize } = this.agent!.policy;
+    const { isCarried, trainedSize } = this.agent!.policy;
     const length = Number(trainedSize.toPrecision(2));
-    const carried =
-      trainedSize === 1
-        ? ''
-        : ` It learned on a pendulum ${length} m long. Here it moves the page’s pendulum at that size.`;
+    const carried = isCarried
+      ? ` It learned on another pendulum, ${length} m long. It moves the page’s at that size.`
+      : '';
     note(`${quoted(this.agents.ownName!)} is the agent now. It stays in this browser.${carried}`);
   }
 

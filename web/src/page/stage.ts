@@ -94,7 +94,7 @@ export class PendulumStage {
     }
     if (this.clock.lag < LAG) return;
     this.clock.lag = -Infinity; // once
-    note('This pendulum is faster than the agent can be computed here, so you see it slowed down.');
+    note('Slowed down, because the agent takes longer than this pendulum gives it.');
   }
 
   setPaused(paused: boolean): void {

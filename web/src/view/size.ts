@@ -45,31 +45,54 @@ function lengthText(length: number): string {
 function drawPerson(canvas: Canvas, x: number, y: number, height: number): void {
   const { context } = canvas;
   const middle = x - 0.14 * height;
-  const at = (across: number, up: number): [number, number] => [
-    middle + across * height,
-    y - up * height,
-  ];
+  const stroke = (points: readonly (readonly [number, number])[], width: number) => {
+    const places = points.map(
+      ([across, up]) => [middle + across * height, y - up * height] as const,
+    );
+    canvas.line(places, 'quiet', width * height);
+  };
   context.lineCap = 'round';
-  const limb = 0.075 * height;
   for (const side of [-1, 1]) {
-    canvas.line([at(side * 0.075, 0.04), at(side * 0.045, 0.48)], 'quiet', limb);
-    canvas.line([at(side * 0.125, 0.42), at(side * 0.1, 0.76)], 'quiet', 0.75 * limb);
+    stroke(
+      [
+        [side * 0.075, 0.04],
+        [side * 0.045, 0.48],
+      ],
+      0.075,
+    ); // a leg
+    stroke(
+      [
+        [side * 0.125, 0.42],
+        [side * 0.1, 0.76],
+      ],
+      0.055,
+    ); // an arm
   }
-  canvas.line([at(0, 0.5), at(0, 0.74)], 'quiet', 0.19 * height);
+  stroke(
+    [
+      [0, 0.5],
+      [0, 0.74],
+    ],
+    0.19,
+  );
+  stroke(
+    [
+      [0, 0.92],
+      [0, 0.92],
+    ],
+    0.16,
+  ); // the head
   context.lineCap = 'butt';
-  canvas.disc(...at(0, 0.92), 0.08 * height, 'quiet');
 }
 
 /// A matchbox, whose lower right corner is at (x, y), with its name if there is room.
 function drawMatchbox(canvas: Canvas, x: number, y: number, width: number, height: number): void {
   const { context } = canvas;
   const [left, top] = [x - width, y - height];
-  context.globalAlpha = 0.6;
   canvas.rectangle(left, top, width, height, 'faint');
   canvas.rectangle(left, top + 0.8 * height, width, 0.2 * height, 'grid'); // the striking surface
   context.strokeStyle = canvas.color('grid');
   context.lineWidth = 1;
   context.strokeRect(left, top, width, height);
-  context.globalAlpha = 1;
   if (width > NAMED) canvas.text('matchbox', left + width / 2, top + 0.4 * height, 'center');
 }
