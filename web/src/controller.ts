@@ -15,7 +15,7 @@ interface About {
   identifies: boolean;
   any_pose: boolean; // whether it observes its goal
   period: number; // between two decisions, s of its own plant
-  /// Units of the built-in plant in those of its own plant; 1 unless that has another size.
+  /// Units of the built-in plant in those of its observations; 1 unless its plant has another size.
   time_unit: number;
   torque_unit: number;
   selfCheckError: number;

@@ -54,7 +54,7 @@ int SetText(const json& value) {
 struct Controller {
   explicit Controller(LoadedPolicy policy)
       : loaded(std::move(policy)),
-        units(CarryOver(loaded.plant, Plant())),
+        units(Scale() / loaded.scale()),
         learned(dynamic_cast<const NetworkPolicy*>(&*loaded.policy)),
         memory(loaded.policy->Start(1)) {}
 
@@ -71,8 +71,6 @@ struct Controller {
   }
   /// Whether it is computed from the equations of motion, and may plan.
   bool computed() const { return learned == nullptr; }
-  /// Whether its plant has another size than the built-in one.
-  bool carried() const { return units != Scale(); }
   double self_check_error() const { return computed() ? 0 : learned->self_check().error; }
   double limit() const {
     if (computed()) return loaded.plant.torque_limit;
@@ -80,7 +78,7 @@ struct Controller {
   }
 
   LoadedPolicy loaded;
-  Scale units;                             // of the built-in plant in those of its own plant
+  Scale units;                             // of the built-in plant, in those of its observations
   const NetworkPolicy* learned;            // null: computed controller
   std::unique_ptr<Policy::Memory> memory;  // of policies without plans
 };
@@ -191,7 +189,7 @@ void ExpectPageCanShow(const Controller& controller) {
         "expected a policy for a plant without rotors and dry friction, as in the page, got one "
         "with them");
   }
-  if (controller.carried()) return;
+  if (controller.units != Scale()) return;
   if (plant.has_own_links() || plant.armature != kArmature) {
     throw BadInput(
         "expected a policy for links that are solid capsules and the usual armature, as in the "

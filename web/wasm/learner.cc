@@ -90,11 +90,10 @@ std::vector<std::byte> Learner::Poses() const {
 }
 
 void Learner::OnEpisode(const TrainState& state, const FinishedEpisode& episode) {
-  episodes_.push_back(
-      {{"step", state.steps},
-       {"length", episode.length},
-       {"return", episode.reward_sum},
-       {"terms", episode.terms}});
+  episodes_.push_back({{"step", state.steps},
+                       {"length", episode.length},
+                       {"return", episode.reward_sum},
+                       {"terms", episode.terms}});
 }
 
 void Learner::OnEvaluation(const TrainState& state, const Evaluation& evaluation) {
