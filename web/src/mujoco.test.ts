@@ -8,6 +8,7 @@ import { HANGING, mjcf, NOMINAL, PARAMETERS } from './pendulum';
 import type { Plant, State } from './pendulum';
 import { Mujoco } from './mujoco';
 import type { Push } from './simulator';
+import { inSi, Units } from './size';
 import { pointOn } from './world';
 import { OTHER } from '../tests/plant';
 import { simulate } from '../tests/program';
@@ -76,6 +77,30 @@ const apart = (a: State, b: State) =>
   Math.max(...numbers(a).map((x, i) => Math.abs(x - numbers(b)[i]!)));
 
 // The page has another version of MuJoCo than the program (npm has no newer one).
+test('another size equals a new model in SI units', () => {
+  const plant = { ...OTHER, size: 0.2 };
+  const model = mujoco.MjModel.from_xml_string(mjcf(inSi(plant)))!;
+  const { time, torque, velocity } = new Units(plant.size);
+  model.opt.timestep = 0.005 * time;
+  const data = new mujoco.MjData(model);
+  data.qpos.set([START.q1, START.q2]);
+  data.qvel.set([velocity * START.w1, velocity * START.w2]);
+  const simulator = new Mujoco(mujoco);
+  simulator.state = START;
+  simulator.plant = plant;
+  expectSame(simulator.state, START, 1e-14);
+  for (let k = 0; k < 400; ++k) {
+    const chosen = 6 * Math.sin(k / 100);
+    data.ctrl[0] = torque * chosen;
+    mujoco.mj_step(model, data);
+    expect(simulator.step(chosen, null, 0.005)).toBe(true);
+  }
+  const [q, w] = [data.qpos, data.qvel];
+  expectSame(simulator.state, { q1: q[0], q2: q[1], w1: time * w[0], w2: time * w[1] }, 1e-9);
+  data.delete();
+  model.delete();
+});
+
 test.each<[string, Plant, State]>([
   ['the nominal plant from rest', NOMINAL, HANGING],
   ['the nominal plant in a fast spin', NOMINAL, { q1: 2, q2: -1, w1: 12, w2: -20 }],

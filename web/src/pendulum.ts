@@ -1,6 +1,5 @@
 import { core } from './core';
 import { Fields } from './fields';
-import { inSi } from './size';
 
 /// The double pendulum and its task as formulas: those of src/pendulum/task.cc, in the core. Its
 /// constants, which a test compares with the program's, are needed before there is a core.
@@ -233,9 +232,9 @@ export function physicsSteps(plant: Plant, period: number): number {
   return steps;
 }
 
-/// The model as MJCF in SI units, with all digits of the plant's numbers. Contacts and constraints
-/// are off: a step takes less time and the trajectory is the same.
+/// The model as MJCF, with all digits of the plant's numbers, which are in SI units. Contacts and
+/// constraints are off: a step takes less time and the trajectory is the same.
 export function mjcf(plant: Plant): string {
-  core().formula(PLANT_FIELDS.numbers(inSi(plant)), core().exports.pendulum_mjcf);
+  core().formula(PLANT_FIELDS.numbers(plant), core().exports.pendulum_mjcf);
   return core().text;
 }
