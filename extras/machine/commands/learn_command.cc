@@ -1,8 +1,10 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "base/error.h"
 #include "base/format.h"
@@ -21,13 +23,14 @@ namespace {
 struct LearnArguments {
   std::string link, out, robot = "pendubot";
   LearnConfig config;
+  std::vector<FlagValue> limits;  // the given ones
   int64_t seed = 1, threads = 0;
 };
 
 std::unique_ptr<MachineLink> g_learned;  // global for signal handlers, which may come until the end
 
 /// The command that runs the controller again.
-std::string CommandOf(const LearnArguments& a, const LearnResult& r) {
+std::string CommandOf(const LearnArguments& a, const Limits& limits, const LearnResult& r) {
   const PolicyArguments& controller = r.controller;
   std::string text = fmt::format("{} run {}", LaunchCommand(), controller.name);
   for (const FlagValue& flag : controller.flags) {
@@ -42,9 +45,8 @@ std::string CommandOf(const LearnArguments& a, const LearnResult& r) {
   return text + fmt::format(
                     " --compensation {} --passive-torque {} --max-torque {} "
                     "--max-angle {} --max-velocity {} --max-energy {} --hz {}",
-                    r.compensation, a.config.passive_torque, a.config.limits.torque,
-                    a.config.limits.angle, a.config.limits.velocity, a.config.limits.energy,
-                    a.config.hz);
+                    r.compensation, limits.passive_torque, limits.torque, limits.angle,
+                    limits.velocity, limits.energy, a.config.hz);
 }
 
 /// The settings of the session. Throws BadInput for missing or wrong arguments.
@@ -52,6 +54,13 @@ LearnConfig LearnConfigOf(const LearnArguments& a) {
   if (a.link.empty()) throw BadInput("machine learn: expected --link, got none");
   if (a.out.empty()) throw BadInput("machine learn: expected --out FOLDER, got none");
   LearnConfig config = a.config;
+  SetFlags(OptionsOf(config.limits), a.limits);
+  const bool has_torque = std::ranges::count(a.limits, "max_torque", &FlagValue::name) > 0;
+  if (config.length > 0 && !has_torque) {
+    throw BadInput("--length: expected --max-torque with it, got none");
+  }
+  config.limits = config.DefaultLimits(config.limits.torque);
+  SetFlags(OptionsOf(config.limits), a.limits);
   config.seed = static_cast<uint64_t>(a.seed);
   config.actuated_joint = static_cast<int>(*ParseRobot(a.robot));
   config.Check();
@@ -92,24 +101,25 @@ std::string UsedText(const LearnResult& r) {
 }
 
 /// Writes the file report.txt: `steps`, the result, and the command that runs the controller again.
-void WriteReport(const LearnArguments& a, const LearnResult& r, const std::string& steps) {
+void WriteReport(const LearnArguments& a, const Limits& limits, const LearnResult& r,
+                 const std::string& steps) {
   std::string text = steps;
   text += r.reason.empty() ? "balanced: " : fmt::format("not balanced, {}: ", r.reason);
   text += UsedText(r) + "\n";
-  if (r.tries > 0) text += CommandOf(a, r) + "\n";
+  if (r.tries > 0) text += CommandOf(a, limits, r) + "\n";
   WriteNamedFile(std::filesystem::path(a.out) / "report.txt", text);
 }
 
 /// Prints the result and returns the exit code. Throws Failure if the machine did not balance.
-int SayResult(const LearnArguments& a, const LearnResult& r) {
+int SayResult(const LearnArguments& a, const Limits& limits, const LearnResult& r) {
   const std::string used = UsedText(r);
   if (StopSignal() != 0) {
     fmt::print(stderr, "stopped: {}; written {}\n", used, Printable(a.out));
     return 128 + StopSignal();
   }
   if (!r.reason.empty()) throw Failure(fmt::format("not balanced: {} ({})", r.reason, used));
-  fmt::print("balanced for {:.1f} s: {}\n{}\nwritten {}\n", r.balanced, used, CommandOf(a, r),
-             Printable(a.out));
+  fmt::print("balanced for {:.1f} s: {}\n{}\nwritten {}\n", r.balanced, used,
+             CommandOf(a, limits, r), Printable(a.out));
   return 0;
 }
 
@@ -123,8 +133,8 @@ int RunLearn(const LearnArguments& a) {
   std::string steps;
   const LearnResult result = LearnAndReport(config, a.out, pool, steps);
   folder.Keep();
-  WriteReport(a, result, steps);
-  return SayResult(a, result);
+  WriteReport(a, config.limits, result, steps);
+  return SayResult(a, config.limits, result);
 }
 
 }  // namespace
@@ -138,13 +148,15 @@ void AddLearn(CommandLine& line) {
   line.Text("--robot", a.robot, "ROBOT",
             "pendubot (motor at joint 1) or acrobot (joint 2) (default pendubot)");
   line.Arguments(OptionsOf(a.config));
+  line.Settings(OptionsOf(a.config.limits), a.limits);
   AddSeed(line, a.seed, "the excitations and of simulated tries");
   AddThreads(line, a.threads);
   line.Notes(
       "The links must hang at rest. Torques grow until they move. The program identifies a twin\n"
       "from this motion, designs a controller on it and tries it. After a failed try it\n"
       "identifies the twin again. You need to know --max-torque, --encoder-counts and the signs\n"
-      "of angles and torques (docs/howto/real-machine.md). Beyond a limit and at Ctrl-C the loop\n"
+      "of angles and torques (docs/howto/real-machine.md). Give --length for a machine of another\n"
+      "size than RealAIGym's: times and limits follow it. Beyond a limit and at Ctrl-C the loop\n"
       "brakes. A second Ctrl-C switches the motors off at once.\n"
       "Exit code: 0 if the machine balanced for --hold, 130 after Ctrl-C, else 1.\n");
   line.Examples(

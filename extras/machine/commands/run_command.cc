@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "base/error.h"
 #include "base/text.h"
@@ -18,13 +19,35 @@
 namespace upswing::machine {
 namespace {
 
+/// Settings whose defaults follow the size of the machine.
+struct SizedSettings {
+  Limits limits;
+  MachineSensors sensors{.velocity_share = 0.2, .velocity_dead_zone = 0.1};
+
+  /// The defaults for a machine like this twin.
+  static SizedSettings For(const Twin& twin) {
+    SizedSettings settings;
+    settings.limits = Limits::For(twin);
+    settings.sensors.velocity_dead_zone *= ScaleOverUsual(twin.plant).velocity();
+    return settings;
+  }
+
+  void Describe(Options& o) {
+    o.Section("Options");
+    o.Add(&sensors.velocity_share, "velocity_share", {0.001, 1}, "",
+          "without a twin: share of the newest difference in the low-passed velocities");
+    o.Add(&sensors.velocity_dead_zone, "velocity_dead_zone", {0, 100}, "rad/s",
+          "without a twin: velocity below which the controller sees 0");
+    limits.Describe(o);
+  }
+};
+
 struct RunArguments {
   PolicyArguments policy;
   std::string link, twin, robot, log, start = "hanging";
-  Limits limits;
-  MachineSensors sensors{.velocity_share = 0.2, .velocity_dead_zone = 0.1};
+  std::vector<FlagValue> sized;  // the given ones of SizedSettings
   int64_t seed = 1;
-  double hz = 500, seconds = 10, compensation = 0, passive_torque = 0.5;
+  double hz = 500, seconds = 10, compensation = 0;
   bool differences = false, draw = false;
 };
 
@@ -81,14 +104,31 @@ void PrintSummary(const LoopSummary& s, const LinkCounts& counts, const Supervis
              supervisor.clipped(), 1e3 * s.longest_act);
 }
 
+/// The machine as far as it is known: its twin, or the plant of the policy.
+Twin KnownMachine(const LoadedPolicy& policy, const std::optional<Twin>& twin) {
+  if (twin) return *twin;
+  Twin machine;
+  machine.plant = policy.plant;
+  return machine;
+}
+
+/// The settings for the machine: those that are given, and the defaults for its size.
+SizedSettings SettingsFor(const RunArguments& a, const Twin& machine) {
+  SizedSettings settings = SizedSettings::For(machine);
+  SetFlags(OptionsOf(settings), a.sized);
+  return settings;
+}
+
 /// The supervisor with the limits of the run and the motors of the machine.
-Supervisor SupervisorOf(const RunArguments& a, const LoadedPolicy& policy,
-                        const std::optional<Twin>& twin) {
+Supervisor SupervisorOf(const RunArguments& a, const SizedSettings& settings,
+                        const LoadedPolicy& policy, const std::optional<Twin>& twin) {
   const int joint = static_cast<int>(RobotOf(policy));
-  Joints motor{a.passive_torque, a.passive_torque};
-  motor[joint - 1] = twin ? twin->plant.torque_limit : a.limits.torque;
-  const MachineSensors sensors = twin ? twin->sensors : a.sensors;
-  return Supervisor({.limits = a.limits,
+  const Limits& limits = settings.limits;
+  Joints motor{limits.passive_torque, limits.passive_torque};
+  motor[joint - 1] = twin ? twin->plant.torque_limit : limits.torque;
+  const MachineSensors sensors = twin ? twin->sensors : settings.sensors;
+  return Supervisor({.limits = limits,
+                     .scale = ScaleOverUsual(KnownMachine(policy, twin).plant),
                      .start = ParsePendulumStart(a.start),
                      .motor_limit = motor,
                      .actuated_joint = joint,
@@ -107,6 +147,17 @@ void OpenLink(const RunArguments& a, const std::optional<Twin>& twin, const Link
   Rng rng(seed, "loop: machine");
   g_link = std::make_unique<TwinLink>(a.draw ? DrawTwin(*twin, rng) : *twin,
                                       ParsePendulumStart(a.start), seed);
+}
+
+/// Prints the limits that follow the size of a machine unlike RealAIGym's.
+void PrintLimits(const Limits& limits, const Twin& machine) {
+  const Scale scale = ScaleOverUsual(machine.plant);
+  if (scale == Scale()) return;
+  fmt::print(
+      "  another size than RealAIGym's: times × {:.3g}, torques × {:.3g}; limits {:.3g} rad/s, "
+      "{:.3g} N·m, other joint {:.3g} N·m; braking {:.3g} N·m·s/rad for {:.3g} s\n",
+      scale.time, scale.torque, limits.velocity, limits.torque, limits.passive_torque,
+      limits.brake_damping, limits.brake_seconds);
 }
 
 /// Prints the policy, the machine and the rate, and how the policy was changed for the machine.
@@ -128,11 +179,11 @@ void PrintDriver(const RunArguments& a, const LoadedPolicy& policy) {
 
 /// The exit code of a run. Throws Failure if the supervisor ended it, or if the links are not
 /// upright.
-int ExitCodeOf(const RunArguments& a, const Supervisor& supervisor, const LoopSummary& summary) {
+int ExitCodeOf(const Limits& limits, const Supervisor& supervisor, const LoopSummary& summary) {
   if (!supervisor.reason().empty()) throw Failure(supervisor.reason());
   if (StopSignal() != 0) return 128 + StopSignal();
   // Without torque the loop only reads.
-  if (a.limits.torque > 0 && summary.upright == 0) {
+  if (limits.torque > 0 && summary.upright == 0) {
     throw Failure("the links were not upright at the end of the run");
   }
   return 0;
@@ -145,8 +196,11 @@ int Drive(const RunArguments& a, const MachinePolicy& policy, const std::optiona
   MachineController controller = ControllerOf(policy);
   const StateSource source = a.differences ? StateSource::kDifferences : StateSource::kTwin;
   const double period = 1 / a.hz;
-  Estimator estimator = twin ? Estimator(*twin, period, source) : Estimator(a.sensors, period);
-  Supervisor supervisor = SupervisorOf(a, *policy, twin);
+  const Twin machine = KnownMachine(*policy, twin);
+  const SizedSettings settings = SettingsFor(a, machine);
+  Estimator estimator =
+      twin ? Estimator(*twin, period, source) : Estimator(settings.sensors, period);
+  Supervisor supervisor = SupervisorOf(a, settings, *policy, twin);
   const LoopConfig config{.hz = std::llround(a.hz),
                           .seconds = a.seconds,
                           .actuated_joint = static_cast<int>(RobotOf(*policy)),
@@ -156,6 +210,7 @@ int Drive(const RunArguments& a, const MachinePolicy& policy, const std::optiona
   MachineLink& link = *g_link;
   LogWriter log(a.log);
   PrintDriver(a, *policy);
+  PrintLimits(settings.limits, machine);
   if (!link.simulated()) {
     const std::string missing = EnterRealTime();
     if (!missing.empty()) fmt::print("  not permitted: {}; cycles may be late\n", missing);
@@ -168,7 +223,7 @@ int Drive(const RunArguments& a, const MachinePolicy& policy, const std::optiona
   PrintSummary(loop.summary(), link.counts(), supervisor, link.simulated());
   if (log.dropped() > 0) fmt::print("  log      {} rows left out\n", log.dropped());
   if (!a.log.empty()) fmt::print("written {}\n", Printable(a.log));
-  return ExitCodeOf(a, supervisor, loop.summary());
+  return ExitCodeOf(settings.limits, supervisor, loop.summary());
 }
 
 int RunRun(const RunArguments& a) {
@@ -218,16 +273,14 @@ void AddRun(CommandLine& line) {
   own.Section("loop");
   own.Add(&a.hz, "hz", {100, 1000}, "1/s", "cycles per second").step = 50;
   own.Add(&a.seconds, "seconds", {0.1, 86400}, "s", "time in which the controller drives");
-  own.Add(&a.passive_torque, "passive_torque", {0, 1000}, "N·m",
-          "largest torque of the joint without the controller's motor");
   own.Add(&a.compensation, "compensation", kZeroToOne, "",
           "share of both joints' estimated dry friction that the motors compensate; needs a twin");
-  own.Add(&a.sensors.velocity_share, "velocity_share", {0.001, 1}, "",
-          "without a twin: share of the newest difference in the low-passed velocities");
-  own.Add(&a.sensors.velocity_dead_zone, "velocity_dead_zone", {0, 100}, "rad/s",
-          "without a twin: velocity below which the controller sees 0");
-  a.limits.Describe(own);
   line.Arguments(own);
+  line.Settings(OptionsOf(SizedSettings()), a.sized);
+  line.Check([&a] {
+    SizedSettings scratch;
+    SetFlags(OptionsOf(scratch), a.sized);
+  });
   AddSeed(line, a.seed, "the twin's cycles and of --draw");
   line.Flag("--differences", a.differences,
             "estimate velocities by differences of the angles, without the twin's prediction");

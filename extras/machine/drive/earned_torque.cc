@@ -7,6 +7,7 @@ namespace upswing::machine {
 namespace {
 
 constexpr double kLeastStep = 1e-5;    // of encoders of an unknown step, rad; 20 bits per turn
+// Times are for UsualPlant, and count by the scale of the machine.
 constexpr double kQuietSeconds = 0.3;  // window of the readings that show whether links rest
 // Range of the readings at rest, rad. A twin knows how slow links go on.
 constexpr double kQuietAngle = 0.004, kPredictedQuietAngle = 0.03;
@@ -18,6 +19,9 @@ constexpr double kSlowDoubling = 0.1;   // the same once the motor's joint has a
 constexpr double kLimitSeconds = 0.04;  // time at the limit in which the joints have to answer, s
 constexpr double kDragSeconds = 0.5;    // the same for the other joint, s
 constexpr double kLargestTravel = 0.5;  // of the motor's joint until the other one answers, rad
+constexpr double kLongestBlind = 0.025;  // age of a reading with which a pulse goes on, s
+// Least times in cycles: those at 100 Hz, the slowest rate of UsualPlant's loop.
+constexpr double kDoublingCycles = 2, kLimitCycles = 4, kBlindCycles = 2.5;
 
 // Motion that the twin predicts for a pulse before it is compared.
 constexpr double kCompared = 0.03, kComparedSteps = 12;  // rad, steps
@@ -47,10 +51,15 @@ constexpr double kUsualMass = 0.05, kUsualFriction = 0.2;  // s², of the torque
 
 EarnedTorque::EarnedTorque(const EarnedTorqueConfig& config)
     : config_(config),
-      block_{.mass = kUsualMass * config.limit, .friction = kUsualFriction * config.limit},
+      block_{.mass = kUsualMass * config.scale.time * config.scale.time * config.limit,
+             .friction = kUsualFriction * config.limit},
       proven_(!config.hangs || config.limit <= 0),
       motor_(config.actuated_joint - 1) {
   for (Joint& joint : joints_) joint.step = config.quantum > 0 ? config.quantum : kUnknownStep;
+}
+
+double EarnedTorque::Time(double usual, double cycles) const {
+  return std::max(Time(usual), std::min(usual, cycles * config_.period));
 }
 
 double EarnedTorque::Visible(const Joint& joint) const {
@@ -80,7 +89,7 @@ void EarnedTorque::See(const Cycle& cycle, const Joints& sent) {
   }
   if (!has_seen_) window_begin_ = cycle.time;
   has_seen_ = true;
-  if (phase_ == Phase::kRest && cycle.time >= window_begin_ + kQuietSeconds) JudgeRest();
+  if (phase_ == Phase::kRest && cycle.time >= window_begin_ + Time(kQuietSeconds)) JudgeRest();
 }
 
 void EarnedTorque::JudgeRest() {
@@ -105,9 +114,9 @@ void EarnedTorque::MoveBlock(double torque) {
   block_.moved += block_.velocity * config_.period;
 }
 
-Joints EarnedTorque::Pulse() {
+Joints EarnedTorque::Pulse(double age) {
   Joints torque{};
-  if (proven_) return torque;
+  if (proven_ || age > Time(kLongestBlind, kBlindCycles)) return torque;
   const double limit = config_.limit;
   if (phase_ == Phase::kRest) {
     phase_ = Phase::kPush;
@@ -118,7 +127,7 @@ Joints EarnedTorque::Pulse() {
   } else if (phase_ == Phase::kPush) {
     // Without a twin, the other joint may have to be dragged along by friction.
     const bool drags = !PredictsPulse() && joints_[motor_].answered;
-    const double doubling = drags ? kSlowDoubling : kDoubling;
+    const double doubling = drags ? Time(kSlowDoubling) : Time(kDoubling, kDoublingCycles);
     amplitude_ = std::min(amplitude_ * std::exp2(config_.period / doubling), limit);
     if (amplitude_ == limit) at_limit_ += config_.period;
   }
@@ -155,7 +164,7 @@ Complaint EarnedTorque::JudgeJoint(int j) {
   }
   const auto number = static_cast<double>(j + 1);
   if (j == motor_) {
-    if (at_limit_ <= kLimitSeconds) return {};
+    if (at_limit_ <= Time(kLimitSeconds, kLimitCycles)) return {};
     return {
         "joint %.0f does not answer its motor: no motion with up to %.3g N·m. Are the motor and "
         "the encoder connected, does anything hold the joint?",
@@ -164,7 +173,7 @@ Complaint EarnedTorque::JudgeJoint(int j) {
   // Once it moves, the motor's joint drags the other one along.
   const Joint& pushed = joints_[motor_];
   const bool travelled = std::abs(pushed.angle - pushed.start) > kLargestTravel;
-  if (!travelled && at_limit_ <= kDragSeconds) return {};
+  if (!travelled && at_limit_ <= Time(kDragSeconds)) return {};
   return {
       "joint %.0f does not answer: no motion after the other one has turned, with up to %.3g N·m. "
       "Is its encoder connected, does anything hold the joint?",
@@ -190,7 +199,7 @@ Complaint EarnedTorque::JudgeShare(int j) {
   Joint& joint = joints_[j];
   const double expected = e.driven[j] - e.coasting[j], shown = e.measured[j] - e.coasting[j];
   const double enough = std::max(kCompared, kComparedSteps * joint.step);
-  const bool last = at_limit_ > kLimitSeconds;
+  const bool last = at_limit_ > Time(kLimitSeconds, kLimitCycles);
   const bool strong = amplitude_ > kAboveFriction * e.friction[motor_];
   if (!last && (std::abs(expected) < enough || !strong)) return {};
   joint.answered = true;
@@ -206,7 +215,7 @@ Complaint EarnedTorque::JudgeShare(int j) {
 
 Complaint EarnedTorque::JudgeRun() {
   const Expectation& e = seen_.expected;
-  if (held_ && seen_.time > held_at_ + kLongestHeld) {
+  if (held_ && seen_.time > held_at_ + Time(kLongestHeld)) {
     return {"both encoders stick, or the links are held, under torques that must move them"};
   }
   for (int j = 0; j < 2; ++j) {
@@ -242,7 +251,7 @@ Complaint EarnedTorque::JudgeRun() {
 Joints EarnedTorque::Permitted(const Joints& wanted) {
   const Expectation& e = seen_.expected;
   const double shown_at = std::max(joints_[0].shown_at, joints_[1].shown_at);
-  if (!PredictsRun() || seen_.time < shown_at + kStillSeconds) {
+  if (!PredictsRun() || seen_.time < shown_at + Time(kStillSeconds)) {
     held_ = false;
     return wanted;
   }

@@ -4,6 +4,7 @@
 
 #include "extras/machine/drive/expectation.h"
 #include "extras/machine/logs/log.h"
+#include "pendulum/scale.h"
 
 /// Torque is earned: motors get their full torque once the encoders have shown that they see what
 /// it does.
@@ -36,10 +37,13 @@ struct EarnedTorqueConfig {
   bool hangs = true;      // whether the run begins with links that hang
   double quantum = 0;     // step of the encoders, rad; 0: unknown
   double period = 0.002;  // of the cycles, s
+  Scale scale = {};       // natural units of the machine over those of UsualPlant
 };
 
 /// Asks the joints for an answer before the controller drives, and watches that they go on
 /// answering.
+///
+/// All times are for UsualPlant, and count by the scale of the machine.
 ///
 /// A pulse of the controller's motor begins with 1% of its limit and doubles every 25 ms until both
 /// joints move. The same impulse in the other direction then stops them. With a twin, each encoder
@@ -71,8 +75,9 @@ class EarnedTorque {
   bool proven() const { return proven_; }
   /// Judges the answer to the pulses so far.
   Complaint JudgePulse();
-  /// The torques (N·m) of the next cycle of the pulses.
-  Joints Pulse();
+  /// The torques (N·m) of the next cycle of the pulses, with a last reading of this age (s). A pulse
+  /// waits for readings.
+  Joints Pulse(double age);
   /// Judges the last cycle of a run.
   Complaint JudgeRun();
   /// The torques (N·m) that are permitted of the ones that the controller wants. With a twin, links
@@ -102,6 +107,10 @@ class EarnedTorque {
 
   bool PredictsPulse() const { return seen_.expected.known && config_.trust == TwinTrust::kAlways; }
   bool PredictsRun() const { return seen_.expected.known && config_.trust != TwinTrust::kNever; }
+  /// A time (s) by the scale of the machine.
+  double Time(double usual) const { return usual * config_.scale.time; }
+  /// The same, but at least this number of cycles.
+  double Time(double usual, double cycles) const;
   /// Least change of an angle that shows a motion, rad.
   double Visible(const Joint& joint) const;
   void MoveBlock(double torque);

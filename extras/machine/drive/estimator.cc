@@ -9,6 +9,8 @@
 namespace upswing::machine {
 namespace {
 
+// Velocities, noise and times are for UsualPlant, and count by the scale of the twin.
+//
 // Noise of the velocities, which stands for unmodelled torques, rad/s/√s: usually, and while a push
 // or static friction may act.
 constexpr double kVelocityNoise = 0.5, kDisturbedNoise = 4;
@@ -17,11 +19,12 @@ constexpr double kMoving = 0.1;  // rad/s; static friction may hold slower links
 // RealAIGym's logs and in simulation, because the noise of the angles is a bound.
 constexpr double kOutlier = 3, kLargestMean = 2;
 constexpr double kInnovationTime = 0.025;  // time constant of this mean, s
+constexpr double kInnovationCycles = 2;    // least of it
 constexpr double kFirstVelocity = 3;       // deviation of the velocities at the beginning, rad/s
 constexpr double kLeastNoise = 1e-6;       // of the measured angles, rad
 constexpr double kKept = 0.1;              // time for which sent torques are kept, s
 constexpr double kLongestGap = 0.1;        // s; after it the filter begins again
-constexpr int kMostKept = 512;             // torques sent in kKept and the longest delay, at 1 kHz
+constexpr double kMostKept = 512;          // torques sent in kKept and the longest delay, at 1 kHz
 constexpr double kStiction = 1.5;          // friction of a joint without motion, of dry friction
 constexpr double kLongestUnseen = 0.4;     // time for which a motion is predicted without sight, s
 
@@ -42,10 +45,12 @@ Estimator::Estimator(const Twin& twin, double period, StateSource source)
   source_ = source;
   const Actuator& motor = twin.actuator;
   const Drive drive(motor.delay, motor.lag);
-  model_.emplace(Model{BodyOf(twin), drive, drive, motor.delay + motor.lag, 0});
+  const Scale scale = ScaleOverUsual(twin.plant);
+  model_.emplace(Model{BodyOf(twin), drive, drive, scale, motor.delay + motor.lag, 0});
   model_->hanging = -model_->body.At({}).energy;
   // The drives' memory grows now, not in the loop.
-  for (int i = kMostKept; i > 0; --i) model_->drive.Add(-1 - i * 1e-3, {});
+  const int kept = static_cast<int>(kMostKept * std::max(1.0, scale.time));
+  for (int i = kept; i > 0; --i) model_->drive.Add(-1 - i * 1e-3, {});
   model_->silent = model_->drive;
 
   Vector& x = track_.x;
@@ -57,6 +62,14 @@ Estimator::Estimator(const Twin& twin, double period, StateSource source)
   for (int i = 0; i < 4; ++i) {
     for (int j = 0; j < 4; ++j) P(kZero + i, kZero + j) = CovarianceOf(twin, kNames[i], kNames[j]);
   }
+}
+
+double Estimator::InnovationTime() const {
+  return std::max(Time(kInnovationTime), std::min(kInnovationTime, kInnovationCycles * period_));
+}
+
+double Estimator::VelocityNoise(bool disturbed) const {
+  return Velocity(disturbed ? kDisturbedNoise : kVelocityNoise) / std::sqrt(model_->scale.time);
 }
 
 Estimator::Vector Estimator::Follow(const Drive& drive, Vector x, double begin,
@@ -96,7 +109,7 @@ void Estimator::Begin(const Joints& angle, double moment) {
   P.topRows<2>() = -P.middleRows<2>(kZero);
   P.leftCols<2>() = -P.middleCols<2>(kZero);
   P.diagonal().head<2>().array() += Square(AngleNoise());
-  P.diagonal().segment<2>(kVelocity).setConstant(Square(kFirstVelocity));
+  P.diagonal().segment<2>(kVelocity).setConstant(Square(Velocity(kFirstVelocity)));
 }
 
 void Estimator::Predict(Track& track, double seconds, double noise) const {
@@ -104,11 +117,15 @@ void Estimator::Predict(Track& track, double seconds, double noise) const {
   const Vector next = Follow(drive, track.x, track.time, seconds);
   // The zeros have no effect on the motion: their columns are those of the identity.
   Matrix F = Matrix::Identity();
-  constexpr double kStep = 1e-6;
+  constexpr double kStep = 1e-6;  // in natural units
+  const Scale& scale = model_->scale;
+  Vector step = Vector::Constant(kStep);
+  step.segment<2>(kVelocity) *= scale.velocity();
+  step.segment<2>(kFriction) *= scale.torque;
   for (const int i : {0, 1, 2, 3, kFriction, kFriction + 1}) {
     Vector other = track.x;
-    other[i] += kStep;
-    F.col(i) = (Follow(drive, other, track.time, seconds) - next) / kStep;
+    other[i] += step[i];
+    F.col(i) = (Follow(drive, other, track.time, seconds) - next) / step[i];
   }
   track.P = F * track.P * F.transpose();
   track.P.diagonal().segment<2>(kVelocity).array() += Square(noise) * seconds;
@@ -143,35 +160,39 @@ Eigen::Vector2d Estimator::Correct(Track& track, const Joints& angle, const Enco
 void Estimator::NoticePush(const Eigen::Vector2d& normalized, double seconds) {
   // While the model holds, normalized innovations are white. A push gives many of them the same
   // sign, so their mean exceeds that of white ones, whose variance is weight / (2 - weight).
-  const double weight = std::min(seconds / kInnovationTime, 1.0);
+  const double weight = std::min(seconds / InnovationTime(), 1.0);
   mean_innovation_ += weight * (normalized - mean_innovation_);
   if (mean_innovation_.squaredNorm() > Square(kLargestMean) * weight / (2 - weight)) {
-    disturbed_until_ = track_.time + kInnovationTime;
+    disturbed_until_ = track_.time + InnovationTime();
   }
 }
 
-bool Estimator::Slow(const Track& track) {
-  return track.x.segment<2>(kVelocity).cwiseAbs().maxCoeff() < kMoving;
+bool Estimator::Slow(const Track& track) const {
+  return track.x.segment<2>(kVelocity).cwiseAbs().maxCoeff() < Velocity(kMoving);
 }
 
 void Estimator::Take(const TimedReading& reading, bool driven) {
   const double seconds = reading.time - track_.time;
   expectation_.innovation = {};
   expectation_.gap = 0;
-  if (!begin_ || std::abs(seconds) > kLongestGap) {
+  if (!begin_ || std::abs(seconds) > LinkTime(kLongestGap)) {
     Begin(reading.angle, reading.time);
     return;
   }
   if (seconds <= 0) return;
   const Track before = track_;
-  const bool disturbed = track_.time < disturbed_until_ || Slow(track_);
-  Predict(track_, seconds, disturbed ? kDisturbedNoise : kVelocityNoise);
+  // A gap that is long for a small machine leaves time for a push.
+  const bool was_blind = seconds > Time(kLongestGap);
+  const bool disturbed = track_.time < disturbed_until_ || Slow(track_) || was_blind;
+  Predict(track_, seconds, VelocityNoise(disturbed));
   for (int j = 0; j < 2; ++j) {
     expectation_.innovation[j] = reading.angle[j] - track_.x[kAngle + j] - track_.x[kZero + j];
   }
   expectation_.gap = seconds;
-  // Readings with a wrong time have large innovations. At the beginning, so have right ones.
-  const double limit = track_.time < *begin_ + kInnovationTime ? 1e9 : kOutlier;
+  // Readings with a wrong time have large innovations. At the beginning, and after such a gap, so
+  // have right ones.
+  const bool begins = track_.time < *begin_ + InnovationTime();
+  const double limit = begins || was_blind ? 1e9 : kOutlier;
   NoticePush(Correct(track_, reading.angle, {true, true}, limit), seconds);
   if (driven || !Slow(track_)) return;
   // Links may rest for minutes, held off their equilibrium: nothing is learned.
@@ -190,7 +211,7 @@ void Estimator::BeginUnseen(int joint, double angle) {
 void Estimator::ExpectUnseen(const TimedReading& reading) {
   Encoders visible{};
   for (int j = 0; j < 2; ++j) {
-    const bool begins = track_.time == *begin_ || track_.time > unseen_begin_[j] + kLongestUnseen;
+    const bool begins = track_.time == *begin_ || track_.time > unseen_begin_[j] + Time(kLongestUnseen);
     visible[j] = std::abs(reading.angle[j] - shown_[j]) > kVisibleSteps * AngleNoise();
     // A filter that sees no motion takes it for friction.
     if (visible[j]) shown_friction_[j] = friction()[j];
@@ -202,7 +223,7 @@ void Estimator::ExpectUnseen(const TimedReading& reading) {
     if (seconds > 0) {
       // Static friction may hold slow links. An encoder without visible motion does not correct the
       // other joint.
-      Predict(track, seconds, Slow(track) ? kDisturbedNoise : kVelocityNoise);
+      Predict(track, seconds, VelocityNoise(Slow(track)));
       Encoders others = visible;
       others[j] = false;
       Correct(track, reading.angle, others, kOutlier);
@@ -222,7 +243,7 @@ void Estimator::ExpectResponse(const TimedReading& reading, bool driven) {
     model_->silent = model_->drive;
   }
   const double seconds = reading.time - response_time_;
-  if (seconds > 0 && reading.time < response_begin_ + kResponseSeconds) {
+  if (seconds > 0 && reading.time < response_begin_ + Time(kResponseSeconds)) {
     driven_ = Follow(model_->drive, driven_, response_time_, seconds);
     coasting_ = Follow(model_->silent, coasting_, response_time_, seconds);
     response_time_ = reading.time;
@@ -246,7 +267,7 @@ void Estimator::Update(double time, const Joints& sent, const TimedReading* read
     now_ = ahead_ = {q[0], q[1], w[0], w[1]};
   }
   if (!model_) return;
-  model_->drive.Forget(time - kKept);
+  model_->drive.Forget(time - LinkTime(kKept));
   model_->drive.Add(time, sent);
   if (reading != nullptr && std::isfinite(reading->angle[0] + reading->angle[1])) {
     const bool driven = sent != Joints{};
@@ -260,7 +281,7 @@ void Estimator::Update(double time, const Joints& sent, const TimedReading* read
   if (!begin_ || source_ == StateSource::kDifferences) return;
   const Drive& drive = model_->drive;
   const Vector now =
-      Follow(drive, track_.x, track_.time, std::clamp(time - track_.time, 0.0, kKept));
+      Follow(drive, track_.x, track_.time, std::clamp(time - track_.time, 0.0, LinkTime(kKept)));
   now_ = StateOf(now);
   ahead_ = StateOf(Follow(drive, now, time, period_ + model_->horizon));
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <optional>
 
@@ -32,6 +33,9 @@ enum class StateSource { kTwin, kDifferences };
 ///
 /// The prediction bridges lost readings. The controller gets the state at the time when its torque
 /// will act: a cycle, the motors' delay and their lag later.
+///
+/// Noise and times are tuned on RealAIGym's machines. For twins of another size they count in natural
+/// units (ScaleOverUsual).
 ///
 /// The twin also says what the encoders have to show (Expectation).
 ///
@@ -70,6 +74,7 @@ class Estimator {
     Manipulator body;
     Drive drive;
     Drive silent;    // the drive's torques until the response began
+    Scale scale;     // natural units of the twin over those of UsualPlant
     double horizon;  // from sending a torque to its effect, s
     double hanging;  // energy below upright of the links that hang, J
   };
@@ -88,6 +93,15 @@ class Estimator {
   void Take(const TimedReading& reading, bool driven);
   /// Standard deviation of measured angles, rad.
   double AngleNoise() const;
+  /// A velocity (rad/s) and a time (s) by the scale of the twin.
+  double Velocity(double usual) const { return usual * model_->scale.velocity(); }
+  double Time(double usual) const { return usual * model_->scale.time; }
+  /// The same, but at least as long: times that belong to the link, however small the machine is.
+  double LinkTime(double usual) const { return std::max(usual, Time(usual)); }
+  /// Time constant of the mean of the innovations, s.
+  double InnovationTime() const;
+  /// Noise of the velocities of a track, rad/s/√s.
+  double VelocityNoise(bool disturbed) const;
   /// Begins with measured angles of a moment (s). Zeros and friction stay.
   void Begin(const Joints& angle, double moment);
   /// Lets a track follow the motion for `seconds`. `noise`: of the velocities, rad/s/√s.
@@ -97,7 +111,7 @@ class Estimator {
   Eigen::Vector2d Correct(Track& track, const Joints& angle, const Encoders& encoders,
                           double limit) const;
   /// Whether static friction may hold both links.
-  static bool Slow(const Track& track);
+  bool Slow(const Track& track) const;
   /// Notices a push by the normalized innovations, `seconds` after the last ones.
   void NoticePush(const Eigen::Vector2d& normalized, double seconds);
   /// Begins to expect motion of a joint (0 or 1) from its measured angle on.

@@ -10,7 +10,6 @@ double Excitation::operator()(int64_t /*step*/, const PendulumState& state) {
   constexpr double kEnough = 0.7;                  // level up to which the amplitude grows
   constexpr int kShortest = 3, kLongest = 15;      // time for which a share is held, steps
   constexpr double kAlong = 0.6;                   // probability of a push along with the motion
-  constexpr double kSlow = 0.5;                    // rad/s
   const double level = level_(state);
   const double w = joint_ == 1 ? state.w1 : state.w2;
   --held_;
@@ -23,11 +22,11 @@ double Excitation::operator()(int64_t /*step*/, const PendulumState& state) {
   if (level >= 1) {
     if (!braking_) amplitude_ = std::max(kDecay * amplitude_, kFirst * limit_);
     braking_ = true;
-    return -amplitude_ * std::tanh(w / kSlow);
+    return -amplitude_ * std::tanh(w / slow_);
   }
   braking_ = false;
   if (level < kEnough) amplitude_ = std::min(kGrowth * amplitude_, limit_);
-  const double share = along_ && std::abs(w) > kSlow ? std::copysign(share_, w) : share_;
+  const double share = along_ && std::abs(w) > slow_ ? std::copysign(share_, w) : share_;
   return share * amplitude_;
 }
 

@@ -7,7 +7,7 @@ namespace upswing::machine {
 
 /// Readings of a joint show a motion if they differ by more than this many steps of its encoder.
 inline constexpr double kVisibleSteps = 2.5;
-/// Longest time for which an uncorrected prediction counts, s.
+/// Longest time for which an uncorrected prediction counts, s, by the scale of the machine.
 inline constexpr double kResponseSeconds = 0.5;
 
 /// The motion that the twin predicts. A measured angle and a prediction are compared as the

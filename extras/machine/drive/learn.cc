@@ -25,6 +25,8 @@
 namespace upswing::machine {
 namespace {
 
+// All times are for UsualPlant, and count by the scale of the machine.
+
 /// The plan of an excitation.
 struct ExcitationPlan {
   double seconds;  // length, s
@@ -83,9 +85,9 @@ std::vector<Candidate> CandidatesFor(const Plant& plant) {
   ControllerConfig with_damping = with_friction;
   constexpr double kDamping = 2;  // for dry friction, s/rad
   if (plant.actuated_joint == 1) {
-    with_damping.plant.damping2 += kDamping * plant.coulomb2;
+    with_damping.plant.damping2 += kDamping * scale.time * plant.coulomb2;
   } else {
-    with_damping.plant.damping1 += kDamping * plant.coulomb1;
+    with_damping.plant.damping1 += kDamping * scale.time * plant.coulomb1;
   }
   return {{"tvlqr", usual, kUsualCompensation},
           {"tvlqr", stiff, kUsualCompensation},
@@ -133,15 +135,13 @@ class LearningSession {
   LearningSession(const LearnConfig& config, MachineLink& link, const std::filesystem::path& out,
                   ThreadPool* pool, const std::function<void(const std::string&)>& say,
                   const std::function<bool()>& stop)
-      : c_(config), link_(link), out_(out), pool_(pool), say_(say), stop_(stop) {
-    twin_.plant.torque_limit = c_.limits.torque;
-    twin_.plant.actuated_joint = c_.actuated_joint;
-    twin_.actuator.passive_limit = c_.passive_torque;
-    twin_.sensors.quantum = 2 * std::numbers::pi / c_.encoder_counts;
-    twin_.sensors.velocity_share = 0.2;
-    twin_.sensors.velocity_dead_zone = 0.1;
-    twin_.loop.period = 1 / c_.hz;
-  }
+      : c_(config),
+        link_(link),
+        out_(out),
+        pool_(pool),
+        say_(say),
+        stop_(stop),
+        twin_(config.Known()) {}
 
   LearnResult Work() {
     try {
@@ -177,6 +177,9 @@ class LearningSession {
     if (result_.computing >= c_.computing) throw Ended{"the time of computing is used up"};
   }
 
+  /// The natural units of the machine over those of UsualPlant, as far as they are known.
+  Scale scale() const { return ScaleOverUsual(twin_.plant); }
+
   /// Ends the session unless the first excitation moved a link.
   void ExpectMotion() const {
     constexpr double kLeast = 0.05;  // rad
@@ -206,13 +209,17 @@ class LearningSession {
     // Links that swing to this lean have this energy.
     const double lean =
         std::min({e.lean, kLimitShare * c_.limits.angle, std::acos(1 - 2 * energy)});
-    say_(fmt::format("excite: torques grow until the links lean {:.2f} rad, {:g} s", lean,
-                     e.seconds));
+    const double seconds = e.seconds * scale().time;
+    say_(fmt::format("excite: torques grow until the links lean {:.2f} rad, {:.3g} s", lean,
+                     seconds));
     const Estimator estimator =
         has_twin ? Estimator(twin_, 1 / c_.hz) : Estimator(twin_.sensors, 1 / c_.hz);
-    Run({.limits = c_.limits, .seconds = e.seconds}, estimator,
-        Excitation(c_.limits.torque, c_.actuated_joint,
-                   has_twin ? LevelWithEnergy(lean, energy) : LevelOfMotion(lean), c_.seed));
+    const Excitation torques(c_.limits.torque, c_.actuated_joint,
+                             has_twin ? LevelWithEnergy(lean, energy) : LevelOfMotion(lean),
+                             c_.seed, scale());
+    const double cycles = std::max(1.0, std::round(kControlPeriod * scale().time * c_.hz));
+    Run({.limits = c_.limits, .seconds = seconds}, estimator,
+        MachineController(torques, cycles / c_.hz));
   }
 
   /// The level of an excitation, 1 at its aim: lean (rad) and velocity of the links.
@@ -238,7 +245,9 @@ class LearningSession {
     ExpectBudget();
     rules.seconds = std::min(rules.seconds, c_.motion - result_.motion);
     rules.log = (out_ / fmt::format("log-{:02}.csv", logs_.size() + 1)).string();
-    if (!logs_.empty()) rules.limits.patience = std::max(rules.limits.patience, kLongestSwinging);
+    rules.scale = scale();
+    const double swinging = kLongestSwinging * std::max(1.0, rules.scale.time);
+    if (!logs_.empty()) rules.limits.patience = std::max(rules.limits.patience, swinging);
     RunOutcome run =
         RunCycles(c_, rules, twin_.sensors, estimator, std::move(controller), link_, stop_);
     if (run.motion == 0) {
@@ -289,8 +298,9 @@ class LearningSession {
     });
   }
 
-  /// Fits all values to windows of this length (s). Throws Failure if no twin follows the motion.
+  /// Fits all values to windows of this length (s by the scale). Throws Failure if no twin follows the motion.
   FitResult FitLogs(double window) const {
+    window *= scale().time;
     const FitConfig config{.windows = {window, window}, .iterations = 30, .tolerance = 1e-4};
     std::vector<std::string> values =
         Structures(/*has_motors=*/true, /*one_body=*/false).back().values;
@@ -327,7 +337,8 @@ class LearningSession {
 
   double ErrorOf(const Twin& twin) const {
     std::vector<std::vector<double>> errors;
-    for (const MachineLog& log : logs_) errors.push_back(WindowErrors(log, twin, 0.3, false));
+    const double window = 0.3 * ScaleOverUsual(twin.plant).time;  // s
+    for (const MachineLog& log : logs_) errors.push_back(WindowErrors(log, twin, window, false));
     return PooledMedian(errors);
   }
 
@@ -346,7 +357,7 @@ class LearningSession {
   /// Says which limits a fall from upright exceeds. A motor cannot hold links that fall.
   void WarnOfFalls() {
     constexpr double kLean = 0.1;   // rad
-    constexpr double kSeconds = 3;  // of each fall
+    const double seconds = 3 * scale().time;  // of each fall
     const Manipulator body = BodyOf(twin_);
     const auto falling = [&](const PendulumState& s, double /*share*/) {
       return body.Acceleration(s, {});
@@ -354,7 +365,7 @@ class LearningSession {
     double angle = 0, velocity = 0;
     for (const double lean : {-kLean, kLean}) {
       PendulumState s{std::numbers::pi + lean, 0, 0, 0};
-      for (int i = 0; i < kSeconds / kMotionStep; ++i) {
+      for (int i = 0; i < seconds / kMotionStep; ++i) {
         s = RungeKuttaStep(s, falling(s, 0), kMotionStep, falling);
         angle = std::max(angle, LargerMagnitude(s.q1, s.q2));
         velocity = std::max(velocity, LargerMagnitude(s.w1, s.w2));
@@ -387,9 +398,10 @@ class LearningSession {
 
   RunRules TryRules(double compensation) const {
     return {.limits = c_.limits,
-            .seconds = 2 * kLongestFall + c_.hold,
+            .seconds = 2 * kLongestFall * scale().time + c_.hold,
             .is_try = true,
-            .compensation = compensation};
+            .compensation = compensation,
+            .scale = scale()};
   }
 
   /// The first controller that balances all machines drawn from the posterior, or most of them.
@@ -454,9 +466,45 @@ void LearnConfig::Describe(Options& o) {
   o.Add(&motion, "motion", {10, 3600}, "s", "longest time with torques, all runs together");
   o.Add(&computing, "computing", {1, 1e6}, "s", "longest processor time of models and controllers");
   o.Add(&hz, "hz", {100, 1000}, "1/s", "cycles per second").step = 50;
-  o.Add(&passive_torque, "passive_torque", {0, 1000}, "N·m",
-        "largest torque of the joint without the controller's motor; it only compensates friction");
-  limits.Describe(o);
+  o.Add(&length, "length", {0.02, 200}, "m",
+        "length of both links together; with --max-torque it tells the size of the machine")
+      .usual = "about that of RealAIGym's robot, 0.5";
+}
+
+Twin LearnConfig::Known() const {
+  Twin twin;
+  Plant& plant = twin.plant;
+  if (length > 0 && limits.torque > 0) {
+    plant = UsualPlant();
+    const double longer = length / (plant.length1 + plant.length2);
+    const double heavier = limits.torque / plant.torque_limit / longer;
+    for (double Plant::*m : {&Plant::mass1, &Plant::mass2}) plant.*m *= heavier;
+    for (double Plant::*l :
+         {&Plant::length1, &Plant::length2, &Plant::center1, &Plant::center2}) {
+      plant.*l *= longer;
+    }
+    for (double Plant::*I : {&Plant::inertia1, &Plant::inertia2, &Plant::armature}) {
+      plant.*I *= heavier * longer * longer;
+    }
+  }
+  plant.torque_limit = limits.torque;
+  plant.actuated_joint = actuated_joint;
+  twin.actuator.passive_limit = limits.passive_torque;
+  twin.sensors.quantum = 2 * std::numbers::pi / encoder_counts;
+  twin.sensors.velocity_share = 0.2;
+  twin.sensors.velocity_dead_zone = 0.1 * ScaleOverUsual(plant).velocity();
+  twin.loop.period = 1 / hz;
+  return twin;
+}
+
+Limits LearnConfig::DefaultLimits(double torque) const {
+  LearnConfig known = *this;
+  known.limits.torque = torque;
+  Twin twin = known.Known();
+  twin.actuator.passive_limit = Limits().passive_torque * ScaleOverUsual(twin.plant).torque;
+  Limits defaults = Limits::For(twin);
+  defaults.angle = LearnConfig().limits.angle;
+  return defaults;
 }
 
 void LearnConfig::Check() const {

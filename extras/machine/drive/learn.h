@@ -7,6 +7,7 @@
 #include "base/thread_pool.h"
 #include "extras/machine/drive/link.h"
 #include "extras/machine/drive/supervisor.h"
+#include "extras/machine/twin/twin.h"
 #include "runs/find_policy.h"
 
 /// From a machine about which nothing is known to one that balances.
@@ -21,12 +22,17 @@ struct LearnConfig {
   double hold = 10;             // time of balance that ends the learning, s
   double motion = 60;           // most time in which torques move the links, s
   double computing = 120;       // most processor time of models and controllers, s
-  double passive_torque = 0.5;  // largest torque of the joint without the controller's motor, N·m
+  double length = 0;            // of both links together, m; 0: about that of RealAIGym's robot
   int actuated_joint = 1;       // 1 or 2
   uint64_t seed = 1;            // of the excitations and of simulated tries
 
-  /// Declares each setting in `options`: name, range, unit, help.
+  /// Declares each setting but the limits in `options`: name, range, unit, help.
   void Describe(Options& options);
+  /// A twin with all that is known of the machine. With a length, its plant is UsualPlant in another
+  /// size, which the length and the torque limit tell.
+  Twin Known() const;
+  /// The default limits for the length and this torque limit (N·m).
+  Limits DefaultLimits(double torque) const;
   /// Throws BadInput without the encoders' steps, and for limits that forbid a swing-up.
   void Check() const;
 };

@@ -9,9 +9,10 @@ RunOutcome RunCycles(const LearnConfig& c, const RunRules& rules, const MachineS
                      Estimator estimator, MachineController own, MachineLink& link,
                      const std::function<bool()>& stop) {
   const int64_t hz = std::llround(c.hz);
-  Joints motor{c.passive_torque, c.passive_torque};
+  Joints motor{c.limits.passive_torque, c.limits.passive_torque};
   motor[c.actuated_joint - 1] = c.limits.torque;
   Supervisor supervisor({.limits = rules.limits,
+                         .scale = rules.scale,
                          .motor_limit = motor,
                          .actuated_joint = c.actuated_joint,
                          // Excitations make the twin that predicts the motion of a try.
@@ -31,7 +32,7 @@ RunOutcome RunCycles(const LearnConfig& c, const RunRules& rules, const MachineS
     const PendulumState& s = estimator.now();
     if (summary->driven == 0) first = s;
     if (summary->upright > 0) upright_at = summary->driven;
-    const bool lost = summary->driven - upright_at > kLongestFall ||
+    const bool lost = summary->driven - upright_at > kLongestFall * rules.scale.time ||
                       LargerMagnitude(s.q1 - first.q1, s.q2 - first.q2) > kMostTurn;
     return stop() || (rules.is_try && (lost || summary->upright >= c.hold));
   };

@@ -12,7 +12,7 @@ namespace upswing::machine {
 /// The larger absolute value.
 inline double LargerMagnitude(double a, double b) { return std::max(std::abs(a), std::abs(b)); }
 
-/// Longest time of a try without balance, s.
+/// Longest time of a try without balance, s by the scale of the machine.
 inline constexpr double kLongestFall = 6;
 
 /// Limits and length of a run, and its purpose.
@@ -22,6 +22,7 @@ struct RunRules {
   bool is_try = false;      // whether balance or a hopeless state ends it; else an excitation
   double compensation = 0;  // share of the dry friction that motors compensate
   std::string log = {};     // file; empty: none
+  Scale scale = {};         // natural units of the machine over those of UsualPlant
 };
 
 struct RunOutcome {

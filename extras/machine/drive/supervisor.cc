@@ -11,6 +11,8 @@
 namespace upswing::machine {
 namespace {
 
+// Velocities, accelerations and times are for UsualPlant, and count by the scale of the machine.
+// Ages and losses are those of the link, whatever the size.
 constexpr double kSlow = 0.3;         // velocity at which braking may end, rad/s
 constexpr double kLow = 0.9;          // cosine of a hanging link's angle: 26° from the vertical
 constexpr double kSlowSeconds = 0.2;  // time for which the links must hang that slow
@@ -19,6 +21,7 @@ constexpr double kLargestReading = 1e6;
 constexpr double kLargestStart = 100;  // rad, rad/s
 
 // Limits of plausible readings.
+constexpr double kFastest = 100;               // velocity that no joint exceeds at first, rad/s
 constexpr double kHardest = 1000;              // acceleration that no joint exceeds, rad/s²
 constexpr double kOldest = 0.001;              // age of an angle when its command comes, s
 constexpr double kShortest = 1e-4;             // time between two measurements, s
@@ -39,9 +42,9 @@ constexpr double kBrakeCycles = 2.5;  // age of a reading with which the motors 
 
 bool Within(double x, double limit) { return std::abs(x) <= limit; }  // false for NaN
 
-/// Whether both links hang slowly. Slow links that stand upright fall when the motors go off.
-bool AtRest(const PendulumState& s) {
-  return Within(s.w1, kSlow) && Within(s.w2, kSlow) && std::cos(s.q1) > kLow &&
+/// Whether both links hang, slower than `slow` (rad/s).
+bool HangSlowly(const PendulumState& s, double slow) {
+  return Within(s.w1, slow) && Within(s.w2, slow) && std::cos(s.q1) > kLow &&
          std::cos(s.q1 + s.q2) > kLow;
 }
 
@@ -60,17 +63,44 @@ SupervisorConfig WithSingleLimits(SupervisorConfig config) {
 void Limits::Describe(Options& o) {
   o.Section("limits");
   o.Add(&angle, "max_angle", {0.1, 1e3}, "rad", "largest angle of a joint; beyond it: braking");
-  o.Add(&velocity, "max_velocity", {0.1, 1e3}, "rad/s",
-        "largest velocity of a joint; beyond it: braking");
-  o.Add(&torque, "max_torque", {0, 1e3}, "N·m", "largest torque; larger ones are cut");
+  // For another size than that of RealAIGym's robot, For() has other defaults.
+  const auto by = [](const Option& option, const char* unit) {
+    return Concat(option.plain_text(), ", for another size than RealAIGym's ", unit);
+  };
+  Option* added = &o.Add(&velocity, "max_velocity", {0.1, 1e3}, "rad/s",
+                         "largest velocity of a joint; beyond it: braking");
+  added->usual = by(*added, "by the natural time");
+  added = &o.Add(&torque, "max_torque", {0, 1e6}, "N·m", "largest torque; larger ones are cut");
+  added->usual = by(*added, "the motor's limit");
+  added = &o.Add(&passive_torque, "passive_torque", {0, 1e6}, "N·m",
+                 "largest torque of the joint without the controller's motor, which only "
+                 "compensates friction and brakes");
+  added->usual = by(*added, "the limit of its motor");
   o.Add(&energy, "max_energy", {0.1, 1e3}, "",
         "largest mechanical energy, 0 hanging, 1 upright; beyond it: braking");
   o.Add(&age, "max_age", {0.001, 1}, "s", "largest age of the last reading; beyond it: a fault");
-  o.Add(&brake_damping, "brake_damping", {0, 100}, "N·m·s/rad",
-        "torque against the velocity while braking");
-  o.Add(&brake_seconds, "brake_seconds", {0, 60}, "s", "longest time of braking");
-  o.Add(&patience, "patience", {0.1, 3600}, "s",
-        "longest wait for readings and for the start state");
+  added = &o.Add(&brake_damping, "brake_damping", {0, 1e6}, "N·m·s/rad",
+                 "torque against the velocity while braking");
+  added->usual = by(*added, "by natural time and torque");
+  added = &o.Add(&brake_seconds, "brake_seconds", {0, 600}, "s", "longest time of braking");
+  added->usual = by(*added, "by the natural time");
+  added = &o.Add(&patience, "patience", {0.1, 3600}, "s",
+                 "longest wait for readings and for the start state");
+  added->usual = by(*added, "longer for a slower machine");
+}
+
+Limits Limits::For(const Twin& twin) {
+  Limits limits;
+  const Scale scale = ScaleOverUsual(twin.plant);
+  if (scale == Scale()) return limits;
+  limits.velocity *= scale.velocity();
+  limits.torque = twin.plant.torque_limit;
+  limits.passive_torque = twin.actuator.passive_limit;
+  limits.brake_damping *= scale.torque * scale.time;
+  limits.brake_seconds *= scale.time;
+  // The link and the people are as slow as before.
+  limits.patience *= std::max(1.0, scale.time);
+  return limits;
 }
 
 const char* NameOf(LoopState state) {
@@ -88,11 +118,16 @@ Supervisor::Supervisor(const SupervisorConfig& config)
       earned_({.limit = config_.motor_limit[config.actuated_joint == 1 ? 0 : 1],
                .actuated_joint = config.actuated_joint,
                .trust = config.trust,
-               .hangs = AtRest(config.start),
+               .hangs = HangSlowly(config.start, kSlow * config.scale.velocity()),
                .quantum = config.quantum,
-               .period = config.period}) {
+               .period = config.period,
+               .scale = config.scale}) {
   const double step = config_.quantum > 0 ? config_.quantum : kUnknownStep;
-  for (Joint& joint : joints_) joint.step = step;
+  for (Joint& joint : joints_) {
+    joint.step = step;
+    joint.fastest = Velocity(kFastest);
+    joint.slowest = -joint.fastest;
+  }
   constexpr size_t kLongestReason = 300;
   reason_.reserve(kLongestReason);
 }
@@ -123,7 +158,7 @@ bool Supervisor::CheckVelocity(Joint& joint, double change, double shortest, dou
   const double most = change + error, least = change - error;  // rad
   // The mean velocity between two measurements differs by half of the acceleration's effect from
   // the velocity at each of them.
-  const double differs = kHardest * longest / 2;
+  const double differs = Acceleration(kHardest) * longest / 2;
   const double fastest_mean = most > 0 ? most / shortest : most / longest;
   const double slowest_mean = least < 0 ? least / shortest : least / longest;
   const double fastest = std::min(joint.fastest + differs, fastest_mean);
@@ -136,18 +171,19 @@ bool Supervisor::CheckVelocity(Joint& joint, double change, double shortest, dou
 /// Whether the angle stays although the joint must have moved since its last change.
 bool Supervisor::IsStuck(Joint& joint, double change, double longest,
                          const CycleFacts& facts) const {
+  const double hardest = Acceleration(kHardest);
   if (change != 0) {
     if (config_.quantum <= 0) joint.step = std::min(joint.step, std::abs(change));
     joint.repeats = 0;
     joint.changed_at = facts.received;
-    joint.least_speed = (std::abs(change) - joint.step) / longest - kHardest * longest / 2;
+    joint.least_speed = (std::abs(change) - joint.step) / longest - hardest * longest / 2;
     return false;
   }
   if (++joint.repeats < kStuckReadings || joint.least_speed <= 0) return false;
   // The least motion: the joint brakes as hard as it can.
   const double v = joint.least_speed;
-  const double time = std::clamp(facts.read_at - joint.changed_at, 0.0, v / kHardest);
-  return v * time - kHardest * time * time / 2 > 2 * joint.step;
+  const double time = std::clamp(facts.read_at - joint.changed_at, 0.0, v / hardest);
+  return v * time - hardest * time * time / 2 > 2 * joint.step;
 }
 
 Complaint Supervisor::CheckMotion(const CycleFacts& facts) {
@@ -214,12 +250,12 @@ Complaint Supervisor::CheckEstimate(const CycleFacts& facts) const {
 Complaint Supervisor::CheckSlip(const CycleFacts& facts) const {
   const Expectation& e = facts.expected;
   if (!e.known || config_.trust == TwinTrust::kNever) return {};
-  if (!facts.fresh || e.gap < kLostCycles * config_.period || e.gap > kLongestLoss) return {};
+  if (!facts.fresh || e.gap < kLostCycles * config_.period || e.gap > std::max(kLongestLoss, Time(kLongestLoss))) return {};
   const Joints w{facts.state.w1, facts.state.w2};
   const double unsure = facts.received - facts.read_at + kOldest;  // of the measurement, s
   for (size_t j = 0; j < 2; ++j) {
     const double most =
-        kSlip + kSlipRate * e.gap + kSlipSteps * joints_[j].step + std::abs(w[j]) * unsure;
+        kSlip + Velocity(kSlipRate) * e.gap + kSlipSteps * joints_[j].step + std::abs(w[j]) * unsure;
     if (Within(e.innovation[j], most)) continue;
     return {"joint %.0f: after lost readings the angle is %.3g rad from its prediction",
             {static_cast<double>(j + 1), e.innovation[j]}};
@@ -252,7 +288,7 @@ Complaint Supervisor::CheckLimits(const CycleFacts& facts) const {
 void Supervisor::GoOnBraking(const CycleFacts& facts) {
   const double velocity = std::max(std::abs(facts.state.w1), std::abs(facts.state.w2));
   // The energy of an estimate is noisy, and the last torques of the controller still act at first.
-  energy_ += config_.period / kEnergyTime * (facts.energy - energy_);
+  energy_ += std::min(config_.period / Time(kEnergyTime), 1.0) * (facts.energy - energy_);
   least_energy_ = std::min(least_energy_, energy_);
   if (!Within(velocity, kBrakeShare * config_.limits.velocity) ||
       !Within(facts.energy, kBrakeShare * config_.limits.energy) ||
@@ -261,18 +297,21 @@ void Supervisor::GoOnBraking(const CycleFacts& facts) {
     return;
   }
   if (!AtRest(facts.state)) slow_since_ = facts.time;
-  const bool is_moving = facts.time - slow_since_ < kSlowSeconds;
+  const bool is_moving = facts.time - slow_since_ < Time(kSlowSeconds);
   const bool may_go_on = facts.time - since_ < config_.limits.brake_seconds;
   if (is_moving && may_go_on) return;
   ended_ = true;
   state_ = reason_.empty() ? LoopState::kIdle : LoopState::kFault;
 }
 
+/// Whether both links hang slowly. Slow links that stand upright fall when the motors go off.
+bool Supervisor::AtRest(const PendulumState& s) const { return HangSlowly(s, Velocity(kSlow)); }
+
 bool Supervisor::AtStart(const PendulumState& s) const {
   return Within(Wrapped(s.q1 - config_.start.q1), kStartAngle) &&
          Within(Wrapped(s.q2 - config_.start.q2), kStartAngle) &&
-         Within(s.w1 - config_.start.w1, kStartVelocity) &&
-         Within(s.w2 - config_.start.w2, kStartVelocity);
+         Within(s.w1 - config_.start.w1, Velocity(kStartVelocity)) &&
+         Within(s.w2 - config_.start.w2, Velocity(kStartVelocity));
 }
 
 void Supervisor::Wait(const CycleFacts& facts) {
@@ -387,7 +426,7 @@ Joints Supervisor::BrakeTorque(const CycleFacts& facts) const {
 Joints Supervisor::Torque(const Joints& controller, const CycleFacts& facts) {
   torque_ = {};
   Joints wanted{};
-  if (state_ == LoopState::kProbing) wanted = earned_.Pulse();
+  if (state_ == LoopState::kProbing) wanted = earned_.Pulse(facts.age);
   if (state_ == LoopState::kRunning) wanted = earned_.Permitted(controller);
   if (state_ == LoopState::kBraking) wanted = earned_.Permitted(BrakeTorque(facts));
   if (!std::isfinite(wanted[0]) || !std::isfinite(wanted[1])) {

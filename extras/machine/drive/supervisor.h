@@ -7,13 +7,15 @@
 #include "extras/machine/drive/earned_torque.h"
 #include "extras/machine/drive/expectation.h"
 #include "extras/machine/logs/log.h"
+#include "extras/machine/twin/twin.h"
 #include "pendulum/plant.h"
+#include "pendulum/scale.h"
 
 /// The supervisor of a control loop: it decides in each cycle who drives the motors. It has no
 /// clock, no link and no thread of its own.
 namespace upswing::machine {
 
-/// Limits of a run on a machine.
+/// Limits of a run on a machine. The defaults are for RealAIGym's robot.
 struct Limits {
   double angle = 12;           // rad
   double velocity = 25;        // rad/s
@@ -23,6 +25,12 @@ struct Limits {
   double brake_damping = 0.2;  // torque per velocity while braking, N·m·s/rad
   double brake_seconds = 5;    // longest time of braking, s
   double patience = 10;        // longest time until readings come, or the start is reached, s
+  double passive_torque = 0.5;  // of the joint without the controller's motor, N·m
+
+  /// The defaults for a machine like this twin. For another size (ScaleOverUsual) the torques are
+  /// those of the twin's motors, and velocities and times count in natural units. The age of a reading is
+  /// a matter of the link, so no size changes it.
+  static Limits For(const Twin& twin);
 
   /// Declares each setting in `options`: name, range, unit, help.
   void Describe(Options& options);
@@ -61,6 +69,9 @@ struct CycleFacts {
 /// The settings of a supervisor.
 struct SupervisorConfig {
   Limits limits;
+  // Natural units of the machine over those of UsualPlant, in which thresholds of velocity,
+  // acceleration and time count.
+  Scale scale = {};
   // State in which the controller takes over, to within kStartAngle and kStartVelocity.
   PendulumState start = {};
   Joints motor_limit{};    // largest torque of each joint, N·m
@@ -96,8 +107,8 @@ class Supervisor {
   /// Number of cycles in which a torque was clipped.
   int64_t clipped() const { return clipped_; }
 
-  // Distance from the start state at which the controller takes over.
-  static constexpr double kStartAngle = 0.3, kStartVelocity = 0.5;  // rad, rad/s
+  // Distance from the start state at which the controller takes over; rad, and rad/s by scale.
+  static constexpr double kStartAngle = 0.3, kStartVelocity = 0.5;
   static constexpr int kArmReadings = 5;  // readings in a row before the motors are armed
 
  private:
@@ -114,6 +125,11 @@ class Supervisor {
   Complaint CheckLimits(const CycleFacts& facts) const;
   void GoOnBraking(const CycleFacts& facts);
   Joints BrakeTorque(const CycleFacts& facts) const;
+  /// A velocity (rad/s), an acceleration (rad/s²) and a time (s) by the scale of the machine.
+  double Velocity(double usual) const { return usual * config_.scale.velocity(); }
+  double Acceleration(double usual) const { return Velocity(usual) / config_.scale.time; }
+  double Time(double usual) const { return usual * config_.scale.time; }
+  bool AtRest(const PendulumState& s) const;
   bool AtStart(const PendulumState& s) const;
   void Wait(const CycleFacts& facts);
   /// Checks and ends a cycle in which torques may act.
@@ -130,12 +146,11 @@ class Supervisor {
   double energy_ = 0, least_energy_ = 0;  // smoothed while braking; see Limits
   int64_t clipped_ = 0;
 
-  static constexpr double kFastest = 100;  // velocity that no joint exceeds at first, rad/s
   /// The readings of a joint.
   struct Joint {
     double angle = 0;  // last reading, rad
     double rate = 0;   // last change over the time between the commands, rad/s
-    double slowest = -kFastest, fastest = kFastest;  // velocities that the readings permit, rad/s
+    double slowest = 0, fastest = 0;                 // velocities that the readings permit, rad/s
     double step;                                     // of the encoder, rad
     int repeats = 0;                                 // readings since the angle changed
     double changed_at = 0;                           // when the last change was received, s

@@ -11,8 +11,10 @@
 namespace upswing::machine {
 namespace {
 
+// Times for UsualPlant; they count by the scale of the machine.
 constexpr double kSpan = 0.2;           // of an integral, s
 constexpr double kSlopeSpan = 0.03;     // to both sides of a slope, s
+
 constexpr double kLongestDelay = 0.02;  // s
 constexpr int kUnknowns = 12;           // J1 J2 b a G1 G2 d1 d2 f1 f2 k1 k2
 
@@ -51,6 +53,7 @@ struct Equations {
   std::vector<std::vector<double>> right;  // (delays) of the impulses, N·m·s
 };
 
+/// `period`: of the log, s, over the natural time.
 void Add(const MachineLog& log, double period, int delays, Equations& all) {
   const int m = std::max(1, static_cast<int>(kSlopeSpan / period));
   const int span = std::max(2, static_cast<int>(kSpan / period));
@@ -88,8 +91,11 @@ Plant RodsOf(const Eigen::Matrix<double, kUnknowns, 1>& x, Plant plant) {
     const Range range = options.Get(name)->range;
     return std::clamp(std::isfinite(value) ? value : range.low, range.low, range.high);
   };
-  const double J1 = x[0], b = x[2], g = plant.gravity, moment2 = std::max(x[5] / g, 1e-4);
-  const double J2 = std::max(x[1], 1e-6);  // a part at a limit of its range would stay there
+  const Scale scale = ScaleOverUsual(plant);
+  const double least_moment = 1e-4 * scale.torque;                            // kg·m
+  const double least_inertia = 1e-6 * scale.torque * scale.time * scale.time;  // kg·m²
+  const double J1 = x[0], b = x[2], g = plant.gravity, moment2 = std::max(x[5] / g, least_moment);
+  const double J2 = std::max(x[1], least_inertia);  // a part at a limit of its range would stay there
   plant.armature = within("armature", std::max(x[3], J2 / 20));
   plant.length1 = within("length1", b / moment2);
   plant.center2 = within("center2", kRod * J2 / moment2);
@@ -100,7 +106,7 @@ Plant RodsOf(const Eigen::Matrix<double, kUnknowns, 1>& x, Plant plant) {
   plant.mass1 = within("mass1", (x[4] / g - plant.mass2 * plant.length1) / plant.center1);
   const double rest = J1 - plant.armature - plant.mass2 * plant.length1 * plant.length1;
   plant.inertia1 = within("inertia1", std::max(rest - plant.mass1 * plant.center1 * plant.center1,
-                                               std::abs(J1) / 20 + 1e-6));
+                                               std::abs(J1) / 20 + least_inertia));
   plant.damping1 = within("damping1", x[6]);
   plant.damping2 = within("damping2", x[7]);
   plant.coulomb1 = within("coulomb1", x[8]);
@@ -115,7 +121,8 @@ Twin FirstTwin(std::span<const MachineLog> logs, const Twin& known) {
   const int delays = static_cast<int>(kLongestDelay / period) + 1;
   Equations all;
   all.right.resize(delays);
-  for (const MachineLog& log : logs) Add(log, period, delays, all);
+  const double natural_period = period / ScaleOverUsual(known.plant).time;
+  for (const MachineLog& log : logs) Add(log, natural_period, delays, all);
   const int n = static_cast<int>(all.left.size());
   if (n < 2 * kUnknowns) {
     throw BadInput("learn: expected a motion of 2 s for a first model, got less");

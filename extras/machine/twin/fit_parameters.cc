@@ -34,21 +34,6 @@ double FirstGuessOf(const Option& option) {
   return option.name == "lag" && option.number() == 0 ? kFirstLag : option.number();
 }
 
-/// The natural units of a plant over those of RealAIGym's machine of design C.1; see
-/// FitParameters::scale.
-Scale ScaleOverUsual(const Plant& plant) {
-  const Plant usual{.mass1 = 0.52,
-                    .mass2 = 0.63,
-                    .length1 = 0.2,
-                    .length2 = 0.3,
-                    .center1 = 0.2,
-                    .center2 = 0.26,
-                    .inertia1 = 0.01,
-                    .inertia2 = 0.01,
-                    .armature = 0.003};
-  return CarryOver(usual, plant);
-}
-
 double NumberIn(Twin twin, const std::string& name) { return OptionsOf(twin).Get(name)->number(); }
 
 }  // namespace

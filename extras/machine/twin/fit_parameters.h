@@ -59,8 +59,7 @@ class FitParameters {
   /// A setting of the twin at first, by name.
   double FirstNumber(const std::string& name) const;
 
-  /// The natural units of the first guess over those of the machine that this program's priors were
-  /// made for, design C.1 of RealAIGym; 1 for machines of about its size (CarryOver).
+  /// ScaleOverUsual of the first guess, by which priors count.
   const Scale& scale() const { return scale_; }
 
   /// Indices in θ of the machine's values.

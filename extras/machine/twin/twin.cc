@@ -194,6 +194,20 @@ std::string TwinText(const Twin& twin) {
   return text;
 }
 
+Plant UsualPlant() {
+  return {.mass1 = 0.52,
+          .mass2 = 0.63,
+          .length1 = 0.2,
+          .length2 = 0.3,
+          .center1 = 0.2,
+          .center2 = 0.26,
+          .inertia1 = 0.01,
+          .inertia2 = 0.01,
+          .armature = 0.003};
+}
+
+Scale ScaleOverUsual(const Plant& plant) { return CarryOver(UsualPlant(), plant); }
+
 double CovarianceOf(const Twin& twin, std::string_view a, std::string_view b) {
   const auto& names = twin.uncertain;
   const auto i = std::ranges::find(names, a) - names.begin();

@@ -9,6 +9,7 @@
 #include "base/rng.h"
 #include "extras/machine/logs/log.h"
 #include "pendulum/plant.h"
+#include "pendulum/scale.h"
 
 /// The twin: a model of a real machine with motors, sensors and control loop, identified from the
 /// machine's logs.
@@ -87,6 +88,13 @@ struct Twin {
   /// Declares each setting in `options`: name, range, unit, help.
   void Describe(Options& options);
 };
+
+/// RealAIGym's machine of design C.1, about as large as the machines on which this program's priors
+/// of a fit and thresholds of the control loop are tuned.
+Plant UsualPlant();
+/// The natural units of a plant over those of UsualPlant; exactly 1 unless it has another size
+/// (CarryOver). Priors and thresholds in s, rad/s and N·m are multiples of them.
+Scale ScaleOverUsual(const Plant& plant);
 
 /// The covariance of two values, by name; 0 if the twin has none.
 double CovarianceOf(const Twin& twin, std::string_view a, std::string_view b);
