@@ -81,6 +81,8 @@ class ControlLoop {
   void Run();
 
   const LoopSummary& summary() const { return summary_; }
+  /// The torques (N·m) of the last cycle, which the next one sends.
+  const Joints& torque() const { return torque_; }
 
  private:
   /// The times of a cycle by the link's clock.

@@ -90,7 +90,8 @@ struct LoopBench {
   LoopConfig config{.seconds = 2};
   MachineController machine_controller = SineTorque;
   PendulumState start{};
-  bool has_twin = true;  // else the loop knows only the encoders
+  bool has_twin = true;  // else the loop knows only the encoders and the size
+  Joints motor_limit{5, 0.5};  // N·m
   std::unique_ptr<MachineLink> link;
   std::string log_path;
   StateSource source = StateSource::kTwin;
@@ -105,8 +106,9 @@ struct LoopBench {
                          : std::make_unique<Estimator>(twin.sensors, period);
     supervisor =
         std::make_unique<Supervisor>(SupervisorConfig{.limits = limits,
+                                                      .scale = ScaleOverUsual(twin.plant),
                                                       .start = start,
-                                                      .motor_limit = {5, 0.5},
+                                                      .motor_limit = motor_limit,
                                                       .actuated_joint = config.actuated_joint,
                                                       .angle_range = twin.sensors.angle_range,
                                                       .quantum = twin.sensors.quantum,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <string>
@@ -35,6 +36,45 @@ inline Twin TestTwin() {
   twin.sensors.zero1 = 0.02;
   twin.sensors.zero2 = -0.01;
   return twin;
+}
+
+/// The units of another size as multiples of those of a machine.
+struct Image {
+  double length = 1, mass = 1, time = 1;
+
+  double inertia() const { return mass * length * length; }
+  double torque() const { return inertia() / (time * time); }
+  /// A unit of a setting, such as kg·m² or s, as a multiple of the machine's.
+  double Of(const std::string& unit) const {
+    if (unit == "kg") return mass;
+    if (unit == "m") return length;
+    if (unit == "m/s²") return length / (time * time);
+    if (unit == "kg·m²") return inertia();
+    if (unit == "N·m") return torque();
+    if (unit == "N·m·s/rad") return torque() * time;
+    if (unit == "s") return time;
+    if (unit == "rad/s") return 1 / time;
+    return 1;
+  }
+};
+
+/// The image of a twin without sessions: the same machine, with its drives, its loop and its
+/// covariance, in another size.
+inline Twin ImageOf(const Twin& twin, const Image& image) {
+  Twin copy = twin;
+  const Options options = OptionsOf(copy);
+  for (const Option& option : options.all()) {
+    if (double* const* value = std::get_if<double*>(&option.target)) {
+      **value *= image.Of(option.unit);
+    }
+  }
+  const size_t n = copy.uncertain.size();
+  for (size_t i = 0; i < n * n; ++i) {
+    for (const size_t k : {i / n, i % n}) {
+      copy.covariance[i] *= image.Of(options.Get(copy.uncertain[k])->unit);
+    }
+  }
+  return copy;
 }
 
 }  // namespace upswing::machine
