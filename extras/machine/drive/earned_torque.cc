@@ -6,19 +6,19 @@
 namespace upswing::machine {
 namespace {
 
-constexpr double kLeastStep = 1e-5;    // of encoders of an unknown step, rad; 20 bits per turn
+constexpr double kLeastStep = 1e-5;  // of encoders of an unknown step, rad; 20 bits per turn
 // Times are for UsualPlant, and count by the scale of the machine.
 constexpr double kQuietSeconds = 0.3;  // window of the readings that show whether links rest
 // Range of the readings at rest, rad. A twin knows how slow links go on.
 constexpr double kQuietAngle = 0.004, kPredictedQuietAngle = 0.03;
 
 // The pulse.
-constexpr double kFirstShare = 0.01;    // of the limit
-constexpr double kDoubling = 0.025;     // time in which the torque doubles, s
-constexpr double kSlowDoubling = 0.1;   // the same once the motor's joint has answered, s
-constexpr double kLimitSeconds = 0.04;  // time at the limit in which the joints have to answer, s
-constexpr double kDragSeconds = 0.5;    // the same for the other joint, s
-constexpr double kLargestTravel = 0.5;  // of the motor's joint until the other one answers, rad
+constexpr double kFirstShare = 0.01;     // of the limit
+constexpr double kDoubling = 0.025;      // time in which the torque doubles, s
+constexpr double kSlowDoubling = 0.1;    // the same once the motor's joint has answered, s
+constexpr double kLimitSeconds = 0.04;   // time at the limit in which the joints have to answer, s
+constexpr double kDragSeconds = 0.5;     // the same for the other joint, s
+constexpr double kLargestTravel = 0.5;   // of the motor's joint until the other one answers, rad
 constexpr double kLongestBlind = 0.025;  // age of a reading with which a pulse goes on, s
 // Least times in cycles: those at 100 Hz, the slowest rate of UsualPlant's loop.
 constexpr double kDoublingCycles = 2, kLimitCycles = 4, kBlindCycles = 2.5;

@@ -75,8 +75,8 @@ class EarnedTorque {
   bool proven() const { return proven_; }
   /// Judges the answer to the pulses so far.
   Complaint JudgePulse();
-  /// The torques (N·m) of the next cycle of the pulses, with a last reading of this age (s). A pulse
-  /// waits for readings.
+  /// The torques (N·m) of the next cycle of the pulses, with a last reading of this age (s). A
+  /// pulse waits for readings.
   Joints Pulse(double age);
   /// Judges the last cycle of a run.
   Complaint JudgeRun();

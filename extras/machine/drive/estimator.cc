@@ -211,7 +211,8 @@ void Estimator::BeginUnseen(int joint, double angle) {
 void Estimator::ExpectUnseen(const TimedReading& reading) {
   Encoders visible{};
   for (int j = 0; j < 2; ++j) {
-    const bool begins = track_.time == *begin_ || track_.time > unseen_begin_[j] + Time(kLongestUnseen);
+    const bool begins =
+        track_.time == *begin_ || track_.time > unseen_begin_[j] + Time(kLongestUnseen);
     visible[j] = std::abs(reading.angle[j] - shown_[j]) > kVisibleSteps * AngleNoise();
     // A filter that sees no motion takes it for friction.
     if (visible[j]) shown_friction_[j] = friction()[j];

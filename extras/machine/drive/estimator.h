@@ -34,8 +34,8 @@ enum class StateSource { kTwin, kDifferences };
 /// The prediction bridges lost readings. The controller gets the state at the time when its torque
 /// will act: a cycle, the motors' delay and their lag later.
 ///
-/// Noise and times are tuned on RealAIGym's machines. For twins of another size they count in natural
-/// units (ScaleOverUsual).
+/// Noise and times are tuned on RealAIGym's machines. For twins of another size they count in
+/// natural units (ScaleOverUsual).
 ///
 /// The twin also says what the encoders have to show (Expectation).
 ///

@@ -15,8 +15,8 @@ class Excitation {
   /// The share of the permitted motion that a state has; the torques keep it below 1.
   using Level = std::function<double(const PendulumState&)>;
 
-  /// `limit`: largest torque, N·m. `joint`: that of the motor, 1 or 2. `scale`: natural units of the
-  /// machine over those of UsualPlant.
+  /// `limit`: largest torque, N·m. `joint`: that of the motor, 1 or 2. `scale`: natural units of
+  /// the machine over those of UsualPlant.
   Excitation(double limit, int joint, Level level, uint64_t seed, const Scale& scale = {})
       : limit_(limit),
         slow_(kSlow * scale.velocity()),
@@ -25,7 +25,8 @@ class Excitation {
         level_(std::move(level)),
         rng_(seed, "machine: excitation") {}
 
-  /// The motor's torque (N·m) in a step of 20 ms by the scale of the machine; see MachineController.
+  /// The motor's torque (N·m) in a step of 20 ms by the scale of the machine; see
+  /// MachineController.
   double operator()(int64_t step, const PendulumState& state);
 
  private:

@@ -298,7 +298,8 @@ class LearningSession {
     });
   }
 
-  /// Fits all values to windows of this length (s by the scale). Throws Failure if no twin follows the motion.
+  /// Fits all values to windows of this length (s by the scale). Throws Failure if no twin follows
+  /// the motion.
   FitResult FitLogs(double window) const {
     window *= scale().time;
     const FitConfig config{.windows = {window, window}, .iterations = 30, .tolerance = 1e-4};
@@ -356,7 +357,7 @@ class LearningSession {
 
   /// Says which limits a fall from upright exceeds. A motor cannot hold links that fall.
   void WarnOfFalls() {
-    constexpr double kLean = 0.1;   // rad
+    constexpr double kLean = 0.1;             // rad
     const double seconds = 3 * scale().time;  // of each fall
     const Manipulator body = BodyOf(twin_);
     const auto falling = [&](const PendulumState& s, double /*share*/) {
@@ -479,8 +480,7 @@ Twin LearnConfig::Known() const {
     const double longer = length / (plant.length1 + plant.length2);
     const double heavier = limits.torque / plant.torque_limit / longer;
     for (double Plant::*m : {&Plant::mass1, &Plant::mass2}) plant.*m *= heavier;
-    for (double Plant::*l :
-         {&Plant::length1, &Plant::length2, &Plant::center1, &Plant::center2}) {
+    for (double Plant::*l : {&Plant::length1, &Plant::length2, &Plant::center1, &Plant::center2}) {
       plant.*l *= longer;
     }
     for (double Plant::*I : {&Plant::inertia1, &Plant::inertia2, &Plant::armature}) {

@@ -17,19 +17,19 @@ namespace upswing::machine {
 struct LearnConfig {
   // torque: that of the motor. angle: links that fall make some turns until they hang.
   Limits limits{.angle = 25};
-  double encoder_counts = 0;    // of a turn
-  double hz = 500;              // cycles per second
-  double hold = 10;             // time of balance that ends the learning, s
-  double motion = 60;           // most time in which torques move the links, s
-  double computing = 120;       // most processor time of models and controllers, s
-  double length = 0;            // of both links together, m; 0: about that of RealAIGym's robot
-  int actuated_joint = 1;       // 1 or 2
-  uint64_t seed = 1;            // of the excitations and of simulated tries
+  double encoder_counts = 0;  // of a turn
+  double hz = 500;            // cycles per second
+  double hold = 10;           // time of balance that ends the learning, s
+  double motion = 60;         // most time in which torques move the links, s
+  double computing = 120;     // most processor time of models and controllers, s
+  double length = 0;          // of both links together, m; 0: about that of RealAIGym's robot
+  int actuated_joint = 1;     // 1 or 2
+  uint64_t seed = 1;          // of the excitations and of simulated tries
 
   /// Declares each setting but the limits in `options`: name, range, unit, help.
   void Describe(Options& options);
-  /// A twin with all that is known of the machine. With a length, its plant is UsualPlant in another
-  /// size, which the length and the torque limit tell.
+  /// A twin with all that is known of the machine. With a length, its plant is UsualPlant in
+  /// another size, which the length and the torque limit tell.
   Twin Known() const;
   /// The default limits for the length and this torque limit (N·m).
   Limits DefaultLimits(double torque) const;

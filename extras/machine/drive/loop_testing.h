@@ -90,7 +90,7 @@ struct LoopBench {
   LoopConfig config{.seconds = 2};
   MachineController machine_controller = SineTorque;
   PendulumState start{};
-  bool has_twin = true;  // else the loop knows only the encoders and the size
+  bool has_twin = true;        // else the loop knows only the encoders and the size
   Joints motor_limit{5, 0.5};  // N·m
   std::unique_ptr<MachineLink> link;
   std::string log_path;

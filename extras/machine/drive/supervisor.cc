@@ -250,12 +250,14 @@ Complaint Supervisor::CheckEstimate(const CycleFacts& facts) const {
 Complaint Supervisor::CheckSlip(const CycleFacts& facts) const {
   const Expectation& e = facts.expected;
   if (!e.known || config_.trust == TwinTrust::kNever) return {};
-  if (!facts.fresh || e.gap < kLostCycles * config_.period || e.gap > std::max(kLongestLoss, Time(kLongestLoss))) return {};
+  if (!facts.fresh || e.gap < kLostCycles * config_.period ||
+      e.gap > std::max(kLongestLoss, Time(kLongestLoss)))
+    return {};
   const Joints w{facts.state.w1, facts.state.w2};
   const double unsure = facts.received - facts.read_at + kOldest;  // of the measurement, s
   for (size_t j = 0; j < 2; ++j) {
-    const double most =
-        kSlip + Velocity(kSlipRate) * e.gap + kSlipSteps * joints_[j].step + std::abs(w[j]) * unsure;
+    const double most = kSlip + Velocity(kSlipRate) * e.gap + kSlipSteps * joints_[j].step +
+                        std::abs(w[j]) * unsure;
     if (Within(e.innovation[j], most)) continue;
     return {"joint %.0f: after lost readings the angle is %.3g rad from its prediction",
             {static_cast<double>(j + 1), e.innovation[j]}};

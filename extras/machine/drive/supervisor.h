@@ -17,19 +17,19 @@ namespace upswing::machine {
 
 /// Limits of a run on a machine. The defaults are for RealAIGym's robot.
 struct Limits {
-  double angle = 12;           // rad
-  double velocity = 25;        // rad/s
-  double torque = 5;           // N·m
-  double energy = 4;           // 0: hanging at rest, 1: upright at rest
-  double age = 0.02;           // of the last reading, s
-  double brake_damping = 0.2;  // torque per velocity while braking, N·m·s/rad
-  double brake_seconds = 5;    // longest time of braking, s
-  double patience = 10;        // longest time until readings come, or the start is reached, s
+  double angle = 12;            // rad
+  double velocity = 25;         // rad/s
+  double torque = 5;            // N·m
+  double energy = 4;            // 0: hanging at rest, 1: upright at rest
+  double age = 0.02;            // of the last reading, s
+  double brake_damping = 0.2;   // torque per velocity while braking, N·m·s/rad
+  double brake_seconds = 5;     // longest time of braking, s
+  double patience = 10;         // longest time until readings come, or the start is reached, s
   double passive_torque = 0.5;  // of the joint without the controller's motor, N·m
 
   /// The defaults for a machine like this twin. For another size (ScaleOverUsual) the torques are
-  /// those of the twin's motors, and velocities and times count in natural units. The age of a reading is
-  /// a matter of the link, so no size changes it.
+  /// those of the twin's motors, and velocities and times count in natural units. The age of a
+  /// reading is a matter of the link, so no size changes it.
   static Limits For(const Twin& twin);
 
   /// Declares each setting in `options`: name, range, unit, help.
@@ -148,13 +148,13 @@ class Supervisor {
 
   /// The readings of a joint.
   struct Joint {
-    double angle = 0;  // last reading, rad
-    double rate = 0;   // last change over the time between the commands, rad/s
-    double slowest = 0, fastest = 0;                 // velocities that the readings permit, rad/s
-    double step;                                     // of the encoder, rad
-    int repeats = 0;                                 // readings since the angle changed
-    double changed_at = 0;                           // when the last change was received, s
-    double least_speed = 0;                          // after it, rad/s
+    double angle = 0;                 // last reading, rad
+    double rate = 0;                  // last change over the time between the commands, rad/s
+    double slowest = 0, fastest = 0;  // velocities that the readings permit, rad/s
+    double step;                      // of the encoder, rad
+    int repeats = 0;                  // readings since the angle changed
+    double changed_at = 0;            // when the last change was received, s
+    double least_speed = 0;           // after it, rad/s
   };
   bool CheckVelocity(Joint& joint, double change, double shortest, double longest) const;
   bool IsStuck(Joint& joint, double change, double longest, const CycleFacts& facts) const;

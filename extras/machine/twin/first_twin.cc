@@ -12,8 +12,8 @@ namespace upswing::machine {
 namespace {
 
 // Times for UsualPlant; they count by the scale of the machine.
-constexpr double kSpan = 0.2;           // of an integral, s
-constexpr double kSlopeSpan = 0.03;     // to both sides of a slope, s
+constexpr double kSpan = 0.2;        // of an integral, s
+constexpr double kSlopeSpan = 0.03;  // to both sides of a slope, s
 
 constexpr double kLongestDelay = 0.02;  // s
 constexpr int kUnknowns = 12;           // J1 J2 b a G1 G2 d1 d2 f1 f2 k1 k2
@@ -92,10 +92,11 @@ Plant RodsOf(const Eigen::Matrix<double, kUnknowns, 1>& x, Plant plant) {
     return std::clamp(std::isfinite(value) ? value : range.low, range.low, range.high);
   };
   const Scale scale = ScaleOverUsual(plant);
-  const double least_moment = 1e-4 * scale.torque;                            // kg·m
+  const double least_moment = 1e-4 * scale.torque;                             // kg·m
   const double least_inertia = 1e-6 * scale.torque * scale.time * scale.time;  // kg·m²
   const double J1 = x[0], b = x[2], g = plant.gravity, moment2 = std::max(x[5] / g, least_moment);
-  const double J2 = std::max(x[1], least_inertia);  // a part at a limit of its range would stay there
+  const double J2 =
+      std::max(x[1], least_inertia);  // a part at a limit of its range would stay there
   plant.armature = within("armature", std::max(x[3], J2 / 20));
   plant.length1 = within("length1", b / moment2);
   plant.center2 = within("center2", kRod * J2 / moment2);
