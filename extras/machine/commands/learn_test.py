@@ -18,6 +18,9 @@ class Learn(ProgramTest):
     def test_bad_input_is_one_line(self):
         for arguments, *words in [
                 (["machine", "learn"], "expected --link, got none"),
+                ([*LEARN, "--link", TWIN, "--length", 0.1], "--length: expected --max-torque with it, got none"),
+                ([*LEARN, "--link", TWIN, "--length", 0], "--length: expected a number in [0.02, 200]", '"0"'),
+                ([*LEARN, "--link", TWIN, "--max-torque", "strong"], "--max-torque", '"strong"'),
                 (["machine", "learn", "--link", TWIN], "expected --out FOLDER, got none"),
                 (["machine", "learn", "--link", TWIN, "--out", "today"],
                  "expected --encoder-counts, got none"),

@@ -340,6 +340,19 @@ class Run(ProgramTest):
         self.assertGreater(passive(0.8), 0.05)
         self.assertLessEqual(passive(0.8), 0.5)
 
+    def test_limits_follow_the_size_of_the_machine(self):
+        run = ["run", "energy", "--seconds", 0.1, "--max-torque"]
+        usual = self.run_here(*run, 0, "--link", TWIN)
+        self.assertNotIn("another size", usual.stdout)
+        small = self.run_here(*run, 0.1, "--link", "cloudpendulum")
+        self.assertRegex(small.stdout, r"another size .* times × 0\.41\d, torques × 0\.03\d+; "
+                         r"limits 60\.\d rad/s, 0\.1 N·m, other joint 0 N·m; braking 0\.0025\d ")
+        own = self.run_here(*run, 0.1, "--link", "cloudpendulum", "--max-velocity", 40, "--brake-damping", 0.01,
+                            "--passive-torque", 0.02)
+        self.assertIn("limits 40 rad/s, 0.1 N·m, other joint 0.02 N·m; braking 0.01 ", own.stdout)
+        for flag, wrong in (("--max-velocity", 0), ("--brake-damping", -1), ("--velocity-share", "x")):
+            self.refuse([*run, 0, "--link", TWIN, flag, wrong], f"{flag}: expected a number", f'"{wrong}"')
+
     def test_limits(self):
         done = self.run_here("run", "mpc", "--link", TWIN, "--max-velocity", 2)
         self.assert_one_line(done, 1, "velocity", "beyond the limit 2 rad/s")

@@ -110,6 +110,32 @@ TEST(Learn, BalancesAMachineThatItDoesNotKnow) {
   EXPECT_NEAR(found.b, truth.b, 0.03 * truth.b);
 }
 
+TEST(Learn, BalancesASmallMachineOfWhichItKnowsTheLength) {
+  const TempFolder folder;
+  WatchedLink link(ReadTwin("cloudpendulum", "twin"));
+  LearnConfig config = ConfigFor(2);
+  config.encoder_counts = 131112;
+  config.length = 0.1;
+  config.limits = config.DefaultLimits(0.15);
+  EXPECT_NEAR(config.limits.velocity, 25 / std::sqrt(0.1 / 0.5), 1e-6);
+  const LearnResult result = LearnOn(link, config, folder.path());
+  EXPECT_EQ(result.reason, "");
+  EXPECT_GE(link.longest_upright, 2);
+  EXPECT_LE(link.strongest[0], 0.15);
+  EXPECT_LE(link.strongest[1], 0.0151);
+  EXPECT_LT(result.motion, 30);
+}
+
+TEST(Learn, WithoutALengthTheMachineIsOfTheUsualSize) {
+  LearnConfig config = ConfigFor(2);
+  for (const double torque : {0.1, 1.0, 5.0, 100.0}) {
+    config.limits.torque = torque;
+    EXPECT_EQ(ScaleOverUsual(config.Known().plant), Scale());
+    EXPECT_EQ(config.DefaultLimits(torque).velocity, Limits().velocity);
+    EXPECT_EQ(config.DefaultLimits(torque).angle, 25);
+  }
+}
+
 TEST(Learn, ExcitationsStayWithinTheLimits) {
   const TempFolder folder;
   WatchedLink link(StrangeTwin());

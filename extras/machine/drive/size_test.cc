@@ -203,6 +203,28 @@ TEST(Size, AnImageHasTheUnitsOfTheImage) {
   EXPECT_EQ(ScaleOverUsual(TestTwin().plant), Scale());
 }
 
+TEST(Size, LimitsFollowTheMachine) {
+  for (const Twin& twin : {TestTwin(), ReadTwin("realaigym-twin", "twin")}) {
+    const Limits usual, limits = Limits::For(twin);
+    EXPECT_EQ(limits.velocity, usual.velocity);
+    EXPECT_EQ(limits.torque, usual.torque);
+    EXPECT_EQ(limits.passive_torque, usual.passive_torque);
+    EXPECT_EQ(limits.brake_damping, usual.brake_damping);
+    EXPECT_EQ(limits.patience, usual.patience);
+  }
+  const Image image = Images()[1];
+  const Twin large = ImageOf(Original(), image);
+  const Limits limits = Limits::For(large);
+  EXPECT_NEAR(limits.velocity, 25 / image.time, 1e-9);
+  EXPECT_EQ(limits.torque, large.plant.torque_limit);
+  EXPECT_EQ(limits.passive_torque, large.actuator.passive_limit);
+  EXPECT_NEAR(limits.brake_damping, 0.2 * image.torque() * image.time, 1e-6);
+  EXPECT_NEAR(limits.brake_seconds, 5 * image.time, 1e-9);
+  EXPECT_NEAR(limits.patience, 10 * image.time, 1e-9);
+  EXPECT_EQ(limits.age, Limits().age);
+  EXPECT_EQ(Limits::For(ImageOf(Original(), Images()[0])).patience, Limits().patience);
+}
+
 TEST(Size, AMachineAndItsImagesHaveTheSameRuns) {
   const double unit = 3.9;  // of the original machine's torque, N·m: its gravity
   for (const Story& story : Stories()) {
