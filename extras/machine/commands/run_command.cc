@@ -112,7 +112,7 @@ Twin KnownMachine(const LoadedPolicy& policy, const std::optional<Twin>& twin) {
   return machine;
 }
 
-/// The settings for the machine: those that are given, and the defaults for its size.
+/// The given settings, and the defaults for the size of the machine.
 SizedSettings SettingsFor(const RunArguments& a, const Twin& machine) {
   SizedSettings settings = SizedSettings::For(machine);
   SetFlags(OptionsOf(settings), a.sized);
