@@ -12,9 +12,11 @@
 namespace upswing::machine {
 namespace {
 
-constexpr double kCubicSpan = 0.02;  // s, to both sides of a start
-constexpr int kCubicRows = 6;        // fewest rows for the cubic
-constexpr double kMargin = 0.05;     // s, between a window and an end of its log
+constexpr double kCubicSpan = 0.02;    // s, to both sides of a start
+constexpr int kCubicRows = 6;          // fewest rows for the cubic
+constexpr double kMargin = 0.05;       // s, between a window and an end of its log
+constexpr double kGapCycles = 5;       // usual cycles of the longest gap in a window
+constexpr double kLongestStall = 0.1;  // longest gap in a window of a log without better ones, s
 
 /// The state at a row: value and slope of the cubics through the angles around it.
 PendulumState StateAt(const MachineLog& log, int row) {
@@ -37,26 +39,59 @@ PendulumState StateAt(const MachineLog& log, int row) {
   return {cubic(0, 0), cubic(0, 1), cubic(1, 0) / kCubicSpan, cubic(1, 1) / kCubicSpan};
 }
 
-bool KeepsRules(const MachineLog& log, int first, int last, const WindowRules& rules,
-                double length1, double length2, double longest_gap) {
-  Joints sum{}, squares{};
-  for (int k = first; k < last; ++k) {
-    const Joints& q = log.angle[k];
-    const double height = -length1 * std::cos(q[0]) - length2 * std::cos(q[0] + q[1]);
-    if (height > rules.highest * (length1 + length2)) return false;
-    if (k > first && log.time[k] - log.time[k - 1] > longest_gap) return false;
-    for (int j = 0; j < 2; ++j) {
-      sum[j] += q[j] - log.angle[first][j];
-      squares[j] += (q[j] - log.angle[first][j]) * (q[j] - log.angle[first][j]);
+/// Cuts a log into windows.
+struct LogCutter {
+  const MachineLog& log;
+  int index;  // of the log
+  const WindowRules& rules;
+  double length1, length2;  // m
+
+  /// The windows without a gap longer than this (s).
+  std::vector<LogWindow> Cut(double longest_gap) const {
+    std::vector<LogWindow> windows;
+    const double end = log.time.back() - kMargin;
+    for (double start = log.time.front() + kMargin; start + rules.seconds < end;
+         start += rules.hop) {
+      const int first = RowAt(start);
+      // A start within a gap moves to the gap's end, with as many hops as that takes.
+      const double ahead = log.time[first] - start;
+      if (ahead > rules.hop) {
+        start += (std::ceil(ahead / rules.hop) - 1) * rules.hop;
+        continue;
+      }
+      const int last = RowAt(log.time[first] + rules.seconds);
+      if (KeepsRules(first, last, longest_gap)) {
+        windows.push_back({index, first, last, StateAt(log, first)});
+      }
     }
+    return windows;
   }
-  const double n = last - first;
-  double motion = 0;
-  for (int j = 0; j < 2; ++j) {
-    motion += std::sqrt(std::max(0.0, squares[j] / n - sum[j] / n * sum[j] / n));
+
+  /// The first row at a time (s) or later.
+  int RowAt(double time) const {
+    return static_cast<int>(std::ranges::lower_bound(log.time, time) - log.time.begin());
   }
-  return motion >= rules.motion;
-}
+
+  bool KeepsRules(int first, int last, double longest_gap) const {
+    Joints sum{}, squares{};
+    for (int k = first; k < last; ++k) {
+      const Joints& q = log.angle[k];
+      const double height = -length1 * std::cos(q[0]) - length2 * std::cos(q[0] + q[1]);
+      if (height > rules.highest * (length1 + length2)) return false;
+      if (k > first && log.time[k] - log.time[k - 1] > longest_gap) return false;
+      for (int j = 0; j < 2; ++j) {
+        sum[j] += q[j] - log.angle[first][j];
+        squares[j] += (q[j] - log.angle[first][j]) * (q[j] - log.angle[first][j]);
+      }
+    }
+    const double n = last - first;
+    double motion = 0;
+    for (int j = 0; j < 2; ++j) {
+      motion += std::sqrt(std::max(0.0, squares[j] / n - sum[j] / n * sum[j] / n));
+    }
+    return motion >= rules.motion;
+  }
+};
 
 }  // namespace
 
@@ -77,25 +112,11 @@ std::vector<LogWindow> CutWindows(std::span<const MachineLog> logs, const Window
   for (int index = 0; index < static_cast<int>(logs.size()); ++index) {
     const MachineLog& log = logs[index];
     if (log.rows() < kCubicRows) continue;
-    const double longest_gap = 5 * UsualCycle(std::span(&log, 1));
-    const double end = log.time.back() - kMargin;
-    for (double start = log.time.front() + kMargin; start + rules.seconds < end;
-         start += rules.hop) {
-      const auto row = [&](double time) {
-        return static_cast<int>(std::ranges::lower_bound(log.time, time) - log.time.begin());
-      };
-      const int first = row(start);
-      // A start within a gap moves to the gap's end, with as many hops as that takes.
-      const double ahead = log.time[first] - start;
-      if (ahead > rules.hop) {
-        start += (std::ceil(ahead / rules.hop) - 1) * rules.hop;
-        continue;
-      }
-      const int last = row(log.time[first] + rules.seconds);
-      if (KeepsRules(log, first, last, rules, length1, length2, longest_gap)) {
-        windows.push_back({index, first, last, StateAt(log, first)});
-      }
-    }
+    const LogCutter cutter{log, index, rules, length1, length2};
+    std::vector<LogWindow> own = cutter.Cut(kGapCycles * UsualCycle(std::span(&log, 1)));
+    // A loop that stalls again and again holds its torques meanwhile.
+    if (own.empty()) own = cutter.Cut(kLongestStall);
+    windows.insert(windows.end(), own.begin(), own.end());
   }
   return windows;
 }

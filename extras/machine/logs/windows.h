@@ -31,8 +31,9 @@ struct LogWindow {
   }
 };
 
-/// The windows of these logs that keep the rules and have no gap longer than five median cycles.
-/// `length1`, `length2`: lengths of the links, m.
+/// The windows of these logs that keep the rules and have no gap longer than five median cycles. Of
+/// a log without such a window, those with gaps of up to 0.1 s: a loop that stalls holds its
+/// torques. `length1`, `length2`: lengths of the links, m.
 std::vector<LogWindow> CutWindows(std::span<const MachineLog> logs, const WindowRules& rules,
                                   double length1, double length2);
 
