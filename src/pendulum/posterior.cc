@@ -10,8 +10,8 @@ namespace upswing {
 namespace {
 
 constexpr double kRounding = 1e-6;  // of a correlation
-// Smallest centre of mass (m) and inertia (kg·m²) of a link that is no capsule.
-constexpr double kSmallestLink = 1e-5;
+// Smallest centre of mass and inertia of a link that is no capsule: those of 0 are a capsule's.
+constexpr double kSmallestCenter = 1e-5, kSmallestInertia = 1e-9;  // m, kg·m²
 constexpr std::string_view kLatency = "sensor_latency";
 
 // Parameters of the plant that identification cannot find.
@@ -21,8 +21,10 @@ constexpr std::string_view kCertain[] = {"torque_limit", "actuated_joint", "roto
 }  // namespace
 
 Range UncertainRange(const Option& option) {
-  const bool of_link = option.name.starts_with("center") || option.name.starts_with("inertia");
-  return {of_link ? kSmallestLink : option.range.low, option.range.high};
+  Range range = option.range;
+  if (option.name.starts_with("center")) range.low = kSmallestCenter;
+  if (option.name.starts_with("inertia")) range.low = kSmallestInertia;
+  return range;
 }
 
 std::optional<std::vector<double>> FactorRow(const std::vector<double>& covariance,

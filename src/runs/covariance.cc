@@ -14,7 +14,7 @@
 namespace upswing {
 namespace {
 
-constexpr size_t kMostUncertain = 32;
+constexpr size_t kMostUncertain = 64;
 constexpr double kRounding = 1e-6;
 
 /// The numbers of a twin that are not settings of its plant (extras/machine/twin/twin.h).
@@ -23,12 +23,21 @@ constexpr std::array kOfMachine{
     "current_inertia", "quantum", "angle_range",    "torque_quantum",
     "zero1",           "zero2",   "velocity_share", "velocity_dead_zone",
     "period",          "jitter",  "late_share",     "late"};
+/// Its harmonics of cogging (extras/machine/twin/cogging.h). Each has a sine and a cosine at each
+/// joint.
+constexpr std::array kHarmonics{"pole_pairs", "slots",   "poles", "2_slots",
+                                "2_poles",    "3_slots", "common"};
 
 /// Throws BadInput unless `name` is one number of a twin. An alias such as `mass` is two.
 void CheckName(const std::string& name, const std::string& place) {
   const Plant plant;
   const Options options = OptionsOf(plant);
   std::vector<std::string> known(kOfMachine.begin(), kOfMachine.end());
+  for (const char* harmonic : kHarmonics) {
+    for (const char* kind : {"sine1_", "sine2_", "cosine1_", "cosine2_"}) {
+      known.push_back(Concat(kind, harmonic));
+    }
+  }
   for (const Option& option : options.all()) {
     const bool is_number = std::holds_alternative<double*>(option.target) && option.step == 0;
     if (is_number) known.push_back(option.name);

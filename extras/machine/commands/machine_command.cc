@@ -34,7 +34,7 @@ struct MachineArguments {
   std::string columns, figure, plant, out, twin, csv;
   std::vector<std::string> against;
   int64_t folds = 5, threads = 0;
-  double seconds = 1;
+  double seconds = 0;  // 0: by the natural time of the machine
   bool as_json = false, one_body = false;
 };
 
@@ -269,7 +269,8 @@ void PrintIdentification(const Identification& found, size_t logs) {
   fmt::print("{} in {}\n", Counted(found.fit.windows, "window"),
              Counted(static_cast<int64_t>(logs), "log"));
   if (!found.structures.empty()) {
-    fmt::print("\nmodel                                    error on left-out runs, 1 s, rad\n");
+    fmt::print("\nmodel                                    error on left-out runs, {:.2g} s, rad\n",
+               found.seconds);
     for (size_t s = 0; s < found.structures.size(); ++s) {
       fmt::print("{} {:<40} {:.4f}\n", static_cast<int>(s) == found.chosen ? "*" : " ",
                  found.structures[s].structure.name, found.structures[s].error);
@@ -339,8 +340,9 @@ Identification FitShowingProgress(const MachineArguments& a, std::span<const Mac
   config.folds = Adapts(a) ? 0 : static_cast<int>(a.folds);
   config.one_body = a.one_body;
   config.fit.adapts = Adapts(a);
-  config.fit.windows.seconds = a.seconds;
-  config.fit.windows.hop = a.seconds / 2;
+  const double seconds = a.seconds > 0 ? a.seconds : ScaleOverUsual(first.plant).time;
+  config.fit.windows.seconds = seconds;
+  config.fit.windows.hop = seconds / 2;
   EpisodeProgress progress(a.as_json, "fits");
   Identification found = Identify(logs, first, config, &pool, std::ref(progress));
   found.fit.twin.name = std::filesystem::path(a.out).stem().string();
@@ -437,13 +439,15 @@ void AddIdentify(CommandLine& line) {
   Options own;
   own.Add(&a.folds, "folds", {0, 100}, "",
           "number of folds of the cross-validation that chooses the model; 0: none");
-  own.Add(&a.seconds, "seconds", {0.05, 10}, "s", "length of a window");
+  own.Add(&a.seconds, "seconds", {0, 10}, "s",
+          "length of a window; 0: 1 s, counted in the natural time of machines of another size");
   line.Arguments(own);
   line.Notes(
       "Fits masses, centres, inertias, friction, delay and lag to windows of the logs. Each\n"
       "window has a free start state. The commanded torques drive the model; the reported\n"
       "ones are a second measurement. Cross-validation chooses the model. The twin's\n"
-      "covariance includes the differences between sessions.\n"
+      "covariance includes the differences between sessions. If the plant file has slots and\n"
+      "poles in a table [cogging], the fit finds the cogging of motors without gears.\n"
       "Exit code: 0, or 1 if the twin's logs have faults; see machine check.\n");
   line.Examples(
       "  ./upswing machine identify logs/*.csv --plant realaigym-c1 --out twin.toml\n"

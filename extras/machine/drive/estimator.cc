@@ -74,10 +74,10 @@ double Estimator::VelocityNoise(bool disturbed) const {
 
 Estimator::Vector Estimator::Follow(const Drive& drive, Vector x, double begin,
                                     double seconds) const {
-  const int steps = MotionSteps(seconds);
+  Body body = model_->body;
+  const int steps = MotionSteps(body, seconds);
   const double h = seconds / steps;
   if (h <= 0) return x;
-  Manipulator body = model_->body;
   body.f1 = x[kFriction];
   body.f2 = x[kFriction + 1];
   MotionIntegrator integrator(body, drive);

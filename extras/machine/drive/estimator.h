@@ -71,7 +71,7 @@ class Estimator {
   using Matrix = Eigen::Matrix<double, kStates, kStates>;
 
   struct Model {
-    Manipulator body;
+    Body body;
     Drive drive;
     Drive silent;    // the drive's torques until the response began
     Scale scale;     // natural units of the twin over those of UsualPlant

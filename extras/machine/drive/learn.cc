@@ -304,7 +304,7 @@ class LearningSession {
     window *= scale().time;
     const FitConfig config{.windows = {window, window}, .iterations = 30, .tolerance = 1e-4};
     std::vector<std::string> values =
-        Structures(/*has_motors=*/true, /*one_body=*/false).back().values;
+        Structures(/*has_motors=*/true, twin_.cogging.any(), /*one_body=*/false).back().values;
     values.emplace_back("length1");
     std::vector<MachineLog> logs = logs_;
     if (result_.tries > 0) logs.push_back(logs_.back());

@@ -77,7 +77,7 @@ class FitParameters {
   /// The values of a session that differ from the machine's.
   Session SessionAt(const Eigen::VectorXd& theta, int session) const;
 
-  /// ∂c/∂θ (kConstants × n) of a session, where c are the constants of its twin (ConstantsOf).
+  /// ∂c/∂θ (NumConstants × n) of a session, where c are the constants of its twin (ConstantsOf).
   Eigen::MatrixXd Slope(const Eigen::VectorXd& theta, int session) const;
 
  private:

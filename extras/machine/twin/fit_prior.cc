@@ -15,12 +15,18 @@ using Eigen::VectorXd;
 // Variance of a new session, as a multiple of the twin's: real machines change more from session to
 // session than the few that a twin knows.
 constexpr double kNewSession = 10;
+constexpr double kCogging =
+    0.04;  // deviation of a coefficient, N·m in units of FitParameters::scale
 
 /// Typical differences of a value: standard deviations of its prior.
 struct Deviations {
   double sessions;  // of a session's value about the machine's; 0: a tenth of the guess
   double guess;     // of the machine's value about a guess without covariance; 0: half of the guess
 };
+
+bool IsCogging(const std::string& name) {
+  return name.starts_with("sine") || name.starts_with("cosine");
+}
 
 /// Encoders' zeros in rad, dry friction in N·m, times in s. Friction and inertia are in units of
 /// `scale`; times are those of motors and buses of any size.
@@ -32,6 +38,7 @@ Deviations DeviationsOf(const std::string& name, const Scale& scale) {
       {"armature", {0.001, 0.005}},     {"current_inertia", {0.0005, 0.005}},
       {"delay", {0.001, 0.005}},        {"lag", {0.001, 0.005}},
       {"current_delay", {0.001, 0.005}}};
+  if (IsCogging(name)) return {kCogging * scale.torque, kCogging * scale.torque};
   const auto found = kDeviations.find(name);
   if (found == kDeviations.end()) return {0, 0};
   double unit = 1;
@@ -89,9 +96,10 @@ FitPrior::FitPrior(const FitParameters& parameters)
 FitPrior FitPrior::OfMachine(const FitParameters& parameters) {
   FitPrior prior(parameters);
   // Motors take milliseconds. Without reported torques, much larger delays can imitate friction.
+  // Harmonics that a log hardly tells apart stay small.
   for (const int i : parameters.IndicesOfMachine()) {
     const std::string& name = parameters[i].name;
-    if (IsTimeOfMotor(name))
+    if (IsTimeOfMotor(name) || IsCogging(name))
       prior.inverse_(i, i) = std::pow(DeviationsOf(name, parameters.scale()).guess, -2);
   }
   prior.first_between_sessions_ = FirstBetweenSessions(parameters);

@@ -162,6 +162,39 @@ TEST(Fit, FindsTheMachineBehindItsLogs) {
 }
 
 /// The machine of today has other zeros, friction and lag. A log of 5 s shows them.
+/// Torques of up to 0.06 N·m at harmonics that are close to each other.
+TEST(Fit, FindsTheCoggingOfTheMotors) {
+  ThreadPool pool(2);
+  Rng rng(11, "cogging");
+  Twin machine = SomeMachine(rng);
+  machine.cogging.slots = 12;
+  machine.cogging.poles = 14;
+  for (auto& coefficients : machine.cogging.coefficients) {
+    for (double& c : coefficients) c = rng.Uniform(-0.06, 0.06);
+  }
+  const std::vector<MachineLog> logs = LogsOf(machine, 4, 5, 300),
+                                later = LogsOf(machine, 1, 5, 400);
+  Twin guess = FirstGuess();
+  Structure structure{"without", kValues};
+  const Twin without = Fit(logs, guess, structure, kWindowsInARow, &pool).twin;
+  guess.cogging.slots = 12;
+  guess.cogging.poles = 14;
+  const std::vector<std::string> coefficients = CoggingCoefficients();
+  structure.values.insert(structure.values.end(), coefficients.begin(), coefficients.end());
+  const Twin with = Fit(logs, guess, structure, kWindowsInARow, &pool).twin;
+  double squares = 0;
+  for (const std::string& name : coefficients) {
+    const double error = ValueOf(with, name) - ValueOf(machine, name);
+    EXPECT_LT(std::abs(error), 5 * std::sqrt(CovarianceOf(with, name, name)) + 0.003) << name;
+    squares += error * error;
+  }
+  EXPECT_LT(std::sqrt(squares / std::ssize(coefficients)), 0.01);
+  const auto error = [&](const Twin& twin) {
+    return Median(WindowErrors(later.front(), twin, 1, /*reported=*/false));
+  };
+  EXPECT_LT(error(with), error(without) / 4);
+}
+
 TEST(Fit, AdaptsATwinToANewSession) {
   ThreadPool pool(2);
   Rng rng(3, "machine");

@@ -12,7 +12,7 @@
 namespace upswing::machine {
 namespace {
 
-constexpr double kJudgedSeconds = 1;  // length of the windows that choose a structure
+constexpr double kJudgedSeconds = 1;  // length of the windows that choose a structure, s
 constexpr double kWorthwhile = 0.95;  // largest error of a better structure, as a share of the best
 
 /// The fold of each log: the logs of a session are dealt in turn. If all sessions have a single
@@ -66,6 +66,10 @@ void ExpectCommands(const MachineLog& log) {
   }
 }
 
+/// Length (s) of the windows that choose a structure. For machines of another size it counts in
+/// their natural time.
+double JudgedSeconds(const Twin& twin) { return kJudgedSeconds * ScaleOverUsual(twin.plant).time; }
+
 /// Progress of several fits of equal weight, one after the other.
 class FitCounter {
  public:
@@ -86,7 +90,7 @@ class FitCounter {
 /// Twins of a structure from logs without those of a fold.
 struct LeftOut {
   std::vector<Twin> twins;  // (logs) the twin that has not seen the log
-  double error;             // MeanOfSessions over 1 s, rad
+  double error;             // MeanOfSessions over JudgedSeconds, rad
 };
 
 /// Fits structures to the logs without a fold, and predicts those of the fold.
@@ -98,6 +102,7 @@ class CrossValidation {
         fold_of_(Folds(logs, config.folds)),
         guesses_(config.folds, first),
         config_(config.fit),
+        seconds_(JudgedSeconds(first)),
         pool_(pool),
         counter_(counter) {
     // A comparison needs less than a result: windows in a row, and fewer digits.
@@ -118,7 +123,7 @@ class CrossValidation {
     }
     std::vector<std::vector<double>> errors(n);
     ParallelFor(pool_, n, [&](int i) {
-      errors[i] = WindowErrors(logs_[i], result.twins[i], kJudgedSeconds, /*reported=*/false);
+      errors[i] = WindowErrors(logs_[i], result.twins[i], seconds_, /*reported=*/false);
     });
     result.error = MeanOfSessions(logs_, errors);
     return result;
@@ -137,6 +142,7 @@ class CrossValidation {
   std::vector<int> fold_of_;   // (logs)
   std::vector<Twin> guesses_;  // (folds)
   FitConfig config_;
+  double seconds_;  // length of the windows that choose a structure
   ThreadPool* pool_;
   FitCounter& counter_;
 };
@@ -187,7 +193,7 @@ CycleTiming TimingOf(const std::vector<double>& cycles) {
 
 }  // namespace
 
-std::vector<Structure> Structures(bool has_motors, bool one_body) {
+std::vector<Structure> Structures(bool has_motors, bool cogging, bool one_body) {
   std::vector<Structure> structures;
   Structure now{"", {"center1", "inertia1", "inertia2"}};
   const auto add = [&](const char* name, const std::vector<std::string>& more) {
@@ -205,6 +211,7 @@ std::vector<Structure> Structures(bool has_motors, bool one_body) {
   }
   now.of_session.insert(now.of_session.end(), {"zero1", "zero2"});
   add("and zeros of each session", {"zero1", "zero2"});
+  if (cogging) add("and cogging of the motors", CoggingCoefficients());
   if (!has_motors || one_body) return structures;
   now.of_session.insert(now.of_session.end(),
                         {"center1", "center2", "inertia1", "inertia2", "armature"});
@@ -215,10 +222,12 @@ std::vector<Structure> Structures(bool has_motors, bool one_body) {
 Identification Identify(std::span<const MachineLog> logs, const Twin& first,
                         const IdentifyConfig& config, ThreadPool* pool, const Progress& progress) {
   for (const MachineLog& log : logs) ExpectCommands(log);
-  const std::vector<Structure> structures = Structures(HasCommands(logs), config.one_body);
+  const std::vector<Structure> structures =
+      Structures(HasCommands(logs), first.cogging.any(), config.one_body);
   const int folds = config.folds >= 2 ? config.folds : 0;
   FitCounter counter(1.0 + folds * static_cast<double>(structures.size()), progress);
   Identification result;
+  result.seconds = JudgedSeconds(first);
   result.chosen = static_cast<int>(structures.size()) - 1;
   if (folds > 0) {
     CrossValidation validation(logs, first, config, pool, counter);

@@ -11,13 +11,14 @@ namespace upswing::machine {
 
 /// The structures to choose from. Each adds values to the structure before it. `has_motors`:
 /// whether the logs have torques. A motion without torques determines only ratios of masses; then
-/// the centre of link 2 stays at the first guess. `one_body`: all sessions have the same body.
-std::vector<Structure> Structures(bool has_motors, bool one_body);
+/// the centre of link 2 stays at the first guess. `cogging`: whether the motors cog. `one_body`:
+/// all sessions have the same body.
+std::vector<Structure> Structures(bool has_motors, bool cogging, bool one_body);
 
 /// A structure's errors on runs that were left out.
 struct StructureError {
   Structure structure;
-  double error;  // geometric mean over sessions of the median error at 1 s, rad
+  double error;  // geometric mean over sessions of the median error of a window, rad
 };
 
 /// Settings of an identification with cross-validation.
@@ -34,6 +35,7 @@ struct Identification {
   FitResult fit;                           // from all logs, with the chosen structure
   std::vector<StructureError> structures;  // empty without cross-validation
   int chosen = 0;                          // index of the structure
+  double seconds = 1;                      // length of the windows that choose it
   // The twin of the other folds for each log; empty without cross-validation.
   std::vector<Twin> left_out;
 };

@@ -7,22 +7,26 @@
 
 #include "pendulum/regressor.h"
 #include "pendulum/runge_kutta.h"
+#include "pendulum/timestep.h"
 
 namespace upswing::machine {
 namespace {
 
-using StateTangents = Eigen::Matrix<double, kTangents, 4>;
-using JointTangents = Eigen::Matrix<double, kTangents, 2>;
+// Largest decay by friction in a step (FastestDecayOf). Near rest dry friction is 13 times steeper.
+constexpr double kFollowedDecay = 0.1;
+
+using StateTangents = TangentMatrix<4>;
+using JointTangents = TangentMatrix<2>;
 
 /// The derivative of DryFriction(1, w) by w, s/rad.
 double FrictionSlope(double w) {
   return kFrictionSlope / (1 + kFrictionSlope * kFrictionSlope * w * w);
 }
 
-/// ∂F/∂(q1, q2, w1, w2) of F = M q̈ + c + g + d q̇ + f atan(100 q̇) at both joints, with q̈ held. Dry
-/// friction is added to the derivatives of the rest, because dual numbers take longer for it.
-Eigen::Matrix<double, 4, 2> ForceByState(const Manipulator& m, const PendulumState& s,
-                                         const Joints& a) {
+/// ∂F/∂(q1, q2, w1, w2) of F = M q̈ + c + g + d q̇ + f atan(100 q̇) - cogging at both joints, with q̈
+/// held. Dry friction and cogging are added to the derivatives of the rest, because dual numbers
+/// take longer for them.
+Eigen::Matrix<double, 4, 2> ForceByState(const Body& m, const PendulumState& s, const Joints& a) {
   using Dual = Eigen::AutoDiffScalar<Eigen::Vector4d>;
   using Pair = dynamics::JointPair<Dual>;
   const Pair q{{s.q1, 4, 0}, {s.q2, 4, 1}}, w{{s.w1, 4, 2}, {s.w2, 4, 3}};
@@ -35,31 +39,39 @@ Eigen::Matrix<double, 4, 2> ForceByState(const Manipulator& m, const PendulumSta
   derivatives << F1.derivatives(), F2.derivatives();
   derivatives(2, 0) += m.f1 * FrictionSlope(s.w1);
   derivatives(3, 1) += m.f2 * FrictionSlope(s.w2);
+  const Joints cogging = m.cogging.SlopeAt({s.q1, s.q2});
+  derivatives(0, 0) -= cogging[0];
+  derivatives(1, 1) -= cogging[1];
   return derivatives;
 }
 
 /// Derivatives of the acceleration q̈ in state s, from those of the state. The equations of motion
 /// F(q̈, s, p) = τ are linear in the constants p, so M dq̈ = dτ - ∂F/∂s ds - Y dp.
-JointTangents AccelerationTangents(const Manipulator& m, const PendulumState& s, const Joints& a,
+JointTangents AccelerationTangents(const Body& m, const PendulumState& s, const Joints& a,
                                    const DriveTangents& torque, const StateTangents& state) {
   const auto angles = dynamics::AnglesOf<double>({s.q1, s.q2});
   const Factors Y = Regressor(angles, {s.w1, s.w2}, {a[0], a[1]});
-  JointTangents force = state * ForceByState(m, s, a);
+  const Joints q{s.q1, s.q2};
+  JointTangents force = state.lazyProduct(ForceByState(m, s, a));
   for (int j = 0; j < 2; ++j) {
     force.col(j).segment<kNumManipulatorConstants>(tangent::kBody) +=
         Eigen::Map<const Eigen::Vector<double, kNumManipulatorConstants>>(Y[j].data());
     force(tangent::kDelay, j) -= torque.by_delay[j];
     force(tangent::kLag, j) -= torque.by_lag[j];
+    if (!m.cogging.any()) continue;
+    const auto factors = m.cogging.Factors(q[j]);
+    force.col(j).segment<Cogging::kCoefficients>(tangent::kCogging + j * Cogging::kCoefficients) -=
+        Eigen::Map<const Eigen::Vector<double, Cogging::kCoefficients>>(factors.data());
   }
   const MassMatrix M = m.Mass(angles.c2);
   Eigen::Matrix2d inverse;
   inverse << M.M22, -M.M12, -M.M12, M.M11;
-  return force * (inverse / -M.det);
+  return force.lazyProduct(inverse / -M.det);
 }
 
 /// The derivatives of the rate of a state: q̇1, q̇2, q̈1, q̈2.
 StateTangents RateOf(const PointTangents& point) {
-  StateTangents rate;
+  StateTangents rate(point.state.rows(), 4);
   rate << point.state.rightCols<2>(), point.acceleration;
   return rate;
 }
@@ -115,17 +127,27 @@ void FillAcceleration(const PredictedStep& step, double moment, int k, Motion& m
 
 }  // namespace
 
-Manipulator BodyOf(const Twin& twin, bool reported) {
-  Manipulator body = ManipulatorOf(twin.plant);
+Joints Body::Acceleration(const PendulumState& s, const Joints& torque) const {
+  if (!cogging.any()) return Manipulator::Acceleration(s, torque);
+  const Joints magnets = cogging.At({s.q1, s.q2});
+  return Manipulator::Acceleration(s, {torque[0] + magnets[0], torque[1] + magnets[1]});
+}
+
+Body BodyOf(const Twin& twin, bool reported) {
+  Body body{ManipulatorOf(twin.plant), CoggingTorque(twin.cogging)};
   if (reported) {
     body.J1 -= twin.actuator.current_inertia;
     body.a -= twin.actuator.current_inertia;
   }
+  while (body.longest_step > kShortestMotionStep &&
+         FastestDecayOf(body).rate * body.longest_step > kFollowedDecay) {
+    body.longest_step /= 2;
+  }
   return body;
 }
 
-int MotionSteps(double seconds) {
-  return std::max(1, static_cast<int>(std::ceil(seconds / kMotionStep - 1e-9)));
+int MotionSteps(const Body& body, double seconds) {
+  return std::max(1, static_cast<int>(std::ceil(seconds / body.longest_step - 1e-9)));
 }
 
 MotionPoint MotionIntegrator::Start(double time, const PendulumState& state) {
@@ -137,7 +159,7 @@ MotionPoint MotionIntegrator::Start(double time, const PendulumState& state,
   DriveTangents of_torque;
   const Joints torque = drive_.At(time, cursor_, &of_torque);
   const MotionPoint point{time, state, body_.Acceleration(state, torque)};
-  tangents.state.setIdentity();
+  tangents.state.setIdentity(body_.tangents(), 4);
   tangents.acceleration =
       AccelerationTangents(body_, state, point.acceleration, of_torque, tangents.state);
   return point;
@@ -197,12 +219,12 @@ Motion Predict(const MotionModel& model, const PendulumState& start, std::span<c
   motion.velocity.resize(rows);
   motion.acceleration.resize(rows);
   if (tangents != nullptr) {
-    tangents->angle.resize(kTangents, 2 * rows);
-    tangents->acceleration.resize(kTangents, 2 * rows);
+    tangents->angle.resize(model.body.tangents(), 2 * rows);
+    tangents->acceleration.resize(model.body.tangents(), 2 * rows);
     tangents->jerk.resize(rows);
   }
   const double begin = times.front(), seconds = times.back() - begin;
-  const int steps = MotionSteps(seconds);
+  const int steps = MotionSteps(model.body, seconds);
   PredictedStep step;
   step.h = std::max(seconds / steps, 1e-9);
   step.has_tangents = tangents != nullptr;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "extras/machine/logs/log.h"
+#include "extras/machine/twin/cogging.h"
 #include "extras/machine/twin/drive.h"
 #include "extras/machine/twin/twin.h"
 #include "pendulum/equations.h"
@@ -14,17 +15,19 @@
 namespace upswing::machine {
 
 /// Rows of the derivatives of a motion: by the start state (q1, q2, w1, w2), by the constants of
-/// Manipulator in their order, and by the drive's times.
+/// Manipulator in their order, by the drive's times, and by the coefficients of cogging. Motions
+/// without cogging lack the last ones.
 namespace tangent {
 enum Row {
   kStart = 0,
   kBody = kStart + 4,
   kDelay = kBody + kNumManipulatorConstants,
   kLag,
-  kRows,
+  kCogging,
+  kRows = kCogging + 2 * Cogging::kCoefficients,
 };
 }
-inline constexpr int kTangents = tangent::kRows;
+inline constexpr int kMostTangents = tangent::kRows;
 
 /// A point of a motion.
 struct MotionPoint {
@@ -33,16 +36,37 @@ struct MotionPoint {
   Joints acceleration;  // rad/s²
 };
 
+/// A matrix with a row for each derivative of a motion.
+template <int kColumns>
+using TangentMatrix =
+    Eigen::Matrix<double, Eigen::Dynamic, kColumns, Eigen::ColMajor, kMostTangents, kColumns>;
+
 /// The derivatives of a point.
 struct PointTangents {
-  Eigen::Matrix<double, kTangents, 4> state;  // q1, q2, w1, w2
-  Eigen::Matrix<double, kTangents, 2> acceleration;
+  TangentMatrix<4> state;  // q1, q2, w1, w2
+  TangentMatrix<2> acceleration;
+};
+
+/// Longest step of the integration, s, unless friction needs a shorter one: a fit would mistake the
+/// errors of longer ones for delay.
+inline constexpr double kMotionStep = 0.0005;
+inline constexpr double kShortestMotionStep = kMotionStep / 64;
+
+/// The links and motors of a twin as equations of motion, with cogging.
+struct Body : Manipulator {
+  CoggingTorque cogging;
+  double longest_step = kMotionStep;  // of the integration (Runge-Kutta of order 4), s
+
+  /// Number of derivatives of its motions.
+  int tangents() const { return cogging.any() ? kMostTangents : tangent::kCogging; }
+  /// q̈ (rad/s²) under the torques (N·m) of the drives at both joints.
+  Joints Acceleration(const PendulumState& s, const Joints& torque) const;
 };
 
 /// Integrates the motion of a body under the torques of a drive. Both must outlive it.
 class MotionIntegrator {
  public:
-  MotionIntegrator(const Manipulator& body, const Drive& drive) : body_(body), drive_(drive) {}
+  MotionIntegrator(const Body& body, const Drive& drive) : body_(body), drive_(drive) {}
 
   /// The point in a state at a time (s).
   MotionPoint Start(double time, const PendulumState& state);
@@ -54,18 +78,18 @@ class MotionIntegrator {
   MotionPoint Step(const MotionPoint& now, double h, PointTangents& tangents);
 
  private:
-  const Manipulator& body_;
+  const Body& body_;
   const Drive& drive_;
   int cursor_ = 0;
 };
 
 /// The equations of motion of a twin. `reported`: driven by reported torques instead of commanded
 /// ones. Reported torques lack current_inertia · q̈, so each joint has less armature.
-Manipulator BodyOf(const Twin& twin, bool reported = false);
+Body BodyOf(const Twin& twin, bool reported = false);
 
 /// A twin as the model of a log: its body, its torques over the time of the log, and its encoders.
 struct MotionModel {
-  Manipulator body;
+  Body body;
   Drive drive;
   Joints zero{};  // measured angles of joints that hang, rad
 };
@@ -83,15 +107,12 @@ struct Motion {
 
 /// Derivatives of a predicted motion. Columns 2k and 2k + 1 are of the joints at moment k.
 struct MotionTangents {
-  Eigen::Matrix<double, kTangents, Eigen::Dynamic> angle, acceleration;
+  Eigen::MatrixXd angle, acceleration;
   std::vector<Joints> jerk;  // (n) rad/s³, where `acceleration` is
 };
 
-/// Longest step of the integration (Runge-Kutta of order 4), s. Dry friction needs short steps: a
-/// fit would mistake the errors of longer ones for delay.
-inline constexpr double kMotionStep = 0.0005;
-/// Number of equal steps for a time of `seconds`, at least 1.
-int MotionSteps(double seconds);
+/// Number of equal steps of a body's motion for a time of `seconds`, at least 1.
+int MotionSteps(const Body& body, double seconds);
 
 /// The motion at the moments `times` (n; s, growing), from a state at the first one. The state's
 /// angles are measured ones. `late`: time from a moment of `acceleration` to the moment of the

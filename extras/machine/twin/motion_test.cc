@@ -37,6 +37,19 @@ Twin MachineWithLag() {
   return twin;
 }
 
+/// The same machine with motors that cog.
+Twin MachineThatCogs() {
+  Twin twin = MachineWithLag();
+  twin.cogging.slots = 12;
+  twin.cogging.poles = 14;
+  for (int j = 0; j < 2; ++j) {
+    for (int k = 0; k < Cogging::kCoefficients; ++k) {
+      twin.cogging.coefficients[j][k] = 0.03 * std::sin(1.0 + j + 2.0 * k);
+    }
+  }
+  return twin;
+}
+
 /// A log with steps of the commanded torques, at an even rate.
 MachineLog LogOfSteps() {
   MachineLog log;
@@ -94,7 +107,7 @@ TEST(Predict, ConservesEnergyWithoutFrictionAndTorque) {
     log.time.push_back(0.002 * k);
     log.angle.push_back({});
   }
-  const Manipulator body = BodyOf(twin);
+  const Body body = BodyOf(twin);
   const Motion motion = Predict({body, Drive::Commanded(log, twin)}, {1, 0.5, 0, 0}, log.time);
   const auto energy = [&](int k) {
     return body
@@ -140,25 +153,32 @@ TEST(Predict, RepeatsTheMotionOfTheSimulatedMachine) {
 }
 
 /// Differences of predictions are the reference.
-TEST(Predict, KnowsItsDerivatives) {
-  const Twin twin = MachineWithLag();
+void ExpectDerivatives(const Twin& twin) {
   const MachineLog log = RunLoop(twin, {.seconds = 0.5, .start = {0.5, -0.3, 0, 0}},
                                  [](const CycleInput& in) -> Joints {
                                    return {1.5 * std::sin(6 * in.time), std::cos(4 * in.time)};
                                  });
-  std::array<double, kTangents> values{0.5, -0.3, 1, 2};
-  const Manipulator body = BodyOf(twin);
+  std::array<double, kMostTangents> values{0.5, -0.3, 1, 2};
+  const Body body = BodyOf(twin);
   for (int k = 0; k < kNumManipulatorConstants; ++k) {
     values[tangent::kBody + k] = body.*kManipulatorConstants[k];
   }
   // No event is at an end of a step, where the derivative jumps.
   values[tangent::kDelay] = 0.0023;
   values[tangent::kLag] = twin.actuator.lag;
-  const auto predict = [&](const std::array<double, kTangents>& v, MotionTangents* tangents) {
+  for (int i = 0; i < 2 * Cogging::kCoefficients; ++i) {
+    values[tangent::kCogging + i] =
+        twin.cogging.coefficients[i / Cogging::kCoefficients][i % Cogging::kCoefficients];
+  }
+  const auto predict = [&](const std::array<double, kMostTangents>& v, MotionTangents* tangents) {
     Twin other = twin;
     other.actuator.delay = v[tangent::kDelay];
     other.actuator.lag = v[tangent::kLag];
-    MotionModel model{Manipulator(), Drive::Commanded(log, other)};
+    for (int i = 0; i < 2 * Cogging::kCoefficients; ++i) {
+      other.cogging.coefficients[i / Cogging::kCoefficients][i % Cogging::kCoefficients] =
+          v[tangent::kCogging + i];
+    }
+    MotionModel model{BodyOf(other), Drive::Commanded(log, other)};
     for (int k = 0; k < kNumManipulatorConstants; ++k) {
       model.body.*kManipulatorConstants[k] = v[tangent::kBody + k];
     }
@@ -167,7 +187,7 @@ TEST(Predict, KnowsItsDerivatives) {
   };
   MotionTangents tangents;
   predict(values, &tangents);
-  for (int i = 0; i < kTangents; ++i) {
+  for (int i = 0; i < body.tangents(); ++i) {
     const double h = 1e-6 * std::max(0.01, std::abs(values[i]));
     auto above = values, below = values;
     above[i] += h;
@@ -184,6 +204,69 @@ TEST(Predict, KnowsItsDerivatives) {
       }
     }
   }
+}
+
+TEST(Predict, KnowsItsDerivatives) { ExpectDerivatives(MachineWithLag()); }
+TEST(Predict, KnowsTheDerivativesByCogging) { ExpectDerivatives(MachineThatCogs()); }
+
+/// Cogging is the slope of a potential, so it keeps the energy with it.
+TEST(Predict, ConservesEnergyWithCogging) {
+  Twin twin = MachineThatCogs();
+  twin.plant.damping1 = twin.plant.damping2 = twin.plant.coulomb1 = twin.plant.coulomb2 = 0;
+  MachineLog log;
+  for (int k = 0; k < 1000; ++k) {
+    log.time.push_back(0.002 * k);
+    log.angle.push_back({});
+  }
+  const Body body = BodyOf(twin);
+  const auto harmonics = twin.cogging.Harmonics();
+  const Motion motion = Predict({body, Drive::Commanded(log, twin)}, {1, 0.5, 0, 0}, log.time);
+  const auto energy = [&](int k) {
+    const Joints &q = motion.angle[k], &w = motion.velocity[k];
+    double sum = body.At({q[0], q[1], w[0], w[1]}).energy;
+    for (int j = 0; j < 2; ++j) {
+      const auto& c = twin.cogging.coefficients[j];
+      for (int i = 0; i < Cogging::kHarmonics; ++i) {
+        const double n = harmonics[i];
+        sum += (c[i] * std::cos(n * q[j]) - c[i + Cogging::kHarmonics] * std::sin(n * q[j])) / n;
+      }
+    }
+    return sum;
+  };
+  for (const int k : {100, 500, 999}) EXPECT_NEAR(energy(k), energy(0), 1e-5) << k;
+}
+
+/// A step of kMotionStep would be unstable.
+TEST(Predict, FollowsStrongFrictionOfLightLinks) {
+  Twin twin = MachineWithLag();
+  twin.plant.inertia1 = twin.plant.inertia2 = 1e-6;
+  twin.plant.center1 = twin.plant.center2 = 0.002;
+  twin.plant.length1 = 0.004;
+  twin.plant.armature = 2e-5;
+  MotionModel coarse = CommandedModel(LogOfSteps(), twin), fine = coarse;
+  EXPECT_LT(coarse.body.longest_step, kMotionStep / 4);
+  fine.body.longest_step = coarse.body.longest_step / 16;
+  const std::vector<double> times{0.1, 0.15, 0.2, 0.3};
+  const PendulumState start{0.5, -0.3, 20, -10};
+  const Motion a = Predict(coarse, start, times), b = Predict(fine, start, times);
+  for (size_t k = 0; k < times.size(); ++k) {
+    for (int j = 0; j < 2; ++j) EXPECT_NEAR(a.angle[k][j], b.angle[k][j], 1e-3) << k;
+  }
+}
+
+/// A loop that stalls again and again leaves no window without a gap.
+TEST(CutWindows, TakeTheGapsOfALoopThatStalls) {
+  const auto windows = [](double stall) {
+    MachineLog log;
+    double t = 0;
+    for (int k = 0; k < 500; ++k, t += k % 20 == 0 ? stall : 0.001) {
+      log.time.push_back(t);
+      log.angle.push_back({0.4 * std::sin(5 * t), 0.3 * std::cos(7 * t)});
+    }
+    return CutWindows(std::span(&log, 1), {.seconds = 0.3, .hop = 0.15}, 0.2, 0.3).size();
+  };
+  EXPECT_GT(windows(0.07), 5u);
+  EXPECT_EQ(windows(0.12), 0u);
 }
 
 TEST(CutWindows, StartInTheTrueState) {

@@ -15,8 +15,8 @@ constexpr int kWindowsInAScore = 6;
 
 /// Normal equations of the constants in which a start state is eliminated.
 struct EliminatedBlock {
-  ConstantsMatrix H;
-  Constants g;
+  MatrixXd H;
+  VectorXd g;
 };
 
 Matrix4d InverseOfDamped(const Matrix4d& Hxx, double damping) {
@@ -26,7 +26,7 @@ Matrix4d InverseOfDamped(const Matrix4d& Hxx, double damping) {
 }
 
 EliminatedBlock EliminateStart(const WindowBlock& b, double damping) {
-  const Eigen::Matrix<double, kConstants, 4> half =
+  const Eigen::Matrix<double, Eigen::Dynamic, 4> half =
       b.Hxc.transpose() * InverseOfDamped(b.Hxx, damping);
   return {b.Hcc - half * b.Hxc, b.gc - half * b.gx};
 }
@@ -57,7 +57,8 @@ NormalEquations EliminateStarts(const ShootingModel& model, const Linearization&
   const auto& [blocks, slopes] = linearization;
   const int n = model.parameters().size();
   NormalEquations equations{MatrixXd::Zero(n, n), VectorXd::Zero(n), {}};
-  std::vector<ConstantsMatrix> H(slopes.size(), ConstantsMatrix::Zero());  // (sessions)
+  std::vector<MatrixXd> H;  // (sessions)
+  for (const MatrixXd& slope : slopes) H.push_back(MatrixXd::Zero(slope.rows(), slope.rows()));
   VectorXd score = VectorXd::Zero(n);
   for (int w = 0; w < model.windows(); ++w) {
     const int session = model.SessionOfWindow(w);
@@ -77,7 +78,7 @@ NormalEquations EliminateStarts(const ShootingModel& model, const Linearization&
 
 Vector4d ChangeOfStart(const WindowBlock& block, const MatrixXd& slope, const VectorXd& change,
                        double damping) {
-  const Constants of_constants = slope * change;
+  const VectorXd of_constants = slope * change;
   return -(InverseOfDamped(block.Hxx, damping) * (block.gx + block.Hxc * of_constants));
 }
 

@@ -12,7 +12,7 @@ namespace upswing::machine {
 /// The model, linearised at a point.
 struct Linearization {
   std::vector<WindowBlock> blocks;      // (windows)
-  std::vector<Eigen::MatrixXd> slopes;  // (sessions) ∂c/∂θ, kConstants × n
+  std::vector<Eigen::MatrixXd> slopes;  // (sessions) ∂c/∂θ, constants × n
 };
 /// `linearized`: residuals and derivatives at the point.
 Linearization LinearizationOf(const ShootingModel& model,

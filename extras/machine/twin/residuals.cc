@@ -6,18 +6,20 @@ namespace upswing::machine {
 namespace {
 
 constexpr int kStartStates = tangent::kBody - tangent::kStart;
-constexpr int kVariables = kStartStates + kConstants;
 // A column of derivatives begins with those of the motion.
 static_assert(kStartStates + constant::kBody == tangent::kBody);
-static_assert(kStartStates + constant::kLag + 1 == kTangents);
+constexpr int kOtherConstants = constant::kCogging - constant::kZero1;
+static_assert(kStartStates + constant::kLag + 1 == tangent::kCogging);
 
 /// Residuals of a window of n rows, with their derivatives unless J is empty.
 struct Residuals {
-  Eigen::VectorXd r;                                    // (2 n)
-  Eigen::Matrix<double, kVariables, Eigen::Dynamic> J;  // (kVariables × 2 n)
+  Eigen::VectorXd r;  // (2 n)
+  Eigen::MatrixXd J;  // (start states and constants × 2 n)
 
-  Residuals(int rows, bool linearizes)
-      : r(Eigen::VectorXd::Zero(2 * rows)), J(kVariables, linearizes ? 2 * rows : 0) {}
+  /// `tangents`: number of derivatives of the motion.
+  Residuals(int rows, int tangents, bool linearizes)
+      : r(Eigen::VectorXd::Zero(2 * rows)),
+        J(tangents + kOtherConstants, linearizes ? 2 * rows : 0) {}
 
   void SetZero() {
     r.setZero();
@@ -25,9 +27,11 @@ struct Residuals {
   }
   /// Sets the derivatives of residual i by the motion, and by the zeros. Start states have measured
   /// angles, so a larger zero is a smaller true angle at the start.
-  void SetTangents(int i, const Eigen::Matrix<double, kTangents, 1>& by_motion) {
+  void SetTangents(int i, const Eigen::VectorXd& by_motion) {
     J.col(i).setZero();
-    J.col(i).head<kTangents>() = by_motion;
+    J.col(i).head<tangent::kCogging>() = by_motion.head<tangent::kCogging>();
+    const int cogging = static_cast<int>(by_motion.size()) - tangent::kCogging;
+    J.col(i).tail(cogging) = by_motion.tail(cogging);
     J(kStartStates + constant::kZero1, i) = -by_motion(tangent::kStart);
     J(kStartStates + constant::kZero2, i) = -by_motion(tangent::kStart + 1);
   }
@@ -93,12 +97,23 @@ void SetTorques(const ModelledLog& modelled, const LogWindow& window,
 
 }  // namespace
 
-Constants ConstantsOf(const Twin& twin) {
+int NumConstants(const Twin& twin) {
+  return twin.cogging.any() ? kMostConstants : constant::kCogging;
+}
+
+Eigen::VectorXd ConstantsOf(const Twin& twin) {
   const Manipulator m = BodyOf(twin);
   const Actuator& motor = twin.actuator;
-  Constants c;
-  c << m.J1, m.J2, m.b, m.a, m.G1, m.G2, m.d1, m.d2, m.f1, m.f2, motor.delay, motor.lag,
-      twin.sensors.zero1, twin.sensors.zero2, motor.current_delay, motor.current_inertia;
+  Eigen::VectorXd c(NumConstants(twin));
+  c.head<constant::kCogging>() << m.J1, m.J2, m.b, m.a, m.G1, m.G2, m.d1, m.d2, m.f1, m.f2,
+      motor.delay, motor.lag, twin.sensors.zero1, twin.sensors.zero2, motor.current_delay,
+      motor.current_inertia;
+  if (!twin.cogging.any()) return c;
+  for (int j = 0; j < 2; ++j) {
+    const auto& own = twin.cogging.coefficients[j];
+    c.segment<Cogging::kCoefficients>(constant::kCogging + j * Cogging::kCoefficients) =
+        Eigen::Map<const Eigen::Vector<double, Cogging::kCoefficients>>(own.data());
+  }
   return c;
 }
 
@@ -115,11 +130,15 @@ WindowResiduals ResidualsOf(const ModelledLog& modelled, const LogWindow& window
   predicted.motion =
       Predict(modelled.model, {x(0), x(1), x(2), x(3)}, window.TimesIn(log),
               modelled.motor.current_delay, linearizes ? &predicted.tangents : nullptr);
-  Residuals residuals(window.rows(), linearizes);
+  Residuals residuals(window.rows(), modelled.model.body.tangents(), linearizes);
   WindowResiduals result;
   SetAngles(log, window, predicted, linearizes, residuals);
   result.angle = residuals.Square();
-  if (log.measured.empty()) return result;
+  if (log.measured.empty()) {
+    result.torque.H.setZero(result.angle.H.rows(), result.angle.H.cols());
+    result.torque.g.setZero(result.angle.g.size());
+    return result;
+  }
   SetTorques(modelled, window, predicted, linearizes, residuals);
   result.torque = residuals.Square();
   return result;

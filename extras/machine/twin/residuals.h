@@ -12,7 +12,8 @@
 namespace upswing::machine {
 
 /// Rows of the constants that residuals depend on besides the start state: those of the motion,
-/// zeros, current_delay and current_inertia.
+/// zeros, current_delay, current_inertia, and the coefficients of cogging. Twins without cogging
+/// lack the last ones.
 namespace constant {
 enum Row {
   kBody = 0,
@@ -22,22 +23,24 @@ enum Row {
   kZero2,
   kCurrentDelay,
   kCurrentInertia,
-  kRows,
+  kCogging,
+  kRows = kCogging + 2 * Cogging::kCoefficients,
 };
 }
-inline constexpr int kConstants = constant::kRows;
-using Constants = Eigen::Matrix<double, kConstants, 1>;
-using ConstantsMatrix = Eigen::Matrix<double, kConstants, kConstants>;
+inline constexpr int kMostConstants = constant::kRows;
+/// Number of constants of a twin.
+int NumConstants(const Twin& twin);
 
-/// The constants of a twin: its equations of motion, times of the motors, and zeros.
-Constants ConstantsOf(const Twin& twin);
+/// The constants of a twin (NumConstants): its equations of motion, times of the motors, zeros, and
+/// cogging.
+Eigen::VectorXd ConstantsOf(const Twin& twin);
 
 /// The mean of a window's squared residuals over its rows, angles or torques, and its derivatives
 /// by start state and constants.
 struct SquaredResiduals {
-  double mean = 0;                                                     // rad² or (N·m)²
-  Eigen::Matrix<double, 4 + kConstants, 4 + kConstants> H = H.Zero();  // half of the second one
-  Eigen::Matrix<double, 4 + kConstants, 1> g = g.Zero();               // half of the first one
+  double mean = 0;    // rad² or (N·m)²
+  Eigen::MatrixXd H;  // half of the second one, n = 4 + constants; empty without derivatives
+  Eigen::VectorXd g;  // half of the first one
 };
 
 /// The residuals of a window.
@@ -56,7 +59,7 @@ struct ModelledLog {
 };
 
 /// The residuals of a window of the log from the start state x (rad, rad, rad/s, rad/s), predicted
-/// minus measured. Derivatives are zero unless `linearizes`.
+/// minus measured. Derivatives are empty unless `linearizes`.
 WindowResiduals ResidualsOf(const ModelledLog& modelled, const LogWindow& window,
                             const Eigen::Vector4d& x, bool linearizes);
 

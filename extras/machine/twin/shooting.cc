@@ -100,10 +100,11 @@ std::vector<WindowBlock> ShootingModel::Blocks(const std::vector<WindowResiduals
     WindowBlock& b = blocks.emplace_back();
     b.Hxx = H.topLeftCorner<4, 4>();
     b.Hxx.diagonal() += start_prior;
-    b.Hxc = H.topRightCorner<4, kConstants>();
-    b.Hcc = H.bottomRightCorner<kConstants, kConstants>();
+    const Eigen::Index constants = H.rows() - 4;
+    b.Hxc = H.topRightCorner(4, constants);
+    b.Hcc = H.bottomRightCorner(constants, constants);
     b.gx = g.head<4>() + start_prior.cwiseProduct(point.starts[w] - cubics_[w]);
-    b.gc = g.tail<kConstants>();
+    b.gc = g.tail(constants);
   }
   return blocks;
 }

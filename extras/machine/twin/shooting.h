@@ -30,9 +30,9 @@ struct RobustScales {
 struct WindowBlock {
   Eigen::Matrix4d Hxx;
   Eigen::Vector4d gx;
-  Eigen::Matrix<double, 4, kConstants> Hxc;
-  ConstantsMatrix Hcc;
-  Constants gc;
+  Eigen::Matrix<double, 4, Eigen::Dynamic> Hxc;
+  Eigen::MatrixXd Hcc;
+  Eigen::VectorXd gc;
 };
 
 /// The windows of logs, in the order of the logs.

@@ -10,13 +10,13 @@ namespace upswing::machine {
 
 SimulatedMachine::SimulatedMachine(const Twin& twin, const PendulumState& start)
     : twin_(twin), body_(BodyOf(twin)), drive_(twin.actuator.delay, twin.actuator.lag) {
-  CheckTimestep(twin.plant, "twin", kMotionStep);
+  CheckTimestep(twin.plant, "twin", kShortestMotionStep);
   moments_.push_back({0, start, body_.Acceleration(start, {})});
 }
 
 void SimulatedMachine::Advance(double time) {
   const double begin = moments_.back().time;
-  const int steps = MotionSteps(time - begin);
+  const int steps = MotionSteps(body_, time - begin);
   const double h = (time - begin) / steps;
   if (h <= 0) return;
   MotionIntegrator integrator(body_, drive_);
@@ -45,7 +45,7 @@ MotionPoint SimulatedMachine::Ago(double age) const {
   if (age < 0) {
     MotionPoint moment = moments_.back();
     MotionIntegrator integrator(body_, drive_);
-    const int steps = MotionSteps(-age);
+    const int steps = MotionSteps(body_, -age);
     for (int i = 0; i < steps; ++i) moment = integrator.Step(moment, -age / steps);
     return moment;
   }

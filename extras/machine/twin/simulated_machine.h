@@ -28,7 +28,7 @@ struct TimedReading : MachineReading {
 class SimulatedMachine {
  public:
   /// Begins at time 0 in a state, whose angles are true ones, without torque. Throws BadInput if
-  /// steps of kMotionStep are unstable for the twin.
+  /// steps of kShortestMotionStep are unstable for the twin.
   SimulatedMachine(const Twin& twin, const PendulumState& start);
 
   /// Lets time pass until `time`, s.
@@ -49,7 +49,7 @@ class SimulatedMachine {
   MotionPoint Ago(double age) const;
 
   Twin twin_;
-  Manipulator body_;
+  Body body_;
   Drive drive_;
   // The newest last; as long as reported torques are old and torques act back.
   std::deque<MotionPoint> moments_;

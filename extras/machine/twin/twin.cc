@@ -137,6 +137,7 @@ std::string SessionOf(const std::string& log) {
 void Twin::Describe(Options& options) {
   plant.Describe(options);
   actuator.Describe(options);
+  cogging.Describe(options);
   sensors.Describe(options);
   loop.Describe(options);
 }
@@ -173,7 +174,9 @@ Twin ReadTwin(const std::string& name, const std::string& flag, const std::strin
 
 std::string TwinText(const Twin& twin) {
   std::string text = Concat("name = ", Quoted(twin.name), "\n\n");
-  text += OptionsOf(twin).Toml(/*comments=*/true, [](const Option&) { return true; });
+  text += OptionsOf(twin).Toml(/*comments=*/true, [&](const Option& option) {
+    return option.section != "cogging" || twin.cogging.any();
+  });
   const Disturbance disturbance = DisturbanceOf(twin);
   text += "\n" + OptionsOf(disturbance).Toml(/*comments=*/true, [](const Option&) { return true; });
   for (const Session& session : twin.sessions) {

@@ -8,6 +8,7 @@
 #include "base/options.h"
 #include "base/rng.h"
 #include "extras/machine/logs/log.h"
+#include "extras/machine/twin/cogging.h"
 #include "pendulum/plant.h"
 #include "pendulum/scale.h"
 
@@ -79,6 +80,7 @@ struct Twin {
   std::string name = "twin";
   Plant plant;
   Actuator actuator;
+  Cogging cogging;
   MachineSensors sensors;
   LoopTiming loop;
   std::vector<std::string> uncertain;  // (n) names of the values with a covariance

@@ -154,7 +154,8 @@ TEST(Identify, PredictsLeftOutRunsOfTheRealMachine) {
     }
   }
   const Twin first = RealPlant();
-  const Structure structure = Structures(true, false).back();
+  const Structure structure =
+      Structures(/*has_motors=*/true, /*cogging=*/false, /*one_body=*/false).back();
   ThreadPool pool(2);
   std::vector<double> own, published;
   for (const int left_out : {0, 2}) {
