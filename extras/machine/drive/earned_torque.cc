@@ -20,7 +20,7 @@ constexpr double kLimitSeconds = 0.04;   // time at the limit in which the joint
 constexpr double kDragSeconds = 0.5;     // the same for the other joint, s
 constexpr double kLargestTravel = 0.5;   // of the motor's joint until the other one answers, rad
 constexpr double kLongestBlind = 0.025;  // age of a reading with which a pulse goes on, s
-// Least times in cycles: those at 100 Hz, the slowest rate of UsualPlant's loop.
+// Least times in cycles, none longer than the times above at 100 Hz.
 constexpr double kDoublingCycles = 2, kLimitCycles = 4, kBlindCycles = 2.5;
 
 // Motion that the twin predicts for a pulse before it is compared.

@@ -90,11 +90,11 @@ void Actuator::Describe(Options& o) {
   o.Add(&delay, "delay", {-kLongest, kLongest}, "s",
         "time from reading the angles to the response of the torque sent with them");
   o.Add(&lag, "lag", {0, kLongest}, "s", "time constant of the torque");
-  o.Add(&passive_limit, "passive_limit", {0, 1000}, "N·m",
+  o.Add(&passive_limit, "passive_limit", {0, 1e6}, "N·m",
         "largest torque of the joint that is not actuated");
   o.Add(&current_delay, "current_delay", {-kLongest, kLongest}, "s",
         "time from the reported torque to the reading of the angles");
-  o.Add(&current_inertia, "current_inertia", {0, 1}, "kg·m²",
+  o.Add(&current_inertia, "current_inertia", {0, 1e6}, "kg·m²",
         "part of the reported torque that opposes the joint's acceleration");
 }
 
@@ -102,7 +102,7 @@ void MachineSensors::Describe(Options& o) {
   o.Section("sensors");
   o.Add(&quantum, "quantum", {0, 1}, "rad", "step of a measured angle");
   o.Add(&angle_range, "angle_range", {1, 1e6}, "rad", "largest measured angle");
-  o.Add(&torque_quantum, "torque_quantum", {0, 10}, "N·m", "step of a reported torque");
+  o.Add(&torque_quantum, "torque_quantum", {0, 1e6}, "N·m", "step of a reported torque");
   o.Add(&zero1, "zero1", {-1, 1}, "rad", "measured angle of joint 1 that hangs");
   o.Add(&zero2, "zero2", {-1, 1}, "rad", "measured angle of a straight joint 2");
   o.Add(&velocity_share, "velocity_share", {0.001, 1}, "",
