@@ -332,6 +332,60 @@ TEST(Size, ASmallMachineMayPauseFor70Milliseconds) {
   EXPECT_GT(gaps, 20);
 }
 
+/// The readings of a log that repeats each one until the next comes, with the measured torques as
+/// sent ones.
+std::vector<TimedReading> NewReadings(const MachineLog& log) {
+  std::vector<TimedReading> readings;
+  for (int k = 1; k < log.rows(); ++k) {
+    const bool repeats = log.angle[k] == log.angle[k - 1] && log.velocity[k] == log.velocity[k - 1];
+    if (!repeats) readings.push_back({{log.angle[k], log.measured[k]}, log.time[k]});
+  }
+  return readings;
+}
+
+TEST(Size, ARealSmallMachineHasNoFault) {
+  if (RealData().empty()) GTEST_SKIP() << "no measured data";
+  const Twin twin = ReadTwin("cloudpendulum", "twin");
+  for (const char* name : {"FreeFall_00", "FreeFall_01", "FreeFall_02", "sysid_exp_data_30s"}) {
+    const auto file = RealData() / "cloudpendulum" / (std::string(name) + ".csv.gz");
+    const MachineLog log = ReadLog(file).front();
+    const Twin own = InSession(twin, log);
+    // New readings come every 2 ms, or in each cycle of a slower loop.
+    const double period = std::max(0.002, UsualCycle(std::span(&log, 1)));
+    const std::vector<TimedReading> readings = NewReadings(log);
+    EXPECT_GT(readings.size(), 5000U);
+    // The run begins in the estimated state in which the supervisor arms the machine.
+    Estimator first(own, period), estimator(own, period);
+    for (int k = 0; k <= Supervisor::kArmReadings; ++k) {
+      first.Update(readings[k].time, readings[k].torque, &readings[k]);
+    }
+    Supervisor supervisor({.limits = {.angle = 1e3, .velocity = 1e3, .energy = 1e3},
+                           .scale = ScaleOverUsual(own.plant),
+                           .start = first.now(),
+                           .angle_range = 1e3,
+                           .quantum = own.sensors.quantum,
+                           .period = period});
+    double last = 0;
+    for (const TimedReading& reading : readings) {
+      estimator.Update(reading.time, reading.torque, &reading);
+      supervisor.Step({.time = reading.time,
+                       .fresh = true,
+                       .read_at = last,
+                       .received = reading.time,
+                       .angle = reading.angle,
+                       .torque = reading.torque,
+                       .zero = estimator.zero(),
+                       .state = estimator.now(),
+                       .ahead = estimator.ahead(),
+                       .energy = estimator.energy(),
+                       .expected = estimator.expectation()});
+      last = reading.time;
+    }
+    EXPECT_EQ(supervisor.state(), LoopState::kRunning) << name;
+    EXPECT_EQ(supervisor.reason(), "") << name;
+  }
+}
+
 TEST(Size, APulseWaitsForReadings) {
   // A link that loses all readings for 70 ms from the first torque on.
   class BlindLink : public TwinLink {
