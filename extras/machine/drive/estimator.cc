@@ -80,6 +80,7 @@ Estimator::Vector Estimator::Follow(const Drive& drive, Vector x, double begin,
   if (h <= 0) return x;
   body.f1 = x[kFriction];
   body.f2 = x[kFriction + 1];
+  body.cogging.SetZero({x[kZero], x[kZero + 1]});
   MotionIntegrator integrator(body, drive);
   MotionPoint point = integrator.Start(begin, StateOf(x));
   for (int i = 0; i < steps; ++i) {
@@ -115,14 +116,16 @@ void Estimator::Begin(const Joints& angle, double moment) {
 void Estimator::Predict(Track& track, double seconds, double noise) const {
   const Drive& drive = model_->drive;
   const Vector next = Follow(drive, track.x, track.time, seconds);
-  // The zeros have no effect on the motion: their columns are those of the identity.
+  // Without cogging, the zeros have no effect on the motion: their columns are those of the
+  // identity.
   Matrix F = Matrix::Identity();
   constexpr double kStep = 1e-6;  // in natural units
   const Scale& scale = model_->scale;
   Vector step = Vector::Constant(kStep);
   step.segment<2>(kVelocity) *= scale.velocity();
   step.segment<2>(kFriction) *= scale.torque;
-  for (const int i : {0, 1, 2, 3, kFriction, kFriction + 1}) {
+  for (int i = 0; i < kStates; ++i) {
+    if (i / 2 == kZero / 2 && !model_->body.cogging.any()) continue;
     Vector other = track.x;
     other[i] += step[i];
     F.col(i) = (Follow(drive, other, track.time, seconds) - next) / step[i];

@@ -56,10 +56,14 @@ std::vector<std::string> CoggingCoefficients() {
   return names;
 }
 
-CoggingTorque::CoggingTorque(const Cogging& cogging)
-    : any_(cogging.any()), harmonics_(cogging.Harmonics()), coefficients_(cogging.coefficients) {}
+CoggingTorque::CoggingTorque(const Cogging& cogging, const Joints& zero)
+    : any_(cogging.any()),
+      zero_(zero),
+      harmonics_(cogging.Harmonics()),
+      coefficients_(cogging.coefficients) {}
 
-std::array<double, Cogging::kCoefficients> CoggingTorque::Factors(double angle) const {
+std::array<double, Cogging::kCoefficients> CoggingTorque::Factors(int joint, double angle) const {
+  angle += zero_[joint];
   const auto turned = [&](double harmonic) { return std::polar(1.0, harmonic * angle); };
   // The order of Harmonics.
   const Complex pole_pairs = turned(harmonics_[0]), slots = turned(harmonics_[1]);
@@ -83,7 +87,7 @@ Joints CoggingTorque::At(const Joints& angle) const {
   Joints torque{};
   if (!any_) return torque;
   for (int j = 0; j < 2; ++j) {
-    const auto factors = Factors(angle[j]);
+    const auto factors = Factors(j, angle[j]);
     for (int k = 0; k < Cogging::kCoefficients; ++k) torque[j] += coefficients_[j][k] * factors[k];
   }
   return torque;
@@ -93,7 +97,7 @@ Joints CoggingTorque::SlopeAt(const Joints& angle) const {
   Joints slope{};
   if (!any_) return slope;
   for (int j = 0; j < 2; ++j) {
-    const auto factors = Factors(angle[j]);
+    const auto factors = Factors(j, angle[j]);
     for (int k = 0; k < Cogging::kHarmonics; ++k) {
       const int c = k + Cogging::kHarmonics;
       slope[j] +=

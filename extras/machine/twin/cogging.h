@@ -21,7 +21,8 @@ struct Cogging {
   static constexpr int kCoefficients = 2 * kHarmonics;
 
   double slots = 0, poles = 0;  // of a motor; 0: no cogging
-  // The torque on a joint at its angle q is Σ s sin(n q) + c cos(n q) over the harmonics n, N·m.
+  // The torque on a joint whose encoder shows the angle q is Σ s sin(n q) + c cos(n q) over the
+  // harmonics n, N·m. The encoder of such a motor is absolute, because its drive needs it.
   std::array<std::array<double, kCoefficients>, 2> coefficients{};
 
   /// Declares each setting in `options`: name, range, unit, help.
@@ -39,18 +40,21 @@ std::vector<std::string> CoggingCoefficients();
 class CoggingTorque {
  public:
   CoggingTorque() = default;
-  explicit CoggingTorque(const Cogging& cogging);
+  /// `zero`: the angles (rad) that the encoders show at the joints' angle 0.
+  CoggingTorque(const Cogging& cogging, const Joints& zero);
 
   bool any() const { return any_; }
+  void SetZero(const Joints& zero) { zero_ = zero; }
   /// The torques (N·m) at the joints' angles (rad).
   Joints At(const Joints& angle) const;
   /// Their derivatives by the own angle, N·m/rad.
   Joints SlopeAt(const Joints& angle) const;
-  /// The derivatives of a joint's torque by its coefficients: sines and cosines of n q.
-  std::array<double, Cogging::kCoefficients> Factors(double angle) const;
+  /// The derivatives of the torque of a joint (0 or 1) by its coefficients.
+  std::array<double, Cogging::kCoefficients> Factors(int joint, double angle) const;
 
  private:
   bool any_ = false;
+  Joints zero_{};  // rad
   std::array<double, Cogging::kHarmonics> harmonics_{};
   std::array<std::array<double, Cogging::kCoefficients>, 2> coefficients_{};
 };

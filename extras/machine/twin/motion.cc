@@ -51,7 +51,7 @@ JointTangents AccelerationTangents(const Body& m, const PendulumState& s, const 
                                    const DriveTangents& torque, const StateTangents& state) {
   const auto angles = dynamics::AnglesOf<double>({s.q1, s.q2});
   const Factors Y = Regressor(angles, {s.w1, s.w2}, {a[0], a[1]});
-  const Joints q{s.q1, s.q2};
+  const Joints q{s.q1, s.q2}, slope = m.cogging.SlopeAt(q);
   JointTangents force = state.lazyProduct(ForceByState(m, s, a));
   for (int j = 0; j < 2; ++j) {
     force.col(j).segment<kNumManipulatorConstants>(tangent::kBody) +=
@@ -59,9 +59,10 @@ JointTangents AccelerationTangents(const Body& m, const PendulumState& s, const 
     force(tangent::kDelay, j) -= torque.by_delay[j];
     force(tangent::kLag, j) -= torque.by_lag[j];
     if (!m.cogging.any()) continue;
-    const auto factors = m.cogging.Factors(q[j]);
+    const auto factors = m.cogging.Factors(j, q[j]);
     force.col(j).segment<Cogging::kCoefficients>(tangent::kCogging + j * Cogging::kCoefficients) -=
         Eigen::Map<const Eigen::Vector<double, Cogging::kCoefficients>>(factors.data());
+    force(tangent::kZero + j, j) -= slope[j];
   }
   const MassMatrix M = m.Mass(angles.c2);
   Eigen::Matrix2d inverse;
@@ -134,7 +135,8 @@ Joints Body::Acceleration(const PendulumState& s, const Joints& torque) const {
 }
 
 Body BodyOf(const Twin& twin, bool reported) {
-  Body body{ManipulatorOf(twin.plant), CoggingTorque(twin.cogging)};
+  Body body{ManipulatorOf(twin.plant),
+            CoggingTorque(twin.cogging, {twin.sensors.zero1, twin.sensors.zero2})};
   if (reported) {
     body.J1 -= twin.actuator.current_inertia;
     body.a -= twin.actuator.current_inertia;

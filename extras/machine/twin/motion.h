@@ -15,8 +15,8 @@
 namespace upswing::machine {
 
 /// Rows of the derivatives of a motion: by the start state (q1, q2, w1, w2), by the constants of
-/// Manipulator in their order, by the drive's times, and by the coefficients of cogging. Motions
-/// without cogging lack the last ones.
+/// Manipulator in their order, by the drive's times, by the coefficients of cogging and by
+/// the encoders' zeros, on which it depends. Motions without cogging lack the last two.
 namespace tangent {
 enum Row {
   kStart = 0,
@@ -24,7 +24,8 @@ enum Row {
   kDelay = kBody + kNumManipulatorConstants,
   kLag,
   kCogging,
-  kRows = kCogging + 2 * Cogging::kCoefficients,
+  kZero = kCogging + 2 * Cogging::kCoefficients,
+  kRows = kZero + 2,
 };
 }
 inline constexpr int kMostTangents = tangent::kRows;

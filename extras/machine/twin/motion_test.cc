@@ -170,8 +170,12 @@ void ExpectDerivatives(const Twin& twin) {
     values[tangent::kCogging + i] =
         twin.cogging.coefficients[i / Cogging::kCoefficients][i % Cogging::kCoefficients];
   }
+  values[tangent::kZero] = twin.sensors.zero1;
+  values[tangent::kZero + 1] = twin.sensors.zero2;
   const auto predict = [&](const std::array<double, kMostTangents>& v, MotionTangents* tangents) {
     Twin other = twin;
+    other.sensors.zero1 = v[tangent::kZero];
+    other.sensors.zero2 = v[tangent::kZero + 1];
     other.actuator.delay = v[tangent::kDelay];
     other.actuator.lag = v[tangent::kLag];
     for (int i = 0; i < 2 * Cogging::kCoefficients; ++i) {
@@ -220,6 +224,7 @@ TEST(Predict, ConservesEnergyWithCogging) {
   }
   const Body body = BodyOf(twin);
   const auto harmonics = twin.cogging.Harmonics();
+  const Joints zero{twin.sensors.zero1, twin.sensors.zero2};
   const Motion motion = Predict({body, Drive::Commanded(log, twin)}, {1, 0.5, 0, 0}, log.time);
   const auto energy = [&](int k) {
     const Joints &q = motion.angle[k], &w = motion.velocity[k];
@@ -228,7 +233,8 @@ TEST(Predict, ConservesEnergyWithCogging) {
       const auto& c = twin.cogging.coefficients[j];
       for (int i = 0; i < Cogging::kHarmonics; ++i) {
         const double n = harmonics[i];
-        sum += (c[i] * std::cos(n * q[j]) - c[i + Cogging::kHarmonics] * std::sin(n * q[j])) / n;
+        const double angle = n * (q[j] + zero[j]);
+        sum += (c[i] * std::cos(angle) - c[i + Cogging::kHarmonics] * std::sin(angle)) / n;
       }
     }
     return sum;

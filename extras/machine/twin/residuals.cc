@@ -8,7 +8,6 @@ namespace {
 constexpr int kStartStates = tangent::kBody - tangent::kStart;
 // A column of derivatives begins with those of the motion.
 static_assert(kStartStates + constant::kBody == tangent::kBody);
-constexpr int kOtherConstants = constant::kCogging - constant::kZero1;
 static_assert(kStartStates + constant::kLag + 1 == tangent::kCogging);
 
 /// Residuals of a window of n rows, with their derivatives unless J is empty.
@@ -16,10 +15,10 @@ struct Residuals {
   Eigen::VectorXd r;  // (2 n)
   Eigen::MatrixXd J;  // (start states and constants × 2 n)
 
-  /// `tangents`: number of derivatives of the motion.
-  Residuals(int rows, int tangents, bool linearizes)
+  /// `constants`: number of constants of the twin.
+  Residuals(int rows, int constants, bool linearizes)
       : r(Eigen::VectorXd::Zero(2 * rows)),
-        J(tangents + kOtherConstants, linearizes ? 2 * rows : 0) {}
+        J(kStartStates + constants, linearizes ? 2 * rows : 0) {}
 
   void SetZero() {
     r.setZero();
@@ -30,10 +29,13 @@ struct Residuals {
   void SetTangents(int i, const Eigen::VectorXd& by_motion) {
     J.col(i).setZero();
     J.col(i).head<tangent::kCogging>() = by_motion.head<tangent::kCogging>();
-    const int cogging = static_cast<int>(by_motion.size()) - tangent::kCogging;
-    J.col(i).tail(cogging) = by_motion.tail(cogging);
     J(kStartStates + constant::kZero1, i) = -by_motion(tangent::kStart);
     J(kStartStates + constant::kZero2, i) = -by_motion(tangent::kStart + 1);
+    if (by_motion.size() == tangent::kCogging) return;
+    constexpr int kCoefficients = tangent::kZero - tangent::kCogging;
+    J.col(i).tail<kCoefficients>() = by_motion.segment<kCoefficients>(tangent::kCogging);
+    J(kStartStates + constant::kZero1, i) += by_motion(tangent::kZero);
+    J(kStartStates + constant::kZero2, i) += by_motion(tangent::kZero + 1);
   }
   void Add(int i, int constant, double derivative) { J(kStartStates + constant, i) += derivative; }
 
@@ -130,7 +132,8 @@ WindowResiduals ResidualsOf(const ModelledLog& modelled, const LogWindow& window
   predicted.motion =
       Predict(modelled.model, {x(0), x(1), x(2), x(3)}, window.TimesIn(log),
               modelled.motor.current_delay, linearizes ? &predicted.tangents : nullptr);
-  Residuals residuals(window.rows(), modelled.model.body.tangents(), linearizes);
+  const int constants = modelled.model.body.cogging.any() ? kMostConstants : constant::kCogging;
+  Residuals residuals(window.rows(), constants, linearizes);
   WindowResiduals result;
   SetAngles(log, window, predicted, linearizes, residuals);
   result.angle = residuals.Square();
