@@ -21,6 +21,7 @@
 #include "extras/realaigym/boards.h"
 #include "extras/realaigym/hardware.h"
 #include "extras/realaigym/machine_trials.h"
+#include "extras/realaigym/olympics.h"
 #include "os/host.h"
 #include "os/streams.h"
 
@@ -34,6 +35,7 @@ struct ScoreArguments {
   bool as_json = false, no_pushes = false;
 
   bool version2() const { return score_version == "2"; }
+  bool olympics() const { return score_version == "2026"; }
 };
 
 struct HardwareArguments {
@@ -196,6 +198,51 @@ void ScoreUptimes(const ScoreArguments& a, const std::optional<Twin>& twin,
   }
 }
 
+/// A count as a share of `all`, with its 95% interval.
+std::string ShareText(int64_t count, int64_t all) {
+  const Interval interval = WilsonInterval(count, all);
+  return fmt::format("{:>5} of {:<5} {:>5.1f}%  ({:.1f}–{:.1f}%)", count, all,
+                     100.0 * static_cast<double>(count) / static_cast<double>(all),
+                     100 * interval.low, 100 * interval.high);
+}
+
+/// Scores a policy by the task of 2026 on machines drawn from a twin's posterior.
+void ScoreOlympics(const ScoreArguments& a, const Twin& twin, const MachinePolicy& policy,
+                   ThreadPool& pool) {
+  std::vector<OlympicsRun> runs;
+  {
+    EpisodeProgress progress(a.as_json, "machines");
+    runs = RunOlympics(twin, policy, static_cast<int>(a.runs), static_cast<uint64_t>(a.seed), &pool,
+                       std::ref(progress));
+  }
+  int64_t held = 0, poses = 0, pushes = 0, perfect = 0, beyond = 0;
+  for (const OlympicsRun& run : runs) {
+    held += run.held;
+    poses += run.poses;
+    pushes += run.pushes;
+    perfect += run.perfect();
+    beyond += !run.within_limits;
+  }
+  if (a.as_json) {
+    fmt::print("{}\n", PrintableJson({{"policy", policy->name},
+                                      {"twin", twin.name},
+                                      {"runs", a.runs},
+                                      {"held", held},
+                                      {"poses", poses},
+                                      {"pushes", pushes},
+                                      {"perfect", perfect},
+                                      {"beyond_limits", beyond}}));
+    return;
+  }
+  fmt::print("{} on {} of {}, the {}'s task of 2026\n", Printable(policy->name),
+             Counted(a.runs, "machine"), Printable(twin.name), NameOf(RobotOf(*policy)));
+  fmt::print("  swings up and stays     {}\n", ShareText(held, a.runs));
+  fmt::print("  back after a pose       {}\n", ShareText(poses, a.runs * kOlympicsPoses));
+  fmt::print("  back after a push       {}\n", ShareText(pushes, a.runs * kOlympicsPushes));
+  fmt::print("  all of this             {}\n", ShareText(perfect, a.runs));
+  if (beyond > 0) fmt::print("  beyond the limits       {}\n", ShareText(beyond, a.runs));
+}
+
 int RunScore(const ScoreArguments& a) {
   if (a.policy.empty()) throw BadInput("realaigym score: expected a policy, got none");
   if (!a.csv.empty()) CheckWritable("--csv", a.csv);
@@ -206,13 +253,16 @@ int RunScore(const ScoreArguments& a) {
   ThreadPool pool(ResolveThreads(a.threads));
   std::optional<Twin> twin;
   if (!a.twin.empty()) twin = ReadTwin(a.twin, "--twin");
-  const MachinePolicy policy = GetMachinePolicy(a.policy, a.robot, twin, kBoardHz);
+  const MachinePolicy policy =
+      GetMachinePolicy(a.policy, a.robot, twin, a.olympics() ? kOlympicsHz : kBoardHz);
   const auto seed = static_cast<uint64_t>(a.seed);
   if (!a.csv.empty()) {
     WriteOutput(a.csv, BoardCsv(a.version2() ? NominalLog(policy) : UptimeLog(policy, seed)));
     if (IsStandardStream(a.csv)) return 0;
   }
-  if (!a.version2()) {
+  if (a.olympics()) {
+    ScoreOlympics(a, *twin, policy, pool);
+  } else if (!a.version2()) {
     ScoreUptimes(a, twin, policy, pool);
   } else if (twin) {
     ScoreOnTwin(a, *twin, policy, pool);
@@ -239,22 +289,23 @@ int RunScore(const ScoreArguments& a) {
   return 0;
 }
 
-/// Adds --robot, --json and --score-version.
+/// Adds --robot, --json and --score-version with the choices of `versions`.
 void AddCommon(CommandLine& line, std::string& robot, bool& as_json, Options& rules,
-               std::string& version) {
+               std::string& version, const std::vector<std::string>& versions) {
   line.Text("--robot", robot, "ROBOT",
             "pendubot or acrobot (default: the policy's, or the joint with more torque in a log)");
   line.Flag("--json", as_json, "print JSON instead of a table");
   rules.Section("rules");
-  rules.AddChoice(&version, "score_version", {"2", "3"},
-                  "rules; 2: one swing-up of 10 s, 3: time upright in 60 s with random resets");
+  std::string help = "rules; 2: one swing-up of 10 s, 3: time upright in 60 s with random resets";
+  if (versions.size() > 2) help += ", 2026: swing-up, 24 poses and 10 pushes on CloudPendulum";
+  rules.AddChoice(&version, "score_version", versions, help);
 }
 
 void AddScore(CommandLine& line) {
   ScoreArguments& a = line.Runs(RunScore);
   AddPolicy(line, a.policy);
   Options rules;
-  AddCommon(line, a.robot, a.as_json, rules, a.score_version);
+  AddCommon(line, a.robot, a.as_json, rules, a.score_version, {"2", "3", "2026"});
   rules.Add(&a.runs, "runs", {1, 1e6}, "",
             "number of runs with resets, or of machines of the twin");
   line.Arguments(rules);
@@ -271,6 +322,9 @@ void AddScore(CommandLine& line) {
     if (line.Has("--no-pushes") && (a.twin.empty() || !a.version2())) {
       throw BadInput("--no-pushes: expected --twin FILE and --score-version 2 with it");
     }
+    if (a.olympics() && a.twin.empty()) {
+      throw BadInput("--score-version 2026: expected --twin FILE with it, such as cloudpendulum");
+    }
   });
   line.Notes(
       "Version 3: runs of 60 s on RealAIGym's plant C.1 without friction, at 500 Hz, from\n"
@@ -280,6 +334,9 @@ void AddScore(CommandLine& line) {
       "Version 2: performance in one swing-up of 10 s; robustness in 722 simulations with model\n"
       "errors, noise, a motor that responds too little or too much, delay and pushes. With\n"
       "--twin, one swing-up on each machine, with pushes.\n\n"
+      "Version 2026: CloudPendulum's task at 400 Hz with late cycles, on machines of --twin. The\n"
+      "motor swings up and holds for 3 s, then a hand leads the links to 24 poses, and 10 torques\n"
+      "of 0.02 to 0.1 N·m push joint 1. The passive joint gets no torque.\n\n"
       "--twin designs a controller for the twin without dry friction; --made-for changes this\n"
       "plant. The motors compensate " +
       fmt::format("{:.0f}%", 100 * kCompensated) +
@@ -289,7 +346,8 @@ void AddScore(CommandLine& line) {
       "  ./upswing train --agent pendubot && ./upswing realaigym score runs/pendubot-seed1\n"
       "  ./upswing realaigym score tvlqr --made-for realaigym --score-version 2\n"
       "  ./upswing realaigym score runs/pendubot-seed1 --csv sim_swingup.csv\n"
-      "  ./upswing realaigym score tvlqr --lqr-q1 100 --lqr-q2 100 --twin realaigym-twin\n");
+      "  ./upswing realaigym score tvlqr --lqr-q1 100 --lqr-q2 100 --twin realaigym-twin\n"
+      "  ./upswing realaigym score mpc --twin cloudpendulum --score-version 2026 --runs 20\n");
 }
 
 void AddHardware(CommandLine& line) {
@@ -297,7 +355,7 @@ void AddHardware(CommandLine& line) {
   line.Texts("log", a.logs, "LOG", "logs of runs on the real robot, .csv or .csv.gz");
   line.Require("log");
   Options rules;
-  AddCommon(line, a.robot, a.as_json, rules, a.score_version);
+  AddCommon(line, a.robot, a.as_json, rules, a.score_version, {"2", "3"});
   line.Arguments(rules);
   line.Notes(
       "Version 2: all logs must be of one robot. A log with tau_pert belongs to the board with\n"

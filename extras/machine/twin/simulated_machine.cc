@@ -41,6 +41,11 @@ void SimulatedMachine::Command(const Joints& torque) {
   Advance(now);
 }
 
+void SimulatedMachine::Place(const PendulumState& state) {
+  MotionIntegrator integrator(body_, drive_);
+  moments_ = {integrator.Start(time(), state)};
+}
+
 MotionPoint SimulatedMachine::Ago(double age) const {
   if (age < 0) {
     MotionPoint moment = moments_.back();

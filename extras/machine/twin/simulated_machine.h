@@ -35,6 +35,8 @@ class SimulatedMachine {
   void Advance(double time);
   /// Sends torques (N·m) now. The motors hold them until the next ones.
   void Command(const Joints& torque);
+  /// Leads the links to a state at once, as a hand or a stand would.
+  void Place(const PendulumState& state);
   /// Reads encoders and drives now. A loop reads after it sent its torques, because torques with a
   /// negative delay have an effect on the reading.
   MachineReading Read() const;
