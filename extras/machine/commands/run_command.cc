@@ -53,26 +53,6 @@ struct RunArguments {
 
 std::unique_ptr<MachineLink> g_link;  // global for signal handlers, which may come until the end
 
-/// Says how the plant that a policy was made for differs from the twin: times and torques that
-/// decide how the machine answers. The controllers of `run` are made for the twin itself.
-void CompareWithTwin(const LoadedPolicy& policy, const Twin& twin) {
-  constexpr double kSimilar = 0.2;  // relative difference that a policy usually withstands
-  const Manipulator own = ManipulatorOf(policy.plant), body = BodyOf(twin);
-  std::string text;
-  const auto compare = [&](const char* what, double of_policy, double of_twin, const char* unit) {
-    if (std::abs(of_policy - of_twin) <= kSimilar * std::abs(of_twin)) return;
-    if (!text.empty()) text += ", ";
-    text += fmt::format("{} {:.3g} {} (twin {:.3g})", what, of_policy, unit, of_twin);
-  };
-  // Upright at rest, with straight links: inertia about joint 1 and its moment of gravity.
-  compare("inertia", own.Mass(1).M11, body.Mass(1).M11, "kg·m²");
-  compare("moment of gravity", own.G1 + own.G2, body.G1 + body.G2, "N·m");
-  compare("inertia of link 2", own.J2, body.J2, "kg·m²");
-  compare("torque limit", policy.plant.torque_limit, twin.plant.torque_limit, "N·m");
-  if (text.empty()) return;
-  fmt::print(stderr, "warning: {} was made for another plant: {}\n", Printable(policy.name), text);
-}
-
 /// Throws BadInput if a serial line is too slow for a frame per cycle in each direction.
 void CheckBaud(const LinkAddress& link, int64_t hz) {
   constexpr int64_t kBitsPerByte = 10;  // start, 8 bits, stop
@@ -133,8 +113,7 @@ Supervisor SupervisorOf(const RunArguments& a, const SizedSettings& settings,
                      .motor_limit = motor,
                      .actuated_joint = joint,
                      .angle_range = sensors.angle_range,
-                     .quantum = sensors.quantum,
-                     .period = 1 / a.hz});
+                     .quantum = sensors.quantum});
 }
 
 /// Opens the link to the twin or the machine, as g_link.
@@ -164,10 +143,8 @@ void PrintLimits(const Limits& limits, const Twin& machine) {
 void PrintDriver(const RunArguments& a, const LoadedPolicy& policy) {
   fmt::print("{} on {}, {} Hz, {}\n", Printable(policy.name), Printable(a.link), a.hz,
              NameOf(RobotOf(policy)));
-  if (policy.carried_over != Scale()) {
-    fmt::print("  carried over to a machine of another size: times × {:.4g}, torques × {:.4g}\n",
-               policy.carried_over.time, policy.carried_over.torque);
-  }
+  const std::string change = ChangeOfSize(policy);
+  if (!change.empty()) fmt::print("  {}\n", change);
   const double decides =
       static_cast<double>(CyclesIn(policy.control_period(), std::llround(a.hz))) / a.hz;
   if (std::abs(decides - policy.control_period()) > 1e-6) {
@@ -247,7 +224,8 @@ int RunRun(const RunArguments& a) {
   if (!twin && a.compensation > 0)
     throw BadInput("--compensation: expected --twin with it, got none");
   const MachinePolicy policy = GetMachinePolicy(a.policy, a.robot, twin, std::llround(a.hz));
-  if (twin) CompareWithTwin(*policy, *twin);
+  const std::string other = twin ? DifferencesFromTwin(*policy, *twin) : "";
+  if (!other.empty()) fmt::print(stderr, "warning: {}\n", other);
   return Drive(a, policy, twin, address);
 }
 

@@ -194,8 +194,7 @@ TEST(Supervisor, TakesTheReadingsOfARealMachineForMotions) {
     Supervisor supervisor({.limits = {.angle = 1e3, .velocity = 1e3, .energy = 1e3},
                            .start = {q[0], q[1], w[0], w[1]},
                            .angle_range = 1e3,
-                           .quantum = twin.sensors.quantum,
-                           .period = period});
+                           .quantum = twin.sensors.quantum});
     for (int k = 1; k < log.rows(); ++k, ++rows) {
       const double time = log.time[k];
       const TimedReading reading{{log.angle[k], log.measured[k]}, time};
@@ -209,7 +208,8 @@ TEST(Supervisor, TakesTheReadingsOfARealMachineForMotions) {
                        .zero = estimator.zero(),
                        .state = estimator.now(),
                        .ahead = estimator.ahead(),
-                       .energy = estimator.energy()});
+                       .energy = estimator.energy(),
+                       .period = period});
     }
     EXPECT_EQ(supervisor.reason(), "") << file;
     running += supervisor.state() == LoopState::kRunning ? 1 : 0;

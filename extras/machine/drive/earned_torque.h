@@ -34,10 +34,9 @@ struct EarnedTorqueConfig {
   double limit = 0;        // largest torque of the controller's motor, N·m
   int actuated_joint = 1;  // of this motor, 1 or 2
   TwinTrust trust = TwinTrust::kAlways;
-  bool hangs = true;      // whether the run begins with links that hang
-  double quantum = 0;     // step of the encoders, rad; 0: unknown
-  double period = 0.002;  // of the cycles, s
-  Scale scale = {};       // natural units of the machine over those of UsualPlant
+  bool hangs = true;   // whether the run begins with links that hang
+  double quantum = 0;  // step of the encoders, rad; 0: unknown
+  Scale scale = {};    // natural units of the machine over those of UsualPlant
 };
 
 /// Asks the joints for an answer before the controller drives, and watches that they go on
@@ -63,6 +62,7 @@ class EarnedTorque {
     double time = 0;  // s
     Joints angle{};   // read, rad
     Expectation expected{};
+    double period = 0.002;  // usual time between two cycles, s
   };
 
   explicit EarnedTorque(const EarnedTorqueConfig& config);

@@ -35,7 +35,7 @@ PendulumState StateOf(const Eigen::Matrix<double, 8, 1>& x) { return {x[0], x[1]
 }  // namespace
 
 Estimator::Estimator(const MachineSensors& sensors, double period)
-    : sensors_(sensors), period_(period), velocity_(sensors) {
+    : sensors_(sensors), period_(period), latency_(period), velocity_(sensors) {
   track_.x[kZero] = sensors.zero1;
   track_.x[kZero + 1] = sensors.zero2;
 }
@@ -52,6 +52,8 @@ Estimator::Estimator(const Twin& twin, double period, StateSource source)
   const int kept = static_cast<int>(kMostKept * std::max(1.0, scale.time));
   for (int i = kept; i > 0; --i) model_->drive.Add(-1 - i * 1e-3, {});
   model_->silent = model_->drive;
+  expectation_.delay_deviation =
+      std::sqrt(CovarianceOf(twin, "delay", "delay") + CovarianceOf(twin, "lag", "lag"));
 
   Vector& x = track_.x;
   Matrix& P = track_.P;
@@ -264,17 +266,22 @@ Joints Estimator::zero() const {
   return {track_.x[kZero], track_.x[kZero + 1]};
 }
 
-void Estimator::Update(double time, const Joints& sent, const TimedReading* reading) {
+void Estimator::Send(double time, const Joints& torque) {
+  sent_ = torque;
+  if (!model_) return;
+  model_->drive.Forget(time - LinkTime(kKept));
+  model_->drive.Add(time, torque);
+}
+
+void Estimator::Update(double time, const TimedReading* reading) {
   if (source_ == StateSource::kDifferences && reading != nullptr) {
     const Joints q{reading->angle[0] - sensors_.zero1, reading->angle[1] - sensors_.zero2};
     const Joints w = velocity_.Update(reading->time, q);
     now_ = ahead_ = {q[0], q[1], w[0], w[1]};
   }
   if (!model_) return;
-  model_->drive.Forget(time - LinkTime(kKept));
-  model_->drive.Add(time, sent);
   if (reading != nullptr && std::isfinite(reading->angle[0] + reading->angle[1])) {
-    const bool driven = sent != Joints{};
+    const bool driven = sent_ != Joints{};
     Take(*reading, driven);
     ExpectUnseen(*reading);
     ExpectResponse(*reading, driven);
@@ -287,7 +294,7 @@ void Estimator::Update(double time, const Joints& sent, const TimedReading* read
   const Vector now =
       Follow(drive, track_.x, track_.time, std::clamp(time - track_.time, 0.0, LinkTime(kKept)));
   now_ = StateOf(now);
-  ahead_ = StateOf(Follow(drive, now, time, period_ + model_->horizon));
+  ahead_ = StateOf(Follow(drive, now, time, latency_ + model_->horizon));
 }
 
 Joints Estimator::CompensationTorque(double share) const {

@@ -32,7 +32,7 @@ enum class StateSource { kTwin, kDifferences };
 /// Applications to Tracking and Navigation, 2001, 5.4). Outliers among the innovations are clipped.
 ///
 /// The prediction bridges lost readings. The controller gets the state at the time when its torque
-/// will act: a cycle, the motors' delay and their lag later.
+/// will act: when it is sent, and the motors' delay and their lag later.
 ///
 /// Noise and times are tuned on RealAIGym's machines. For twins of another size they count in
 /// natural units (ScaleOverUsual).
@@ -47,8 +47,21 @@ class Estimator {
   /// `source`: where the controller's state comes from.
   Estimator(const Twin& twin, double period, StateSource source = StateSource::kTwin);
 
+  /// Changes the usual time between two cycles, and the time from a reading to sending the torques
+  /// that answer it, s. At first both are the period of the cycles.
+  void SetTimes(double period, double latency) {
+    period_ = period;
+    latency_ = latency;
+  }
+  /// Takes the torques (N·m) sent at a time (s), later than those before.
+  void Send(double time, const Joints& torque);
+  /// Estimates the state at a time (s), with a new reading if there is one.
+  void Update(double time, const TimedReading* reading);
   /// Takes the torques (N·m) sent at a time (s), and a new reading if there is one.
-  void Update(double time, const Joints& sent, const TimedReading* reading);
+  void Update(double time, const Joints& sent, const TimedReading* reading) {
+    Send(time, sent);
+    Update(time, reading);
+  }
 
   /// The estimated state now: true angles, without the encoders' zeros.
   const PendulumState& now() const { return now_; }
@@ -122,7 +135,8 @@ class Estimator {
   void ExpectResponse(const TimedReading& reading, bool driven);
 
   MachineSensors sensors_;
-  double period_;
+  double period_, latency_;  // s
+  Joints sent_{};            // last torques, N·m
   StateSource source_ = StateSource::kDifferences;
   VelocityEstimate velocity_;
   std::optional<Model> model_;

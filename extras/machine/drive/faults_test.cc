@@ -167,12 +167,12 @@ TEST(Faults, RealMachinesHaveNone) {
   const Twin twin = ReadTwin("realaigym-twin", "twin");
   for (const auto& [file, log, period] : runs) {
     Estimator estimator(twin, period);
-    EarnedTorque earned(
-        {.limit = 5, .hangs = false, .quantum = twin.sensors.quantum, .period = period});
+    EarnedTorque earned({.limit = 5, .hangs = false, .quantum = twin.sensors.quantum});
     for (int k = 1; k < log.rows(); ++k) {
       const TimedReading reading{{log.angle[k], log.measured[k]}, log.time[k]};
       estimator.Update(log.time[k], log.commanded[k - 1], &reading);
-      earned.See({log.time[k], log.angle[k], estimator.expectation()}, log.commanded[k - 1]);
+      earned.See({log.time[k], log.angle[k], estimator.expectation(), period},
+                 log.commanded[k - 1]);
       ASSERT_FALSE(earned.JudgeRun()) << file << " at " << log.time[k] << " s";
     }
   }

@@ -18,8 +18,7 @@ RunOutcome RunCycles(const LearnConfig& c, const RunRules& rules, const MachineS
                          // Excitations make the twin that predicts the motion of a try.
                          .trust = rules.is_try ? TwinTrust::kInRun : TwinTrust::kNever,
                          .angle_range = sensors.angle_range,
-                         .quantum = sensors.quantum,
-                         .period = 1 / c.hz});
+                         .quantum = sensors.quantum});
   LoopConfig config{.hz = hz,
                     .seconds = rules.seconds,
                     .actuated_joint = c.actuated_joint,

@@ -111,8 +111,7 @@ struct LoopBench {
                                                       .motor_limit = motor_limit,
                                                       .actuated_joint = config.actuated_joint,
                                                       .angle_range = twin.sensors.angle_range,
-                                                      .quantum = twin.sensors.quantum,
-                                                      .period = period});
+                                                      .quantum = twin.sensors.quantum});
     log = std::make_unique<LogWriter>(log_path);
     loop = std::make_unique<ControlLoop>(config, *link, *estimator, *supervisor, machine_controller,
                                          *log);

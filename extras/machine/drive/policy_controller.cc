@@ -1,5 +1,7 @@
 #include "extras/machine/drive/policy_controller.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -7,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/text.h"
+#include "extras/machine/twin/motion.h"
 #include "pendulum/observation.h"
 
 namespace upswing::machine {
@@ -68,7 +71,7 @@ MachinePolicy GetMachinePolicy(PolicyArguments a, const std::string& robot,
   if (twin) {
     a.plant = WithoutDryFriction(twin->plant);
     if (asked) a.plant->actuated_joint = static_cast<int>(*asked);
-    if (IsController(a.name) && a.control_period == 0) {
+    if (IsController(a.name) && a.control_period == 0 && hz > 0) {
       const double period = kControlPeriod * TaskScaleOf(*a.plant).time;
       const double cycles = std::max(1.0, std::round(period * static_cast<double>(hz)));
       a.control_period = cycles / static_cast<double>(hz);
@@ -83,6 +86,37 @@ MachinePolicy GetMachinePolicy(PolicyArguments a, const std::string& robot,
   throw BadInput(Concat("--robot: expected ", NameOf(own), ", the robot of ",
                         Printable(policy->name), " (motor at joint ", static_cast<int>(own),
                         "), got ", NameOf(*asked)));
+}
+
+MachinePolicy ForMachine(const LoadedPolicy& loaded, const Twin& twin) {
+  ExpectPendulum(loaded);
+  const Plant plant = WithoutDryFriction(twin.plant);
+  return std::make_shared<const LoadedPolicy>(ForOtherSize(loaded, plant).value_or(loaded));
+}
+
+std::string DifferencesFromTwin(const LoadedPolicy& policy, const Twin& twin) {
+  constexpr double kSimilar = 0.2;  // relative difference that a policy usually withstands
+  const Manipulator own = ManipulatorOf(policy.plant), body = BodyOf(twin);
+  std::string text;
+  const auto compare = [&](const char* what, double of_policy, double of_twin, const char* unit) {
+    if (std::abs(of_policy - of_twin) <= kSimilar * std::abs(of_twin)) return;
+    if (!text.empty()) text += ", ";
+    text += fmt::format("{} {:.3g} {} (twin {:.3g})", what, of_policy, unit, of_twin);
+  };
+  // Upright at rest, with straight links: inertia about joint 1 and its moment of gravity.
+  compare("inertia", own.Mass(1).M11, body.Mass(1).M11, "kg·m²");
+  compare("moment of gravity", own.G1 + own.G2, body.G1 + body.G2, "N·m");
+  compare("inertia of link 2", own.J2, body.J2, "kg·m²");
+  compare("torque limit", policy.plant.torque_limit, twin.plant.torque_limit, "N·m");
+  if (text.empty()) return text;
+  return fmt::format("{} was made for another plant: {}", Printable(policy.name), text);
+}
+
+std::string ChangeOfSize(const LoadedPolicy& policy) {
+  const Scale& change = policy.carried_over;
+  if (change == Scale()) return {};
+  return fmt::format("carried over to a machine of another size: times × {:.4g}, torques × {:.4g}",
+                     change.time, change.torque);
 }
 
 MachineController ControllerOf(MachinePolicy policy) {

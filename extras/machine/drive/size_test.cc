@@ -363,8 +363,7 @@ TEST(Size, ARealSmallMachineHasNoFault) {
                            .scale = ScaleOverUsual(own.plant),
                            .start = first.now(),
                            .angle_range = 1e3,
-                           .quantum = own.sensors.quantum,
-                           .period = period});
+                           .quantum = own.sensors.quantum});
     double last = 0;
     for (const TimedReading& reading : readings) {
       estimator.Update(reading.time, reading.torque, &reading);
@@ -378,6 +377,7 @@ TEST(Size, ARealSmallMachineHasNoFault) {
                        .state = estimator.now(),
                        .ahead = estimator.ahead(),
                        .energy = estimator.energy(),
+                       .period = period,
                        .expected = estimator.expectation()});
       last = reading.time;
     }

@@ -120,7 +120,6 @@ Supervisor::Supervisor(const SupervisorConfig& config)
                .trust = config.trust,
                .hangs = HangSlowly(config.start, kSlow * config.scale.velocity()),
                .quantum = config.quantum,
-               .period = config.period,
                .scale = config.scale}) {
   const double step = config_.quantum > 0 ? config_.quantum : kUnknownStep;
   for (Joint& joint : joints_) {
@@ -237,7 +236,7 @@ Complaint Supervisor::CheckEstimate(const CycleFacts& facts) const {
   const Joints q{q1, q2}, w{w1, w2};
   for (size_t j = 0; j < 2; ++j) {
     const double error = facts.angle[j] - facts.zero[j] - q[j];
-    if (Within(error, kLargestEstimateError + std::abs(w[j]) * (facts.age + config_.period)))
+    if (Within(error, kLargestEstimateError + std::abs(w[j]) * (facts.age + facts.period)))
       continue;
     return {"joint %.0f: the estimate is %.4g rad from the reading",
             {static_cast<double>(j + 1), error}};
@@ -250,7 +249,7 @@ Complaint Supervisor::CheckEstimate(const CycleFacts& facts) const {
 Complaint Supervisor::CheckSlip(const CycleFacts& facts) const {
   const Expectation& e = facts.expected;
   if (!e.known || config_.trust == TwinTrust::kNever) return {};
-  if (!facts.fresh || e.gap < kLostCycles * config_.period ||
+  if (!facts.fresh || e.gap < kLostCycles * facts.period ||
       e.gap > std::max(kLongestLoss, Time(kLongestLoss)))
     return {};
   const Joints w{facts.state.w1, facts.state.w2};
@@ -290,7 +289,7 @@ Complaint Supervisor::CheckLimits(const CycleFacts& facts) const {
 void Supervisor::GoOnBraking(const CycleFacts& facts) {
   const double velocity = std::max(std::abs(facts.state.w1), std::abs(facts.state.w2));
   // The energy of an estimate is noisy, and the last torques of the controller still act at first.
-  energy_ += std::min(config_.period / Time(kEnergyTime), 1.0) * (facts.energy - energy_);
+  energy_ += std::min(facts.period / Time(kEnergyTime), 1.0) * (facts.energy - energy_);
   least_energy_ = std::min(least_energy_, energy_);
   if (!Within(velocity, kBrakeShare * config_.limits.velocity) ||
       !Within(facts.energy, kBrakeShare * config_.limits.energy) ||
@@ -362,7 +361,7 @@ LoopState Supervisor::Step(const CycleFacts& facts) {
       Fail(complaint);
       return state_;
     }
-    earned_.See({facts.read_at, facts.angle, facts.expected}, torque_);
+    earned_.See({facts.read_at, facts.angle, facts.expected, facts.period}, torque_);
   }
   if (!CheckAge(facts.age)) return state_;
   if (state_ != LoopState::kIdle) {
@@ -409,7 +408,7 @@ void Supervisor::Drive(const CycleFacts& facts) {
 /// Damping by the least of the measured and the estimated velocities, where all have the same sign.
 /// Near the end of a swing they differ, and a torque would add energy.
 Joints Supervisor::BrakeTorque(const CycleFacts& facts) const {
-  if (!facts.fresh || facts.age > kBrakeCycles * config_.period) return {};
+  if (!facts.fresh || facts.age > kBrakeCycles * facts.period) return {};
   const Joints now{facts.state.w1, facts.state.w2}, ahead{facts.ahead.w1, facts.ahead.w2};
   Joints torque{};
   for (size_t j = 0; j < 2; ++j) {
@@ -443,7 +442,7 @@ Joints Supervisor::Torque(const Joints& controller, const CycleFacts& facts) {
   return torque_;
 }
 
-PendulumState ParsePendulumStart(const std::string& text) {
+PendulumState ParsePendulumStart(const std::string& text, const std::string& where) {
   if (text == "hanging") return {};
   if (text == "upright") return {std::numbers::pi, 0, 0, 0};
   std::vector<double> numbers;
@@ -452,7 +451,7 @@ PendulumState ParsePendulumStart(const std::string& text) {
     if (number && Within(*number, kLargestStart)) numbers.push_back(*number);
   }
   if (numbers.size() != 4 || std::ranges::count(text, ',') != 3) {
-    throw BadInput(Concat("--start: expected hanging, upright or four numbers q1,q2,w1,w2 within ±",
+    throw BadInput(Concat(where, ": expected hanging, upright or four numbers q1,q2,w1,w2 within ±",
                           kLargestStart, ", got \"", Printable(text), "\""));
   }
   return {numbers[0], numbers[1], numbers[2], numbers[3]};

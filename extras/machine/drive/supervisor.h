@@ -62,6 +62,7 @@ struct CycleFacts {
   PendulumState state{};     // estimate of the true state now
   PendulumState ahead{};     // the same when a torque that is sent next will act
   double energy = 0;         // see Limits; 0 if unknown
+  double period = 0.002;     // usual time between two cycles, s
   Expectation expected{};    // motion that the encoders have to show
   bool stop = false;         // whether the user or the end of the run asks for a stop
 };
@@ -79,7 +80,6 @@ struct SupervisorConfig {
   TwinTrust trust = TwinTrust::kAlways;
   double angle_range = 0;  // of the encoders, rad
   double quantum = 0;      // of the encoders, rad
-  double period = 0.002;   // of the cycles, s
 };
 
 /// The state machine. Faults are latched. For any inputs, torques are finite and within their
@@ -167,7 +167,7 @@ class Supervisor {
 };
 
 /// Parses a start state: hanging, upright, or q1,q2,w1,w2 (rad, rad/s). Throws BadInput that begins
-/// with --start.
-PendulumState ParsePendulumStart(const std::string& text);
+/// with `where`.
+PendulumState ParsePendulumStart(const std::string& text, const std::string& where = "--start");
 
 }  // namespace upswing::machine

@@ -28,8 +28,7 @@ struct Bench {
                          .start = start,
                          .motor_limit = {5, 0.5},
                          .angle_range = kRange,
-                         .quantum = kQuantum,
-                         .period = kCycle}};
+                         .quantum = kQuantum}};
   CycleFacts facts{.fresh = true, .expected = {.known = true}};
 
   explicit Bench(const Limits& l = {}, const PendulumState& s = kHeld) : limits(l), start(s) {}
@@ -522,6 +521,27 @@ TEST(Start, IsParsed) {
   for (const char* wrong :
        {"", "1", "1,2,3", "1,2,3,4,5", "1,2,3,x", "nan,0,0,0", "1e9,0,0,0", "1,,2,3,4"}) {
     EXPECT_THROW(ParsePendulumStart(wrong), Error) << wrong;
+  }
+}
+
+TEST(Supervisor, PlausibleMotionsFollowTheSizeOfTheMachine) {
+  // Both joints accelerate by 5000 rad/s² for 8 ms, which a link of 5 cm can and one of 0.5 m
+  // cannot.
+  for (const double time : {1.0, 0.3}) {
+    Bench bench({.velocity = 1e3});
+    bench.supervisor = Supervisor({.limits = bench.limits,
+                                   .scale = {.time = time},
+                                   .start = {0, 0, 0.4 / time, 0},
+                                   .motor_limit = {5, 0.5},
+                                   .angle_range = kRange,
+                                   .quantum = kQuantum});
+    bench.Run();
+    double velocity = 0;
+    for (int k = 0; k < 4; ++k) {
+      velocity += 5000 * kCycle;
+      bench.Move(velocity, velocity);
+    }
+    EXPECT_EQ(bench.supervisor.reason().empty(), time < 1) << bench.supervisor.reason();
   }
 }
 

@@ -226,8 +226,8 @@ LogColumns RealAiGymColumns(const std::vector<std::string>& names, const std::st
 }
 
 /// Turns numbers of a column into SI units. Throws BadInput for a huge one.
-void Scale(std::vector<double>& values, const LogColumn& column, bool is_time,
-           const std::string& where) {
+void ToBaseUnits(std::vector<double>& values, const LogColumn& column, bool is_time,
+                 const std::string& where) {
   for (size_t row = 0; row < values.size(); ++row) {
     double& x = values[row];
     x = (x - column.hanging) * column.scale;
@@ -263,14 +263,14 @@ WholeLog ReadRows(std::string_view csv, const LogColumns& columns, const std::st
   WholeLog whole;
   if (!columns.piece.empty()) whole.piece = TakeValues(table, columns.piece);
   whole.log.time = TakeValues(table, columns.time.name);
-  Scale(whole.log.time, columns.time, /*is_time=*/true, where);
+  ToBaseUnits(whole.log.time, columns.time, /*is_time=*/true, where);
   for (const JointQuantity& q : kJointQuantities) {
     std::vector<Joints>& values = whole.log.*q.values;
     for (int joint = 0; joint < 2; ++joint) {
       const LogColumn& column = (columns.*q.columns)[joint];
       if (column.name.empty()) continue;
       std::vector<double> numbers = TakeValues(table, column.name);
-      Scale(numbers, column, /*is_time=*/false, where);
+      ToBaseUnits(numbers, column, /*is_time=*/false, where);
       values.resize(numbers.size());
       for (size_t row = 0; row < numbers.size(); ++row) values[row][joint] = numbers[row];
     }
