@@ -199,6 +199,10 @@ The package `upswing`. [Python](../howto/python.md) shows how to use it.
    :exclude-members: Error, Failure, InputError
    :imported-members:
 
+.. automodule:: upswing.machine
+   :members:
+   :special-members: __call__
+
 .. py:exception:: upswing.InputError
 
    An argument is wrong. A :py:exc:`ValueError`.

@@ -141,5 +141,6 @@ void BindEnvironments(nanobind::module_& m);
 void BindPolicies(nanobind::module_& m);
 void BindTraining(nanobind::module_& m);
 void BindEvaluation(nanobind::module_& m);
+void BindMachine(nanobind::module_& m);
 
 }  // namespace upswing

@@ -10,4 +10,5 @@ NB_MODULE(_upswing, m) {
   upswing::BindPolicies(m);
   upswing::BindTraining(m);
   upswing::BindEvaluation(m);
+  upswing::BindMachine(m);
 }

@@ -29,7 +29,7 @@ import numpy as np
 import numpy.typing as npt
 import upswing
 from upswing import (DoublePendulumEnv, DoublePendulumVectorEnv, Error, Evaluation, Failure, InputError, Map, Policy,
-                     Setting, Training, agents, evaluate, load_policy, map, settings, train)
+                     Setting, Training, agents, evaluate, load_policy, machine, map, settings, train)
 
 
 def stop(row: dict[str, Any]) -> bool:
@@ -66,6 +66,13 @@ obs, infos = envs.reset(seed=[1, 2, 3])
 obs, rewards, ends, cuts, infos = envs.step(envs.action_space.sample())
 rewards.mean()
 made = gym.make("upswing/DoublePendulum-v0")
+controller: machine.Controller = machine.Controller(best, twin=Path("twin.toml"), start=[0, 0, 0, 0], latency=None,
+                                                    max_torque=0.1)
+torques: list[float] = controller(0.1, np.zeros(2), [0, 0])
+stopped: str | None = controller.stopped
+fake = machine.FakeMachine("cloudpendulum", draw=1)
+fake.send(torques)
+angles: list[float] = fake.read()
 train("ppo", env=made, steps=100, num_envs=2)
 train("ppo", env=lambda: gym.make("CartPole-v1"))
 try:

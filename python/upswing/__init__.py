@@ -18,6 +18,7 @@ from gymnasium.envs.registration import register as _register
 from . import _mujoco as _mujoco  # loads MuJoCo's library, which the next module needs
 from ._upswing import Error, Failure, InputError
 from ._upswing import version as __version__
+from . import machine
 from .envs import DoublePendulumEnv, DoublePendulumVectorEnv
 from .evaluation import Evaluation, Map, evaluate, map  # pylint: disable=redefined-builtin
 from .policy import Policy, load_policy
@@ -39,6 +40,7 @@ __all__ = [
     "agents",
     "evaluate",
     "load_policy",
+    "machine",
     "map",
     "settings",
     "train",

@@ -152,11 +152,14 @@ def load_policy(
     Raises:
         InputError: the policy does not exist, or its file is broken or of another kind
     """
+    return _load(path_of("path", path), texts_of(settings), changes_of(made_for))
+
+
+def changes_of(made_for: Mapping[str, float] | PathLike | None) -> list[str]:
+    """Changes of a controller's design plant as texts, or its plant file."""
     if isinstance(made_for, (str, bytes, os.PathLike)):
-        changes = [path_of("made_for", made_for)]
-    else:
-        changes = [f"{name}={text_of(value)}" for name, value in (made_for or {}).items()]
-    return _load(path_of("path", path), texts_of(settings), changes)
+        return [path_of("made_for", made_for)]
+    return [f"{name}={text_of(value)}" for name, value in (made_for or {}).items()]
 
 
 def _load(name: str, settings: list[tuple[str, str]], made_for: list[str]) -> Policy:
