@@ -37,7 +37,7 @@ struct OlympicsRun {
 };
 
 /// Runs on `count` machines drawn from the twin's posterior, with cycles of which one in 250 is
-/// late by up to 67.5 ms, as in logs of the machine's users. The policy's motor alone drives; it
+/// late by up to 67.5 ms, as in logs of the machine's users. Only the policy's motor drives; it
 /// compensates most of its own joint's dry friction. An Estimator of the twin gives the state.
 /// Throws BadInput if the policy's control period is no whole number of cycles.
 std::vector<OlympicsRun> RunOlympics(const Twin& twin, const MachinePolicy& policy, int count,

@@ -16,7 +16,7 @@ namespace upswing::machine {
 
 /// Rows of the derivatives of a motion: by the start state (q1, q2, w1, w2), by the constants of
 /// Manipulator in their order, by the drive's times, by the coefficients of cogging and by
-/// the encoders' zeros, on which it depends. Motions without cogging lack the last two.
+/// the encoders' zeros. Cogging depends on the zeros, so motions without it lack the last two.
 namespace tangent {
 enum Row {
   kStart = 0,
