@@ -132,7 +132,8 @@ std::shared_ptr<PolicyHandle> Redesign(const std::string& controller, const Sett
   SetFlags(OptionsOf(config), FlagsOf(settings));
   if (swing_up) config.swing_up_policy = PolicyOf(*swing_up, config.swing_up).policy;
   const nb::gil_scoped_release unlocked;
-  return std::make_shared<PolicyHandle>(DesignController(controller, config, title));
+  return std::make_shared<PolicyHandle>(
+      DesignController(controller, config, title, {controller, FlagsOf(settings), {}}));
 }
 
 }  // namespace

@@ -215,5 +215,37 @@ class SwingUp(ProgramTest):
             self.refuse(["eval", controller, "--made-for", LOST], "lqr: found no gain", "delta")
 
 
+class OtherSize(ProgramTest):
+    """Settings that are given hold for plants of any size; others follow the plant."""
+
+    PLANT = """[plant]
+mass1 = 0.01
+mass2 = 0.01
+length1 = 0.05
+length2 = 0.05
+damping1 = 6e-5
+damping2 = 6e-5
+torque_limit = 5e-3
+armature = 1e-6
+"""
+
+    def evaluate(self, *arguments):
+        self.write("small.toml", self.PLANT)
+        done = self.run_here("eval", "tvlqr", "--plant", "small.toml", "--episodes", 1, "--physics",
+                             "closed-form", "--json", *arguments)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return json.loads(done.stdout), done.stderr
+
+    def test_a_given_period_is_that_of_the_small_plant(self):
+        self.assertRegex(self.evaluate()[1], r"a decision every 0\.006\d* s")
+        self.assertIn("a decision every 0.005 s", self.evaluate("--control-period", 0.005)[1])
+
+    def test_a_given_time_is_that_of_the_small_plant(self):
+        # The default is 4 s for the built-in plant, so 1.3 s for this one.
+        usual, given = (self.evaluate(*more)[0]["swing_up_seconds"]
+                        for more in ((), ("--tvlqr-seconds", 4)))
+        self.assertNotEqual(usual, given)
+
+
 if __name__ == "__main__":
     unittest.main()

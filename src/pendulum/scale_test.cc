@@ -91,9 +91,9 @@ std::vector<double> History(PendulumEnv& env, double time) {
 
 TEST(Scale, EpisodesOfAPlantAndItsImageAreTheSame) {
   Rng rng(1, "test");
-  for (int n = 0; n < 30; ++n) {
+  for (int n = 0; n < 100; ++n) {
     const Plant plant = OwnLinks(rng);
-    for (const double length : {0.02, 0.1, 0.5, 10.0}) {
+    for (const double length : {0.02, 0.1, 0.3, 3.0, 10.0}) {
       const double mass = std::exp(rng.Uniform(-3, 3)), time = std::sqrt(length);
       PendulumEnvConfig config;
       config.plants = {plant};

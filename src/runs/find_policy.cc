@@ -133,7 +133,8 @@ LoadedPolicy DesignNamed(const PolicyArguments& a) {
   ControllerConfig config = ControllerConfig::For(plant);
   SetFlags(OptionsOf(config), a.flags);
   config.swing_up_policy = swing_up;
-  return DesignController(a.name, config, TitleOf(a.name, config, made_for.name, made_for.plant));
+  return DesignController(a.name, config, TitleOf(a.name, config, made_for.name, made_for.plant),
+                          a);
 }
 
 /// Throws BadInput if a setting belongs to no controller in `names`.
@@ -216,11 +217,16 @@ LoadedPolicy GetPolicy(const PolicyArguments& a) {
 }
 
 LoadedPolicy DesignController(const std::string& name, const ControllerConfig& config,
-                              const std::string& title) {
-  const auto design_for = [name, config](const Plant& plant) {
+                              const std::string& title,
+                              const PolicyArguments& given) {
+  const auto design_for = [name, config, given](const Plant& plant) {
     ControllerConfig other = config;
     const Scale ratio = CarryOver(config.plant, plant);
-    if (ratio != Scale()) other = config.In(ratio);
+    if (ratio != Scale()) {
+      other = config.In(ratio);
+      SetFlags(OptionsOf(other), given.flags);
+      if (given.control_period > 0) other.plant.control_period = given.control_period;
+    }
     static_cast<Plant&>(other.plant) = plant;
     return MakeController(name, other);
   };

@@ -35,10 +35,11 @@ std::vector<std::string> ShippedPolicies();
 /// a policy that is not a controller.
 LoadedPolicy GetPolicy(const PolicyArguments& a);
 
-/// Makes the controller `name`, which messages call `title`, without reading a file. Throws as
+/// Makes the controller `name`, which messages call `title`, without reading a file. The settings
+/// and the control period of `given` hold for plants of any size; others follow the plant. Throws as
 /// MakeController does.
 LoadedPolicy DesignController(const std::string& name, const ControllerConfig& config,
-                              const std::string& title);
+                              const std::string& title, const PolicyArguments& given = {});
 
 /// Gets policies of the double pendulum by these names, each a PolicyArguments::name. Each
 /// controller gets those settings in `controllers` that it has. Throws BadInput if none of the
