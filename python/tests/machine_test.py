@@ -259,5 +259,52 @@ class Controllers(BadInputTest):
                     draw=1)
 
 
+class Archives(BadInputTest):
+    """Logs in archives of NumPy."""
+
+    def setUp(self):
+        temporary = tempfile.TemporaryDirectory()
+        self.addCleanup(temporary.cleanup)
+        self.folder = Path(temporary.name)
+        self.t = np.arange(5) / 100
+        self.q = np.column_stack([np.sin(self.t), 1 / (3 + self.t)])
+
+    def convert(self, arrays, **settings):
+        np.savez_compressed(self.folder / "log.npz", **arrays)
+        return upswing.machine.csv_of_npz(self.folder / "log.npz", self.folder / "csv", **settings)
+
+    def test_logs_become_files_with_the_same_numbers(self):
+        u = np.linspace(-1, 1, 5)
+        files = self.convert({"a_t": self.t, "a_q": self.q, "a_dq": 2 * self.q, "a_u": u, "note": "text",
+                              "b_t": self.t, "b_q": self.q}, torque_joint=2)
+        self.assertEqual([file.name for file in files], ["a.csv", "b.csv"])
+        with files[0].open(encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        self.assertEqual([float(row["pos_meas2"]) for row in rows], list(self.q[:, 1]))
+        self.assertEqual([float(row["vel_meas1"]) for row in rows], list(2 * self.q[:, 0]))
+        self.assertEqual([float(row["tau_con2"]) for row in rows], list(u))
+        self.assertEqual({row["tau_con1"] for row in rows}, {"0"})
+        self.refuse("a.csv: expected a new file", self.convert, {"a_t": self.t, "a_q": self.q})
+
+    def test_wrong_archives_are_refused(self):
+        good = {"t": self.t, "q": self.q}
+        for what, arrays in (
+                ("expected an array called t, got q", {"q": self.q}),
+                ("q: expected this array, got none", {"t": self.t}),
+                ("q: expected the shape (5, 2), got (2, 5)", good | {"q": self.q.T}),
+                ("dq: expected finite numbers", good | {"dq": np.full((5, 2), np.nan)}),
+                ("u: expected torque_joint=1 or 2", good | {"u": self.t}),
+                ("t: expected finite numbers, got others", good | {"t": np.array(list("abcde"))}),
+                ("expected the name of a log, got '../x'", {"../x_t": self.t, "../x_q": self.q})):
+            with self.subTest(what):
+                self.refuse(what, self.convert, arrays)
+        self.refuse("torque_joint: expected 1, 2 or None, got 3", self.convert, good, torque_joint=3)
+        (self.folder / "text.npz").write_text("no archive", encoding="utf-8")
+        for name in ("text.npz", "missing.npz"):
+            self.refuse("expected an archive of NumPy", upswing.machine.csv_of_npz, self.folder / name,
+                        self.folder)
+        self.assertFalse((self.folder / "csv").exists())
+
+
 if __name__ == "__main__":
     unittest.main()

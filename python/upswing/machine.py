@@ -1,11 +1,13 @@
-"""A controller of a real machine for a loop of your own."""
+"""A controller of a real machine for a loop of your own, and logs of such machines."""
 
 from __future__ import annotations
 
 import os
 import warnings
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, Union
+from zipfile import BadZipFile
 
 import numpy as np
 import numpy.typing as npt
@@ -263,3 +265,87 @@ def _pair(name: str, numbers: npt.ArrayLike) -> list[float]:
     if pair.shape != (2,):
         raise _upswing.InputError(f"{name}: expected two numbers, one of each joint, got {numbers!r}")
     return [float(pair[0]), float(pair[1])]
+
+
+def csv_of_npz(file: PathLike, folder: PathLike, *, torque_joint: int | None = None) -> list[Path]:
+    """Writes the logs in an archive of NumPy as CSV files for `upswing machine`.
+
+    A log has the arrays t (n), q (n × 2), dq (n × 2, may be missing), and u (n × 2, or n for the
+    torque of one joint, may be missing), in s, rad, rad/s and N·m. In an archive of several logs,
+    the log's name and an underscore come before these names, as in run1_q. Other arrays are left
+    out. Pickled objects are not read.
+
+    Args:
+        file: archive, .npz
+        folder: folder of the CSV files, which is made if it is missing
+        torque_joint: joint on which torques of one joint act, 1 or 2
+
+    Returns:
+        the files, each with the name of its log, or of an archive of one
+
+    Raises:
+        InputError: the archive has no log, its arrays do not fit, or a CSV file exists
+    """
+    source, target = path_of("file", file), Path(path_of("folder", folder))
+    if torque_joint not in (None, 1, 2):
+        raise _upswing.InputError(f"torque_joint: expected 1, 2 or None, got {torque_joint!r}")
+    try:
+        with np.load(source, allow_pickle=False) as archive:
+            arrays = dict(archive.items()) if hasattr(archive, "items") else {}
+    except (OSError, ValueError, BadZipFile) as error:
+        reason = str(error).splitlines()[0]
+        raise _upswing.InputError(f"{source}: expected an archive of NumPy, got: {reason}") from None
+    names = [key[:-1].rstrip("_") for key in arrays if key == "t" or key.endswith("_t")]
+    if not names:
+        raise _upswing.InputError(f"{source}: expected an array called t, got "
+                                  f"{', '.join(list(arrays)[:5]) or 'none'}")
+    logs = {}
+    for name in names:
+        if os.path.basename(name) != name or not name.isprintable():
+            raise _upswing.InputError(f"{source}: expected the name of a log, got {name!r}")
+        path = target / f"{name or Path(source).stem}.csv"
+        if os.path.lexists(path):
+            raise _upswing.InputError(f"{path}: expected a new file, got one that exists")
+        logs[path] = _columns_of(arrays, f"{name}_" if name else "", source, torque_joint)
+    target.mkdir(parents=True, exist_ok=True)
+    for path, columns in logs.items():
+        with path.open("x", encoding="utf-8") as out:
+            np.savetxt(out, np.column_stack(list(columns.values())), "%.17g", delimiter=",",
+                       header=",".join(columns), comments="")
+    return list(logs)
+
+
+def _columns_of(arrays: Mapping[str, Any], prefix: str, source: str,
+                torque_joint: int | None) -> dict[str, npt.NDArray[np.float64]]:
+    """The columns (n) of a log by their names in CSV files. Raises InputError."""
+
+    def array(key: str, *shapes: tuple[int, ...]) -> Any:
+        where = f"{source}: {prefix}{key}"
+        if prefix + key not in arrays:
+            raise _upswing.InputError(f"{where}: expected this array, got none")
+        found = arrays[prefix + key]
+        if shapes and found.shape not in shapes:
+            expected = " or ".join(str(shape) for shape in shapes)
+            raise _upswing.InputError(f"{where}: expected the shape {expected}, got {found.shape}")
+        if found.dtype.kind not in "fiu" or not np.isfinite(found).all():
+            raise _upswing.InputError(f"{where}: expected finite numbers, got others")
+        return found
+
+    t = array("t")
+    n = len(t) if t.ndim == 1 else 0
+    array("t", (n,))
+    columns = {"time": t}
+    q = array("q", (n, 2))
+    columns |= {"pos_meas1": q[:, 0], "pos_meas2": q[:, 1]}
+    if prefix + "dq" in arrays:
+        w = array("dq", (n, 2))
+        columns |= {"vel_meas1": w[:, 0], "vel_meas2": w[:, 1]}
+    if prefix + "u" not in arrays:
+        return columns
+    u = array("u", (n, 2), (n,))
+    if u.ndim == 1:
+        if torque_joint is None:
+            raise _upswing.InputError(
+                f"{source}: {prefix}u: expected torque_joint=1 or 2 with torques of one joint, got None")
+        u = np.column_stack([u if joint == torque_joint else np.zeros(n) for joint in (1, 2)])
+    return columns | {"tau_con1": u[:, 0], "tau_con2": u[:, 1]}
