@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 
+#include "base/error.h"
 #include "base/rng.h"
 #include "extras/machine/drive/estimator.h"
 #include "extras/machine/twin/simulated_machine.h"
@@ -84,10 +85,12 @@ class Run {
       run.poses += Holds();
     }
     // A push tests links that stand.
-    for (int k = 0; k < kOlympicsPushes && within_limits_ && (k > 0 || Holds()); ++k) {
+    bool stands = Holds();
+    for (int k = 0; k < kOlympicsPushes && stands; ++k) {
       push_ = PushOf(k);
       push_end_ = time_ + kPushSeconds;
-      run.pushes += Holds();
+      stands = Holds();
+      run.pushes += stands;
     }
     run.within_limits = within_limits_;
     return run;
@@ -111,11 +114,15 @@ class Run {
     double period = kPeriod;
     if (rng_.Uniform() < kLateShare) period += rng_.Uniform(0, kLatest);
     // A cycle sends the torques of the cycle before.
-    Joints torque = answer_;
-    if (time_ < push_end_) torque[0] += push_;
-    machine_.Command(torque);
+    const Joints sent = answer_;
+    const bool pushed = time_ < push_end_;
+    machine_.Command({sent[0] + (pushed ? push_ : 0), sent[1]});
     answer_ = pilot_.Torque(time_, machine_.Read().angle);
     time_ += period;
+    if (pushed && time_ >= push_end_) {
+      machine_.Advance(push_end_);
+      machine_.Command(sent);
+    }
     machine_.Advance(time_);
     const PendulumState& s = machine_.state();
     within_limits_ = std::max(std::abs(s.w1), std::abs(s.w2)) <= kOlympicsVelocity &&
@@ -154,7 +161,11 @@ class Run {
 
 std::vector<OlympicsRun> RunOlympics(const Twin& twin, const MachinePolicy& policy, int count,
                                      uint64_t seed, ThreadPool* pool, const Progress& progress) {
-  CyclesIn(policy->control_period(), kOlympicsHz);
+  if (CarryOver(ReadTwin("cloudpendulum", "olympics").plant, twin.plant) != Scale()) {
+    throw BadInput(
+        "--twin: expected a machine of about the size of cloudpendulum, for which the pushes and "
+        "limits of 2026 are, got one of another size");
+  }
   return RunAll(count, pool, progress, [&](int i) {
     Rng rng(seed, "olympics: machine", static_cast<uint64_t>(i));
     const Twin machine = DrawTwin(twin, rng);

@@ -20,14 +20,15 @@ inline constexpr int64_t kOlympicsHz = 400;
 /// Largest velocity (rad/s) and angle (rad) of a joint. A run ends beyond them.
 inline constexpr double kOlympicsVelocity = 50, kOlympicsAngle = 50.27;
 /// The disturbances of a run: poses to which a hand leads the links within half a second, and
-/// torques of 0.02 to 0.1 N·m at joint 1 for 0.1 s, in both directions. Each follows 3 s at the
-/// goal.
+/// torques of 0.02 to 0.1 N·m at joint 1 for 0.1 s, in both directions. A push follows 3 s at the
+/// goal; after one from which the links do not come back, the others count as failed. A pose comes
+/// in any case.
 inline constexpr int kOlympicsPoses = 24, kOlympicsPushes = 10;
 
 /// The outcome of a run.
 struct OlympicsRun {
   bool held = false;           // whether the links swing up and stay for 3 s
-  double swing_up = 0;         // time until they stay, s
+  double swing_up = 0;         // time until they stay, if they do, s
   int poses = 0, pushes = 0;   // disturbances after which they stay again
   bool within_limits = false;  // whether the run kept the limits of the machine
 
@@ -38,8 +39,9 @@ struct OlympicsRun {
 
 /// Runs on `count` machines drawn from the twin's posterior, with cycles of which one in 250 is
 /// late by up to 67.5 ms, as in logs of the machine's users. Only the policy's motor drives; it
-/// compensates most of its own joint's dry friction. An Estimator of the twin gives the state.
-/// Throws BadInput if the policy's control period is no whole number of cycles.
+/// compensates most of its own joint's dry friction, and acts in the cycle next to the end of its
+/// control period. An Estimator of the twin gives the state. Throws BadInput for a twin of another
+/// size than CloudPendulum's machines.
 std::vector<OlympicsRun> RunOlympics(const Twin& twin, const MachinePolicy& policy, int count,
                                      uint64_t seed, ThreadPool* pool,
                                      const Progress& progress = nullptr);

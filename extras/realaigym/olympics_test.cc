@@ -48,13 +48,9 @@ TEST(Olympics, ModelPredictiveControlSwingsUpAndSeedsRepeat) {
   EXPECT_EQ(first[0].poses, again[0].poses);
 }
 
-TEST(Olympics, RefusesAPolicyWithoutWholeCycles) {
-  const Twin twin = SmoothMachine();
-  PolicyArguments arguments;
-  arguments.name = "lqr";
-  arguments.control_period = 0.0038;
-  const MachinePolicy policy = GetMachinePolicy(arguments, "", twin, kOlympicsHz);
-  EXPECT_THROW(RunOlympics(twin, policy, 1, 1, nullptr), Error);
+TEST(Olympics, RefusesMachinesOfAnotherSize) {
+  const Twin large = ReadTwin("realaigym-c1", "test");
+  EXPECT_THROW(RunOlympics(large, PolicyFor(large, "lqr"), 1, 1, nullptr), Error);
 }
 
 }  // namespace
