@@ -34,3 +34,16 @@ test("writes CSV with time from the history's start", () => {
     't,qpos0,qpos1,qvel0,qvel1,torque\n0.00,0,0,0,0,1.25\n0.02,0.1,-0.3333333333333333,0,2,1.25\n',
   );
 });
+
+test('writes only the moments at the last size, in its units', () => {
+  const history = new History(10);
+  const moved = { ...moment(3.02), state: { q1: 0.1, q2: 0, w1: 1, w2: 2 } };
+  history.add(moment(3));
+  history.add(moved, 4);
+  history.add({ ...moved, t: 3.04 }, 4);
+  const rows = history.csv().trimEnd().split('\n').slice(1);
+  expect(rows.map((row) => row.split(',').slice(0, 5))).toEqual([
+    ['0.00', '0.1', '0', '0.5', '1'],
+    ['0.04', '0.1', '0', '0.5', '1'],
+  ]);
+});

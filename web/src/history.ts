@@ -10,12 +10,16 @@ export class History {
   private moments: Moment[] = [];
   private first = 0; // index of the oldest moment that is kept
   private readonly seconds: number;
+  private size = 1; // of the pendulum
+  private sizedAt = -Infinity; // when it got this size, s
 
   constructor(seconds: number) {
     this.seconds = seconds;
   }
 
-  add(moment: Moment): void {
+  add(moment: Moment, size = 1): void {
+    if (size !== this.size) this.sizedAt = moment.t;
+    this.size = size;
     this.moments.push(moment);
     while (this.moments[this.first]!.t < moment.t - this.seconds - MARGIN) ++this.first;
     // Removes old moments in bulk, not at each step.
@@ -38,11 +42,14 @@ export class History {
   clear(): void {
     this.moments = [];
     this.first = 0;
+    this.sizedAt = -Infinity;
   }
 
-  /// CSV as `upswing simulate` writes it, in SI units and with all digits; time starts at 0.
-  csv(units = new Units(1)): string {
-    const kept = this.moments.slice(this.first);
+  /// CSV of the moments at this size, as `upswing simulate` writes it, in SI units and with all
+  /// digits; time starts at 0.
+  csv(): string {
+    const units = new Units(this.size);
+    const kept = this.from(this.sizedAt);
     const times = kept.map(({ t }) => units.time * (t - kept[0]!.t));
     const decimals = decimalsFor(times);
     const { torque: newtonMetres, velocity } = units;

@@ -125,7 +125,7 @@ test('the trajectory is saved in true numbers', async ({ stage: page }) => {
   await open(page, '#size=4');
   await startFrom(page, 1, 0, 2);
   const rows = await run(page, 1);
-  const csv = await page.evaluate(() => upswing.stage.history.csv(upswing.world.units));
+  const csv = await page.evaluate(() => upswing.stage.history.csv());
   const saved = csv
     .trim()
     .split('\n')

@@ -53,7 +53,7 @@ export class Page {
     );
     this.router = new Router(this, this);
     world.onMoment = (moment) => {
-      this.stage.history.add(moment);
+      this.stage.history.add(moment, this.stage.world.plant.size);
       this.tour.moment(moment);
     };
     world.onChange = () => this.frames.wake();
@@ -166,7 +166,7 @@ export class Page {
     };
     listenToKeys(actions, () => router.keys);
     restoreOnScroll();
-    button('save', () => save(stage.history, world.units));
+    button('save', () => save(stage.history));
     nameSendButtons();
     listenToFilms(
       () => (world.twin ? [scene, twin.scene] : [scene]),

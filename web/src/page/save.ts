@@ -1,5 +1,4 @@
 import type { History } from '../history';
-import type { Units } from '../size';
 import { note } from './message';
 
 /// Lets the browser save a file under a name.
@@ -12,7 +11,7 @@ export function saveFile(file: Blob, name: string): void {
 }
 
 /// Saves a trajectory as CSV.
-export function save(history: History, units: Units): void {
+export function save(history: History): void {
   if (!history.last) return note('There is no trajectory yet.');
-  saveFile(new Blob([history.csv(units)], { type: 'text/csv' }), 'trajectory.csv');
+  saveFile(new Blob([history.csv()], { type: 'text/csv' }), 'trajectory.csv');
 }
