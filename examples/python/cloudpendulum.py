@@ -22,12 +22,15 @@ import upswing
 def drive(control_loop: Any, controller: upswing.machine.Controller) -> Any:
     """Runs an experiment, and returns what the client returns at its end."""
     control_loop.start()
-    while not control_loop.finished():
-        state = control_loop.get_state()
-        torques = controller(control_loop.time(), [joint.position for joint in state],
-                             [joint.velocity for joint in state])
-        control_loop.step(torques)
-    return control_loop.stop()
+    try:
+        while not control_loop.finished():
+            state = control_loop.get_state()
+            torques = controller(control_loop.time(), [joint.position for joint in state],
+                                 [joint.velocity for joint in state])
+            control_loop.step(torques)
+    finally:
+        result = control_loop.stop()
+    return result
 
 
 @dataclasses.dataclass

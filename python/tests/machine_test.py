@@ -215,7 +215,8 @@ class Controllers(BadInputTest):
                 ("latency: expected 0 to 0.1 s or None, got 1", "mpc", {"latency": 1}),
                 ("start: expected hanging", "mpc", {"start": "lying"}),
                 ("start: expected hanging", "mpc", {"start": [1, 2]}),
-                ("control_period: expected more than 0 s", "mpc", {"control_period": -1}),
+                ("control_period: expected 0.001 to 0.1 s", "mpc", {"control_period": -1}),
+                ("control_period: expected 0.001 to 0.1 s", "mpc", {"control_period": 0.2}),
                 ("mpc_second", "mpc", {"mpc_second": 1}),
                 ("expected a controller", "sac", {"mpc_seconds": 1}),
                 ("policy: expected a Policy, a path or a controller's name", 3, {}),
@@ -275,7 +276,7 @@ class Archives(BadInputTest):
 
     def test_logs_become_files_with_the_same_numbers(self):
         u = np.linspace(-1, 1, 5)
-        files = self.convert({"a_t": self.t, "a_q": self.q, "a_dq": 2 * self.q, "a_u": u, "note": "text",
+        files = self.convert({"a_t": self.t, "a_q": self.q, "a_dq": 2 * self.q, "a_u": u, "note": "text", "delta_t": self.t,
                               "b_t": self.t, "b_q": self.q}, torque_joint=2)
         self.assertEqual([file.name for file in files], ["a.csv", "b.csv"])
         with files[0].open(encoding="utf-8") as file:
@@ -289,8 +290,8 @@ class Archives(BadInputTest):
     def test_wrong_archives_are_refused(self):
         good = {"t": self.t, "q": self.q}
         for what, arrays in (
-                ("expected an array called t, got q", {"q": self.q}),
-                ("q: expected this array, got none", {"t": self.t}),
+                ("expected arrays t and q, got q", {"q": self.q}),
+                ("expected arrays t and q, got t", {"t": self.t}),
                 ("q: expected the shape (5, 2), got (2, 5)", good | {"q": self.q.T}),
                 ("dq: expected finite numbers", good | {"dq": np.full((5, 2), np.nan)}),
                 ("u: expected torque_joint=1 or 2", good | {"u": self.t}),
@@ -300,7 +301,8 @@ class Archives(BadInputTest):
                 self.refuse(what, self.convert, arrays)
         self.refuse("torque_joint: expected 1, 2 or None, got 3", self.convert, good, torque_joint=3)
         (self.folder / "text.npz").write_text("no archive", encoding="utf-8")
-        for name in ("text.npz", "missing.npz"):
+        (self.folder / "empty.npz").touch()
+        for name in ("text.npz", "empty.npz", "missing.npz"):
             self.refuse("expected an archive of NumPy", upswing.machine.csv_of_npz, self.folder / name,
                         self.folder)
         self.assertFalse((self.folder / "csv").exists())

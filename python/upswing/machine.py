@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
+import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Union
@@ -127,6 +128,7 @@ class Controller:
         Raises:
             InputError: t is earlier than before, or a number is not finite. All further torques are
                 0
+            TypeError: an argument is no number or no pair. All further torques are 0
         """
         try:
             time, angles = float(t), _pair("q", q)
@@ -134,7 +136,7 @@ class Controller:
                 raise _upswing.InputError(
                     f"w: expected two finite velocities in rad/s, got {_pair('w', w)}")
         except (_upswing.InputError, TypeError, ValueError) as error:
-            self._loop.refuse(str(error))
+            self._loop.refuse(str(error) or repr(error))
             raise
         return list(self._loop.step(time, angles))
 
@@ -169,7 +171,7 @@ class Controller:
     @property
     def upright(self) -> float:
         """Time for which both links have been within 30° of upright [s]; 0 if they are not now."""
-        return self._loop.upright
+        return self._loop.upright if self.state == "running" else 0.0
 
     def __repr__(self) -> str:
         return (f"<upswing.machine.Controller {self.name}, motor at joint {self.actuated_joint}: "
@@ -220,9 +222,9 @@ class FakeMachine:
 def _chosen(policy: Union[Policy, PathLike], joint: int, twin: str, control_period: float | None,
             made_for: list[str], settings: list[tuple[str, str]]) -> _upswing.MachinePolicy:
     """The policy for the twin's machine."""
-    if control_period is not None and not control_period > 0:
+    if control_period is not None and not 0.001 <= control_period <= 0.1:
         raise _upswing.InputError(
-            f"control_period: expected more than 0 s, got {control_period!r}")
+            f"control_period: expected 0.001 to 0.1 s, got {control_period!r}")
     if isinstance(policy, Policy):
         for name, given in (("made_for", made_for), ("control_period", control_period),
                             *((name, True) for name, _ in settings)):
@@ -292,21 +294,24 @@ def csv_of_npz(file: PathLike, folder: PathLike, *, torque_joint: int | None = N
     try:
         with np.load(source, allow_pickle=False) as archive:
             arrays = dict(archive.items()) if hasattr(archive, "items") else {}
-    except (OSError, ValueError, BadZipFile) as error:
-        reason = str(error).splitlines()[0]
+    except (OSError, ValueError, EOFError, BadZipFile, zlib.error) as error:
+        reason = " ".join((str(error) or repr(error)).split())
         raise _upswing.InputError(f"{source}: expected an archive of NumPy, got: {reason}") from None
-    names = [key[:-1].rstrip("_") for key in arrays if key == "t" or key.endswith("_t")]
-    if not names:
-        raise _upswing.InputError(f"{source}: expected an array called t, got "
+    # An array such as delta_t is of no log.
+    prefixes = [key[:-1] for key in arrays
+                if (key == "t" or key.endswith("_t")) and key[:-1] + "q" in arrays]
+    if not prefixes:
+        raise _upswing.InputError(f"{source}: expected arrays t and q, got "
                                   f"{', '.join(list(arrays)[:5]) or 'none'}")
     logs = {}
-    for name in names:
+    for prefix in prefixes:
+        name = prefix.removesuffix("_")
         if os.path.basename(name) != name or not name.isprintable():
             raise _upswing.InputError(f"{source}: expected the name of a log, got {name!r}")
         path = target / f"{name or Path(source).stem}.csv"
         if os.path.lexists(path):
             raise _upswing.InputError(f"{path}: expected a new file, got one that exists")
-        logs[path] = _columns_of(arrays, f"{name}_" if name else "", source, torque_joint)
+        logs[path] = _columns_of(arrays, prefix, source, torque_joint)
     target.mkdir(parents=True, exist_ok=True)
     for path, columns in logs.items():
         with path.open("x", encoding="utf-8") as out:

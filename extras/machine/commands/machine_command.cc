@@ -324,6 +324,11 @@ void CheckFitArguments(const MachineArguments& a) {
     throw BadInput(
         fmt::format("machine {}: expected --out FILE, got none", adapts ? "adapt" : "identify"));
   }
+  constexpr double kShortestWindow = 0.01;  // s
+  if (a.seconds != 0 && a.seconds < kShortestWindow) {
+    throw BadInput(
+        Concat("--seconds: expected 0, or ", kShortestWindow, " s or more, got ", a.seconds));
+  }
   if (a.folds == 1) throw BadInput("--folds: expected 0, or 2 or more, got 1");
   CheckWritable("--out", a.out);
 }

@@ -359,15 +359,15 @@ class LearningSession {
   void WarnOfFalls() {
     constexpr double kLean = 0.1;             // rad
     const double seconds = 3 * scale().time;  // of each fall
-    const Manipulator body = BodyOf(twin_);
+    const Body body = BodyOf(twin_);
     const auto falling = [&](const PendulumState& s, double /*share*/) {
       return body.Acceleration(s, {});
     };
     double angle = 0, velocity = 0;
     for (const double lean : {-kLean, kLean}) {
       PendulumState s{std::numbers::pi + lean, 0, 0, 0};
-      for (int i = 0; i < seconds / kMotionStep; ++i) {
-        s = RungeKuttaStep(s, falling(s, 0), kMotionStep, falling);
+      for (int i = 0; i < seconds / body.longest_step; ++i) {
+        s = RungeKuttaStep(s, falling(s, 0), body.longest_step, falling);
         angle = std::max(angle, LargerMagnitude(s.q1, s.q2));
         velocity = std::max(velocity, LargerMagnitude(s.w1, s.w2));
       }

@@ -13,8 +13,9 @@ int64_t CyclesIn(double control_period, int64_t hz) {
   const double cycles = control_period * static_cast<double>(hz), whole = std::round(cycles);
   if (std::abs(whole - cycles) <= kMostChange * cycles) return static_cast<int64_t>(whole);
   throw BadInput(Concat("--hz: expected a rate with whole cycles in ", FormatNumber(control_period),
-                        " s, the control period of the policy, got ", hz, ", which has ",
-                        FormatNumber(cycles)));
+                        " s, the control period of the policy, such as ",
+                        std::lround(std::ceil(cycles) / control_period), ", got ", hz,
+                        ", which has ", FormatNumber(cycles)));
 }
 
 MachineController PerCycle(MachineController controller, int64_t hz) {

@@ -48,7 +48,9 @@ class SteppedLoop {
   /// Asks for a stop: the motors brake until the links hang.
   void Stop() { stop_asked_ = true; }
   /// Refuses all further readings with a reason: the torques are 0.
-  void Refuse(const std::string& reason) { refused_ = reason; }
+  void Refuse(const std::string& reason) {
+    if (refused_.empty()) refused_ = reason;
+  }
 
   LoopState state() const { return refused_.empty() ? supervisor_.state() : LoopState::kFault; }
   /// Why the controller no longer drives, in a line; empty until then. While the loop brakes,

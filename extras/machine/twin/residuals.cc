@@ -32,8 +32,8 @@ struct Residuals {
     J(kStartStates + constant::kZero1, i) = -by_motion(tangent::kStart);
     J(kStartStates + constant::kZero2, i) = -by_motion(tangent::kStart + 1);
     if (by_motion.size() == tangent::kCogging) return;
-    constexpr int kCoefficients = tangent::kZero - tangent::kCogging;
-    J.col(i).tail<kCoefficients>() = by_motion.segment<kCoefficients>(tangent::kCogging);
+    constexpr int kBothJoints = 2 * Cogging::kCoefficients;
+    J.col(i).tail<kBothJoints>() = by_motion.segment<kBothJoints>(tangent::kCogging);
     J(kStartStates + constant::kZero1, i) += by_motion(tangent::kZero);
     J(kStartStates + constant::kZero2, i) += by_motion(tangent::kZero + 1);
   }

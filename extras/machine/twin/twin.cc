@@ -77,6 +77,18 @@ Disturbance DisturbanceOf(const Twin& twin) {
   return d;
 }
 
+/// Throws BadInput for half a description of the motors, which would be no cogging in silence.
+void CheckCogging(const Cogging& cogging, const std::string& where) {
+  if (cogging.any()) return;
+  bool given = cogging.slots > 0 || cogging.poles > 0;
+  for (const auto& coefficients : cogging.coefficients) {
+    for (const double c : coefficients) given = given || c != 0;
+  }
+  if (!given) return;
+  throw BadInput(Concat(where, ": [cogging]: expected slots and poles above 0, got ", cogging.slots,
+                        " and ", cogging.poles));
+}
+
 std::string Quoted(std::string_view text) {
   const std::string escaped = Replaced(Printable(text), "\\", "\\\\");
   return Concat("\"", Replaced(escaped, "\"", "\\\""), "\"");
@@ -161,6 +173,7 @@ Twin ParseTwin(std::string_view text, const std::string& where) {
   for (const char* key : {"name", "sessions", "disturbance"}) table.erase(key);
   ApplyTable(OptionsOf(twin), table, where, /*flat=*/false);
   if (!has_plant) throw BadInput(Concat(where, ": expected a table [plant], got none"));
+  CheckCogging(twin.cogging, where);
   if (!twin.uncertain.empty()) Factor(twin, where);
   return twin;
 }

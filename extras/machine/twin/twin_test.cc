@@ -122,6 +122,15 @@ TEST(Twin, RefusesCovariancesThatAreNone) {
             std::string::npos);
 }
 
+TEST(Twin, RefusesHalfATableOfCogging) {
+  const std::string plant = "[plant]\nmass1 = 1\n[cogging]\n";
+  EXPECT_EQ(MessageFor(plant + "slots = 12\npoles = 14"), "");
+  for (const char* half : {"slots = 12", "poles = 14", "sine1_slots = 0.05"}) {
+    EXPECT_NE(MessageFor(plant + half).find("[cogging]: expected slots and poles"),
+              std::string::npos);
+  }
+}
+
 TEST(Twin, EveryNumberCanHaveACovariance) {
   const Twin twin;
   const Options options = OptionsOf(twin);
