@@ -30,7 +30,7 @@ Options PlantFlags(Plant& plant) {
 void SayIfCarriedOver(const LoadedPolicy& loaded) {
   const Scale& ratio = loaded.carried_over;
   if (ratio == Scale()) return;
-  std::string how = "designed for the plant of --plant, with";
+  std::string how = "designed for this plant, with";
   if (!loaded.design_for) {
     how = fmt::format(
         "carried over to a plant of another size, with times × {:.4g} and torques × {:.4g}:",

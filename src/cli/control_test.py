@@ -246,6 +246,22 @@ armature = 1e-6
                         for more in ((), ("--tvlqr-seconds", 4)))
         self.assertNotEqual(usual, given)
 
+    def test_flags_and_a_file_are_the_same_plant(self):
+        flags = [word for line in self.PLANT.splitlines()[1:] for word in (
+            f"--{line.split(' = ')[0].replace('_', '-')}", line.split(" = ")[1])]
+        by_flags = self.run_here("eval", "tvlqr", "--episodes", 1, "--physics", "closed-form", "--json",
+                                 *flags)
+        self.assertEqual(by_flags.returncode, 0, by_flags.stderr)
+        self.assertIn("designed for this plant", by_flags.stderr)
+        for name in ("return", "successes"):
+            self.assertEqual(json.loads(by_flags.stdout)[name], self.evaluate()[0][name])
+
+    def test_a_round_length_becomes_whole_periods(self):
+        self.write("small.toml", self.PLANT)
+        done = self.run_here("simulate", "tvlqr", "--plant", "small.toml", "--seconds", 1)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertAlmostEqual(float(done.stdout.splitlines()[-1].split(",")[0]), 1, delta=0.004)
+
 
 if __name__ == "__main__":
     unittest.main()

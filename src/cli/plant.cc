@@ -18,6 +18,7 @@
 #include "judge/rollout.h"
 #include "os/file.h"
 #include "os/streams.h"
+#include "pendulum/timestep.h"
 #include "runs/plant_file.h"
 
 namespace upswing {
@@ -46,7 +47,7 @@ struct PlantArguments {
 };
 
 /// The instructions of the Python program. Throws BadInput.
-nlohmann::json JobOf(const PlantArguments& a) {
+nlohmann::json JobOf(const PlantArguments& a, int steps) {
   for (const std::string& name : a.drop) {
     if (std::ranges::find(kDroppable, name) != kDroppable.end()) continue;
     throw BadInput(Concat("--drop: expected one of ", Join(kDroppable, ", "), ", got \"",
@@ -65,8 +66,8 @@ nlohmann::json JobOf(const PlantArguments& a) {
           {"length2", given(a.length2)},
           {"convert_friction", a.convert_friction},
           {"physics",
-           {{"timestep", kPhysicsTimestep},
-            {"steps", kPhysicsSteps},
+           {{"timestep", kControlPeriod / steps},
+            {"steps", steps},
             {"friction_slope", kFrictionSlope}}}};
 }
 
@@ -91,11 +92,13 @@ double LargestDifference(const Plant& plant, const nlohmann::json& read) {
   return largest;
 }
 
-/// What the Python program read, or nothing if it failed; `code` is then the exit code.
-std::optional<nlohmann::json> ReadModel(const PlantArguments& a, int& code) {
+/// What the Python program read, or nothing if it failed; `code` is then the exit code. `steps`: of
+/// the physics in a control period.
+std::optional<nlohmann::json> ReadModel(const PlantArguments& a, int steps, int& code) {
   InstallSignalHandlers("");
-  PythonChild reader("plant", PlantProgram(),
-                     JobOf(a).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  PythonChild reader(
+      "plant", PlantProgram(),
+      JobOf(a, steps).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
   const std::optional<std::string> line = reader.Next();
   code = reader.Finish();
   if (StopSignal() != 0) code = 128 + StopSignal();
@@ -121,12 +124,17 @@ void ExpectNoPart(const std::string& out, const nlohmann::json& files) {
 int RunPlant(const PlantArguments& a) {
   CheckWritable("--out", a.out);
   int code = 0;
-  const std::optional<nlohmann::json> read = ReadModel(a, code);
+  std::optional<nlohmann::json> read = ReadModel(a, kPhysicsSteps, code);
   if (!read) return code;
   ExpectNoPart(a.out, (*read)["files"]);
 
   const auto toml = (*read)["toml"].get<std::string>();
-  const Plant plant = ParsePlantFile(toml, Concat("plant of ", Printable(a.model))).plant;
+  const std::string where = Concat("plant of ", Printable(a.model));
+  const Plant plant = ParsePlantFile(toml, where).plant;
+  // Both have to take the steps that the plant needs.
+  const int steps = PhysicsStepsFor(plant, kControlPeriod, where);
+  if (steps != kPhysicsSteps) read = ReadModel(a, steps, code);
+  if (!read) return code;
   const size_t motions = (*read)["starts"].size();
   const double difference = LargestDifference(plant, *read);
   const std::string check = fmt::format(

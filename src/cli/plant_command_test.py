@@ -110,6 +110,18 @@ class Numbers(PlantCommandTest):
         self.assertIn('inertia1', self.succeed("simulate", "--plant", "plant.toml", "--seconds", "0.1",
                                                "--csv", "s.csv") + self.toml)
 
+    def test_a_small_machine_takes_the_steps_that_it_needs(self):
+        self.write("small.xml", """<mujoco><worldbody><body>
+            <joint name="a" axis="0 1 0"/>
+            <geom type="capsule" fromto="0 0 0 0 0 -0.05" size="0.004" mass="0.01" contype="0"
+            conaffinity="0"/><body pos="0 0 -0.05"><joint name="b" axis="0 1 0"/>
+            <geom type="capsule" fromto="0 0 0 0 0 -0.05" size="0.004" mass="0.01" contype="0"
+            conaffinity="0"/></body>
+            </body></worldbody><actuator><motor joint="a" ctrlrange="-1 1" gear="0.001"/></actuator>
+            </mujoco>""")
+        self.assertIn("random motions of 1 s differ from MuJoCo's by at most", self.succeed(
+            "plant", "small.xml", "--out", "small.toml", env=self.ENVIRONMENT))
+
     def test_zero_poses_and_signs(self):
         """Horizontal, upright, folded, another axis: the comparison with MuJoCo proves the angles."""
         for links, axis1, axis2, q1, q2 in (

@@ -94,8 +94,8 @@ int RunPlot(const PlotArguments& a) {
   const LoadedPolicy loaded = GetPolicyIn(a.trial, a.policy);
   RolloutConfig config = TrialEpisode(a.trial, &loaded);
   const double usual = a.trial.is_of_eval() ? kEvaluationSeconds * config.env.scale.time : 10;
-  config.seconds = a.seconds < 0 ? usual : a.seconds;
-  ExpectWholePeriods("--seconds", config.seconds, config.env.control_period);
+  config.seconds =
+      InWholePeriods("--seconds", a.seconds < 0 ? usual : a.seconds, config.env.control_period);
   config.estimates = true;
   const fs::path folder = FigureFolder(a.out, loaded, "plot");
   CheckCanDraw();

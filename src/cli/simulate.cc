@@ -79,8 +79,7 @@ int RunSimulate(const SimulateArguments& a) {
   const double scheduled = static_cast<double>(config.schedule.size()) * period;
   const double episode = kEvaluationSeconds * config.env.scale.time;
   const double usual = config.schedule.empty() ? episode : scheduled;
-  config.seconds = a.seconds < 0 ? usual : a.seconds;
-  ExpectWholePeriods("--seconds", config.seconds, period);
+  config.seconds = InWholePeriods("--seconds", a.seconds < 0 ? usual : a.seconds, period);
   if (!config.schedule.empty() &&
       PeriodsIn(config.seconds, period) > static_cast<int64_t>(config.schedule.size())) {
     throw BadInput(Concat("--seconds: expected at most ", FormatNumber(scheduled),

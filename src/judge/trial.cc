@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <string_view>
 
 #include "base/error.h"
 #include "base/text.h"
@@ -41,8 +43,20 @@ PendulumState ParseStart(const std::string& text) {
 }  // namespace
 
 LoadedPolicy UsedIn(const TrialArguments& trial, const LoadedPolicy& loaded) {
-  if (trial.plant.empty() || loaded.is_foreign()) return loaded;
-  return ForOtherSize(loaded, ReadPlantFile(trial.plant).plant).value_or(loaded);
+  if (loaded.is_foreign()) return loaded;
+  Plant plant = trial.plant.empty() ? loaded.plant : ReadPlantFile(trial.plant).plant;
+  const Options options = OptionsOf(plant);
+  SetFlags(options, trial.plant_flags);
+  // Of a map, --set also changes states and sensors.
+  std::vector<std::string> changes;
+  std::ranges::copy_if(trial.set, std::back_inserter(changes), [&](const std::string& change) {
+    const std::string_view name = std::string_view(change).substr(0, change.find('='));
+    return options.Get(name) != nullptr ||
+           std::ranges::find(options.aliases(), name, &Options::AliasEntry::name) !=
+               options.aliases().end();
+  });
+  ApplyChanges(options, changes);
+  return ForOtherSize(loaded, plant).value_or(loaded);
 }
 
 TrialConditions ConditionsOf(const std::vector<FlagValue>& flags) {

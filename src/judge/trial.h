@@ -34,7 +34,7 @@ struct TrialArguments {
   bool is_of_eval() const { return episode >= 0; }
 };
 
-/// A loaded policy for the plant file of the trial (ForOtherSize). Throws BadInput.
+/// A loaded policy for the plant of the trial, by file and flags (ForOtherSize). Throws BadInput.
 LoadedPolicy UsedIn(const TrialArguments& trial, const LoadedPolicy& loaded);
 
 /// Disturbances of sensors and motor, and random plants.

@@ -18,4 +18,14 @@ void ExpectWholePeriods(const std::string& name, double seconds, double period) 
                         "\"; the nearest are ", below * period, " and ", (below + 1) * period));
 }
 
+double InWholePeriods(const std::string& name, double seconds, double period) {
+  constexpr double kRound = 1e-4, kRounding = 1e-6;  // s, of kRound
+  const double parts = period / kRound;
+  if (std::abs(parts - std::round(parts)) > kRounding) {
+    return static_cast<double>(PeriodsIn(seconds, period)) * period;
+  }
+  ExpectWholePeriods(name, seconds, period);
+  return seconds;
+}
+
 }  // namespace upswing

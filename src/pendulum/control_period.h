@@ -12,4 +12,9 @@ int64_t PeriodsIn(double seconds, double period);
 /// control periods of `period` seconds, up to rounding.
 void ExpectWholePeriods(const std::string& name, double seconds, double period);
 
+/// A length in whole control periods (s). Periods of plants of another size are no round numbers,
+/// so no round length is a multiple of theirs: it becomes the nearest one. Of other periods, throws
+/// as ExpectWholePeriods does.
+double InWholePeriods(const std::string& name, double seconds, double period);
+
 }  // namespace upswing

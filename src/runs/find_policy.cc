@@ -217,8 +217,7 @@ LoadedPolicy GetPolicy(const PolicyArguments& a) {
 }
 
 LoadedPolicy DesignController(const std::string& name, const ControllerConfig& config,
-                              const std::string& title,
-                              const PolicyArguments& given) {
+                              const std::string& title, const PolicyArguments& given) {
   const auto design_for = [name, config, given](const Plant& plant) {
     ControllerConfig other = config;
     const Scale ratio = CarryOver(config.plant, plant);

@@ -36,8 +36,8 @@ std::vector<std::string> ShippedPolicies();
 LoadedPolicy GetPolicy(const PolicyArguments& a);
 
 /// Makes the controller `name`, which messages call `title`, without reading a file. The settings
-/// and the control period of `given` hold for plants of any size; others follow the plant. Throws as
-/// MakeController does.
+/// and the control period of `given` hold for plants of any size; others follow the plant. Throws
+/// as MakeController does.
 LoadedPolicy DesignController(const std::string& name, const ControllerConfig& config,
                               const std::string& title, const PolicyArguments& given = {});
 

@@ -21,7 +21,7 @@ constexpr size_t kMostPlantBytes = 1 << 20;
 
 /// Tables of a plant file with the other parts of a machine.
 constexpr std::array<std::string_view, 5> kOtherTables{"actuator", "cogging", "sensors", "loop",
-                                                     "sessions"};
+                                                       "sessions"};
 
 /// Removes kOtherTables and the machine's name. Throws BadInput unless each table left is one of a
 /// plant file.
