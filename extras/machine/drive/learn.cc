@@ -234,7 +234,7 @@ class LearningSession {
 
   /// The same, or the energy (1: upright) of the twin as a share of `energy`, if that is more.
   Excitation::Level LevelWithEnergy(double lean, double energy) const {
-    const Manipulator body = BodyOf(twin_);
+    const Manipulator body = ManipulatorOf(twin_.plant);
     const double hanging = -body.At({}).energy;
     return [=, of_motion = LevelOfMotion(lean)](const PendulumState& s) {
       return std::max(of_motion(s), (1 + body.At(s).energy / hanging) / energy);
@@ -329,7 +329,7 @@ class LearningSession {
   }
 
   void SayTwin(double error) const {
-    const Manipulator m = BodyOf(twin_);
+    const Manipulator m = ManipulatorOf(twin_.plant);
     say_(fmt::format(
         "  error {:.4f} rad; gravity {:.2f} and {:.2f} N·m, dry friction {:.3f} and {:.3f} "
         "N·m, delay {:.1f} ms, lag {:.1f} ms",

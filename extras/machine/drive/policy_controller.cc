@@ -96,7 +96,7 @@ MachinePolicy ForMachine(const LoadedPolicy& loaded, const Twin& twin) {
 
 std::string DifferencesFromTwin(const LoadedPolicy& policy, const Twin& twin) {
   constexpr double kSimilar = 0.2;  // relative difference that a policy usually withstands
-  const Manipulator own = ManipulatorOf(policy.plant), body = BodyOf(twin);
+  const Manipulator own = ManipulatorOf(policy.plant), body = ManipulatorOf(twin.plant);
   std::string text;
   const auto compare = [&](const char* what, double of_policy, double of_twin, const char* unit) {
     if (std::abs(of_policy - of_twin) <= kSimilar * std::abs(of_twin)) return;

@@ -120,7 +120,7 @@ Session FitParameters::SessionAt(const VectorXd& theta, int session) const {
 
 MatrixXd FitParameters::Slope(const VectorXd& theta, int session) const {
   constexpr double h = 1e-7;
-  MatrixXd slope = MatrixXd::Zero(NumConstants(base_), size());
+  MatrixXd slope = MatrixXd::Zero(NumConstants(base_.cogging.any()), size());
   for (const int i : IndicesOfMachine()) {
     VectorXd above = theta, below = theta;
     above(i) += h;

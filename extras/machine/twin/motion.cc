@@ -24,9 +24,10 @@ double FrictionSlope(double w) {
 }
 
 /// ∂F/∂(q1, q2, w1, w2) of F = M q̈ + c + g + d q̇ + f atan(100 q̇) - cogging at both joints, with q̈
-/// held. Dry friction and cogging are added to the derivatives of the rest, because dual numbers
-/// take longer for them.
-Eigen::Matrix<double, 4, 2> ForceByState(const Body& m, const PendulumState& s, const Joints& a) {
+/// held. Dry friction and cogging, whose slope is given, are added to the derivatives of the rest,
+/// because dual numbers take longer for them.
+Eigen::Matrix<double, 4, 2> ForceByState(const Manipulator& m, const PendulumState& s,
+                                         const Joints& a, const Joints& cogging_slope) {
   using Dual = Eigen::AutoDiffScalar<Eigen::Vector4d>;
   using Pair = dynamics::JointPair<Dual>;
   const Pair q{{s.q1, 4, 0}, {s.q2, 4, 1}}, w{{s.w1, 4, 2}, {s.w2, 4, 3}};
@@ -39,9 +40,8 @@ Eigen::Matrix<double, 4, 2> ForceByState(const Body& m, const PendulumState& s, 
   derivatives << F1.derivatives(), F2.derivatives();
   derivatives(2, 0) += m.f1 * FrictionSlope(s.w1);
   derivatives(3, 1) += m.f2 * FrictionSlope(s.w2);
-  const Joints cogging = m.cogging.SlopeAt({s.q1, s.q2});
-  derivatives(0, 0) -= cogging[0];
-  derivatives(1, 1) -= cogging[1];
+  derivatives(0, 0) -= cogging_slope[0];
+  derivatives(1, 1) -= cogging_slope[1];
   return derivatives;
 }
 
@@ -52,7 +52,7 @@ JointTangents AccelerationTangents(const Body& m, const PendulumState& s, const 
   const auto angles = dynamics::AnglesOf<double>({s.q1, s.q2});
   const Factors Y = Regressor(angles, {s.w1, s.w2}, {a[0], a[1]});
   const Joints q{s.q1, s.q2}, slope = m.cogging.SlopeAt(q);
-  JointTangents force = state.lazyProduct(ForceByState(m, s, a));
+  JointTangents force = state.lazyProduct(ForceByState(m, s, a, slope));
   for (int j = 0; j < 2; ++j) {
     force.col(j).segment<kNumManipulatorConstants>(tangent::kBody) +=
         Eigen::Map<const Eigen::Vector<double, kNumManipulatorConstants>>(Y[j].data());
@@ -141,8 +141,8 @@ Body BodyOf(const Twin& twin, bool reported) {
     body.J1 -= twin.actuator.current_inertia;
     body.a -= twin.actuator.current_inertia;
   }
-  while (body.longest_step > kShortestMotionStep &&
-         FastestDecayOf(body).rate * body.longest_step > kFollowedDecay) {
+  const double decay = FastestDecayOf(body).rate;
+  while (body.longest_step > kShortestMotionStep && decay * body.longest_step > kFollowedDecay) {
     body.longest_step /= 2;
   }
   return body;

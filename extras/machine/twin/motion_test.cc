@@ -61,6 +61,16 @@ MachineLog LogOfSteps() {
   return log;
 }
 
+/// A log of 2 s without torques, for motions that go on by themselves.
+MachineLog LogWithoutTorques() {
+  MachineLog log;
+  for (int k = 0; k < 1000; ++k) {
+    log.time.push_back(0.002 * k);
+    log.angle.push_back({});
+  }
+  return log;
+}
+
 TEST(Drive, FollowsACommandWithDelayAndLag) {
   const Twin twin = MachineWithLag();
   const Drive drive = Drive::Commanded(LogOfSteps(), twin);
@@ -102,11 +112,7 @@ TEST(Drive, ForgetsOnlyCommandsThatNoLongerMatter) {
 TEST(Predict, ConservesEnergyWithoutFrictionAndTorque) {
   Twin twin = MachineWithLag();
   twin.plant.damping1 = twin.plant.damping2 = twin.plant.coulomb1 = twin.plant.coulomb2 = 0;
-  MachineLog log;
-  for (int k = 0; k < 1000; ++k) {
-    log.time.push_back(0.002 * k);
-    log.angle.push_back({});
-  }
+  const MachineLog log = LogWithoutTorques();
   const Body body = BodyOf(twin);
   const Motion motion = Predict({body, Drive::Commanded(log, twin)}, {1, 0.5, 0, 0}, log.time);
   const auto energy = [&](int k) {
@@ -217,11 +223,7 @@ TEST(Predict, KnowsTheDerivativesByCogging) { ExpectDerivatives(MachineThatCogs(
 TEST(Predict, ConservesEnergyWithCogging) {
   Twin twin = MachineThatCogs();
   twin.plant.damping1 = twin.plant.damping2 = twin.plant.coulomb1 = twin.plant.coulomb2 = 0;
-  MachineLog log;
-  for (int k = 0; k < 1000; ++k) {
-    log.time.push_back(0.002 * k);
-    log.angle.push_back({});
-  }
+  const MachineLog log = LogWithoutTorques();
   const Body body = BodyOf(twin);
   const auto harmonics = twin.cogging.Harmonics();
   const Joints zero{twin.sensors.zero1, twin.sensors.zero2};

@@ -99,14 +99,10 @@ void SetTorques(const ModelledLog& modelled, const LogWindow& window,
 
 }  // namespace
 
-int NumConstants(const Twin& twin) {
-  return twin.cogging.any() ? kMostConstants : constant::kCogging;
-}
-
 Eigen::VectorXd ConstantsOf(const Twin& twin) {
-  const Manipulator m = BodyOf(twin);
+  const Manipulator m = ManipulatorOf(twin.plant);
   const Actuator& motor = twin.actuator;
-  Eigen::VectorXd c(NumConstants(twin));
+  Eigen::VectorXd c(NumConstants(twin.cogging.any()));
   c.head<constant::kCogging>() << m.J1, m.J2, m.b, m.a, m.G1, m.G2, m.d1, m.d2, m.f1, m.f2,
       motor.delay, motor.lag, twin.sensors.zero1, twin.sensors.zero2, motor.current_delay,
       motor.current_inertia;
@@ -132,8 +128,7 @@ WindowResiduals ResidualsOf(const ModelledLog& modelled, const LogWindow& window
   predicted.motion =
       Predict(modelled.model, {x(0), x(1), x(2), x(3)}, window.TimesIn(log),
               modelled.motor.current_delay, linearizes ? &predicted.tangents : nullptr);
-  const int constants = modelled.model.body.cogging.any() ? kMostConstants : constant::kCogging;
-  Residuals residuals(window.rows(), constants, linearizes);
+  Residuals residuals(window.rows(), NumConstants(modelled.model.body.cogging.any()), linearizes);
   WindowResiduals result;
   SetAngles(log, window, predicted, linearizes, residuals);
   result.angle = residuals.Square();

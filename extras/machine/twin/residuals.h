@@ -28,8 +28,8 @@ enum Row {
 };
 }
 inline constexpr int kMostConstants = constant::kRows;
-/// Number of constants of a twin.
-int NumConstants(const Twin& twin);
+/// Number of constants of a twin whose motors cog, or not.
+inline int NumConstants(bool cogs) { return cogs ? kMostConstants : constant::kCogging; }
 
 /// The constants of a twin (NumConstants): its equations of motion, times of the motors, zeros, and
 /// cogging.
