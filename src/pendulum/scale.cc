@@ -1,6 +1,7 @@
 #include "pendulum/scale.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "pendulum/equations.h"
@@ -20,6 +21,61 @@ bool BothDiffer(double a, double b) {
   return std::min(a, b) > kOtherSize || std::max(a, b) * kOtherSize < 1;
 }
 
+/// The numbers without unit that decide a motion, as logarithms.
+struct Shape {
+  double limit;                 // of the motor's torque
+  std::array<double, 13> rest;  // inertias, gravity, lengths, friction
+
+  /// In units of time (s), torque (N·m) and length (m).
+  Shape(const Plant& plant, const Scale& unit, double length) {
+    // Armature and friction may be 0. Below this many units they hardly change a motion.
+    constexpr double kNegligible = 0.02;
+    const Manipulator body = ManipulatorOf(plant);
+    const double inertia = unit.torque * unit.time * unit.time, damping = unit.torque * unit.time;
+    limit = std::log(plant.torque_limit / unit.torque);
+    rest = {body.J1 / inertia,
+            body.J2 / inertia,
+            body.b / inertia,
+            body.G1 / unit.torque,
+            body.G2 / unit.torque,
+            plant.length1 / length,
+            plant.length2 / length,
+            plant.gravity * unit.time * unit.time / length,
+            kNegligible + body.a / inertia,
+            kNegligible + body.d1 / damping,
+            kNegligible + body.d2 / damping,
+            kNegligible + body.f1 / unit.torque,
+            kNegligible + body.f2 / unit.torque};
+    for (double& x : rest) x = std::log(x);
+  }
+};
+
+/// The distances of two shapes.
+struct Distance {
+  double limit, all;
+
+  Distance(const Shape& a, const Shape& b) : limit(std::abs(a.limit - b.limit)), all(limit) {
+    for (size_t i = 0; i < a.rest.size(); ++i) all += std::abs(a.rest[i] - b.rest[i]);
+  }
+};
+
+/// Whether `plant` is clearly nearer to the image of `from` in its own units than to `from`. A
+/// motor of the same torque is that of `from`, however heavy the links are.
+bool IsImage(const Plant& from, const Plant& plant, const Scale& ratio) {
+  constexpr double kSame = 0.01;  // |log ratio| of sizes and torques that are the same
+  if (std::abs(std::log(ratio.time)) < kSame && std::abs(std::log(ratio.torque)) < kSame) {
+    return false;
+  }
+  const Scale unit = NaturalUnits(from), own = unit * ratio;
+  const double length = from.gravity * unit.time * unit.time;
+  const double own_length = plant.gravity * own.time * own.time;
+  const Shape original(from, unit, length);
+  const Distance to_plant(original, Shape(plant, unit, length));
+  const Distance to_image(original, Shape(plant, own, own_length));
+  return to_image.limit <= kClearlyNearer * to_plant.limit + kSame &&
+         to_image.all <= kClearlyNearer * to_plant.all;
+}
+
 }  // namespace
 
 Scale ScaleOf(const Plant& plant) {
@@ -32,7 +88,7 @@ Scale CarryOver(const Plant& from, const Plant& plant) {
   const double length = (plant.length1 + plant.length2) / (from.length1 + from.length2);
   const bool other_size = BothDiffer(ratio.torque, plant.torque_limit / from.torque_limit) ||
                           BothDiffer(ratio.time, length);
-  return other_size ? ratio : Scale();
+  return other_size || IsImage(from, plant, ratio) ? ratio : Scale();
 }
 
 Scale TaskScaleOf(const Plant& plant) { return CarryOver(Plant(), plant); }

@@ -30,15 +30,18 @@ inline Scale operator*(const Scale& a, const Scale& b) {
 Scale ScaleOf(const Plant& plant);
 
 /// The units of `plant` as multiples of those of `from`, by which a policy for `from` acts on
-/// `plant`. They are 1 unless `plant` has another size: its torques, or its lengths and times,
-/// differ by more than a factor of kOtherSize. Where only the shape differs, such as one mass, a
-/// policy keeps its units.
+/// `plant`. They are 1 unless `plant` has another size:
+/// - its torques, or its lengths and times, differ by more than a factor of kOtherSize, or
+/// - it is clearly nearer to the image of `from` in its own natural units than to `from` itself.
+/// Where only the shape differs, such as one mass, a policy keeps its units.
 Scale CarryOver(const Plant& from, const Plant& plant);
 inline constexpr double kOtherSize = 3;
+/// The largest distance to the image, over the distance to the plant itself, of a plant of another
+/// size; distances are sums of |log ratio|.
+inline constexpr double kClearlyNearer = 1.0 / 3;
 
 /// The units by which the task of a plant counts, carried over from the built-in plant. For plants
-/// of about its size, seconds and N·m are the same in all rewards, observations and
-/// evaluations.
+/// of its size, seconds and N·m are the same in all rewards, observations and evaluations.
 Scale TaskScaleOf(const Plant& plant);
 
 }  // namespace upswing

@@ -73,6 +73,94 @@ TEST(Scale, OnlyPlantsOfAnotherSizeAreCarriedOver) {
   EXPECT_EQ(CarryOver(image, image), Scale());
 }
 
+TEST(Scale, ImagesOfNearSizesAreCarriedOver) {
+  Rng rng(1, "test");
+  for (int n = 0; n < 100; ++n) {
+    const Plant plant = n == 0 ? Plant() : OwnLinks(rng);
+    for (const double length : {0.4, 0.6, 0.8, 0.95, 1.05, 1.2, 1.5, 2.0, 2.5}) {
+      for (const double mass : {1.0, length, 1 / length, length * length * length}) {
+        const double time = std::sqrt(length);
+        Plant image = ImageOf(plant, length, mass, time);
+        if (n == 0) image.armature = kArmature;  // capsules, with the default of a plant file
+        const Scale ratio = CarryOver(plant, image);
+        EXPECT_EQ(ratio, ScaleOf(image) / ScaleOf(plant)) << n << ": " << length << ", " << mass;
+        EXPECT_NE(ratio, Scale());
+      }
+    }
+    const Plant heavy = ImageOf(plant, 1, 2, 1);  // of another material
+    EXPECT_NEAR(CarryOver(plant, heavy).torque, 2, 1e-9);
+  }
+}
+
+/// RealAIGym's robots, of designs C.1 and A.0.
+std::vector<Plant> Robots() {
+  const Plant c1{.mass1 = 0.5235,
+                 .mass2 = 0.6256,
+                 .length1 = 0.2,
+                 .length2 = 0.3,
+                 .coulomb1 = 0.16,
+                 .coulomb2 = 0.12,
+                 .center1 = 0.2,
+                 .center2 = 0.2557,
+                 .inertia1 = 0.01095,
+                 .inertia2 = 0.00997,
+                 .armature = 0.00264};
+  const Plant a0{.mass1 = 0.5594,
+                 .mass2 = 0.6043,
+                 .length1 = 0.3,
+                 .length2 = 0.2,
+                 .torque_limit = 6,
+                 .coulomb1 = 0.093,
+                 .coulomb2 = 0.078,
+                 .center1 = 0.3,
+                 .center2 = 0.1838,
+                 .inertia1 = 0.00313,
+                 .inertia2 = 0.00351,
+                 .armature = 0.00322};
+  return {c1, a0};
+}
+
+TEST(Scale, PlantsWithOneOtherValueKeepTheirUnits) {
+  struct Slider {
+    double Plant::*value;
+    double low, high;
+  };
+  constexpr Slider kSliders[] = {// of the page
+                                 {&Plant::mass1, 0.2, 3},       {&Plant::mass2, 0.2, 3},
+                                 {&Plant::length1, 0.2, 1},     {&Plant::length2, 0.2, 1},
+                                 {&Plant::damping1, 0, 1},      {&Plant::damping2, 0, 1},
+                                 {&Plant::gravity, 1, 25},      {&Plant::torque_limit, 1, 10},
+                                 {&Plant::armature, 1e-4, 0.1}, {&Plant::coulomb1, 0, 1}};
+  for (const auto& [value, low, high] : kSliders) {
+    for (int k = 0; k <= 100; ++k) {
+      Plant plant;
+      plant.*value = low + (high - low) * k / 100;
+      EXPECT_EQ(CarryOver(Plant(), plant), Scale()) << plant.*value;
+      EXPECT_EQ(CarryOver(plant, Plant()), Scale()) << plant.*value;
+    }
+  }
+}
+
+TEST(Scale, RobotsOfOneLaboratoryKeepTheirUnits) {
+  Rng rng(1, "test");
+  std::vector<Plant> plants = Robots();
+  plants.emplace_back();
+  for (const Plant& from : plants) {
+    for (Plant plant : plants) {
+      EXPECT_EQ(CarryOver(from, plant), Scale());
+      // Identified or drawn again, with all values but the motor's up to 30% off.
+      for (int n = 0; n < 100; ++n) {
+        Plant other = plant;
+        for (const PlantParameter& p : kPlantParameters) {
+          if (p.value == &Plant::torque_limit || p.value == &Plant::actuated_joint) continue;
+          other.*p.value *= std::exp(rng.Uniform(-0.3, 0.3));
+        }
+        EXPECT_EQ(CarryOver(from, other), Scale());
+      }
+    }
+  }
+}
+
 /// Steps `env` under the torques sin(k), in units of its limit, and returns all observations,
 /// rewards and states, the latter in natural units.
 std::vector<double> History(PendulumEnv& env, double time) {

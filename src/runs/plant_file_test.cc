@@ -4,6 +4,7 @@
 
 #include "base/error.h"
 #include "base/text.h"
+#include "pendulum/scale.h"
 #include "runs/config_files.h"
 
 namespace upswing {
@@ -159,6 +160,18 @@ TEST(PlantFile, EveryShippedPlantIsValid) {
   EXPECT_FALSE(EmbeddedPlants().empty());
   for (const std::string& name : NamesOf(EmbeddedPlants()))
     EXPECT_NO_THROW((void)ReadPlantFile(name)) << name;
+}
+
+TEST(PlantFile, OnlyCloudPendulumHasAnotherSizeThanTheBuiltInPlant) {
+  std::vector<Plant> robots{Plant()};
+  for (const char* name : {"realaigym", "realaigym-c1", "realaigym-twin"}) {
+    robots.push_back(ReadPlantFile(name).plant);
+  }
+  const Plant small = ReadPlantFile("cloudpendulum").plant;
+  for (const Plant& from : robots) {
+    for (const Plant& robot : robots) EXPECT_EQ(CarryOver(from, robot), Scale());
+    EXPECT_EQ(CarryOver(from, small), ScaleOf(small) / ScaleOf(from));
+  }
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Successes of shipped policies and controllers on plants of the nominal shape and another size, and of
-controllers at other control periods.
+"""Successes of shipped policies and controllers on plants of the nominal shape and another size, on plants
+whose links are up to 2.5 times as long or as short, and of controllers at other control periods.
 
 Prints the tables of docs/tutorials/your-own-plant.md:
     python3 tools/results/sizes.py
@@ -15,6 +15,8 @@ ROOT = Path(__file__).resolve().parents[2]
 POLICIES = ("sac", "d3qn", "any-pose", "mpc", "tvlqr", "energy", "pfl")
 CONTROLLERS = ("tvlqr", "energy", "pfl")
 SIZES = ((0.1, 0.01), (1, 1), (10, 1000))  # length and mass over those of the nominal plant
+NEAR_SIZES = (0.4, 0.6, 1.5, 2, 2.5)  # length over that of the nominal plant
+CARRIED = ("sac", "d3qn", "any-pose")
 PERIODS = (0.002, 0.005, 0.01, 0.02)       # s
 EPISODES = 100
 # The nominal plant with its inertias as numbers, in SI units.
@@ -52,6 +54,13 @@ def main() -> None:
     print("|---|" + "---|" * len(POLICIES))
     for length, mass in SIZES:
         print(f"| {0.5 * length:g} m | {' | '.join(successes(length, mass, POLICIES))} |", flush=True)
+    print()
+    print(f"| length of a link | mass of a link | {' | '.join(CARRIED)} |")
+    print("|---|---|" + "---|" * len(CARRIED))
+    for length in NEAR_SIZES:
+        for mass in (1, length ** 3):
+            counts = successes(length, mass, CARRIED)
+            print(f"| {0.5 * length:g} m | {mass:.3g} kg | {' | '.join(counts)} |", flush=True)
     print()
     print(f"| length of a link | control period | {' | '.join(CONTROLLERS)} |")
     print("|---|---|" + "---|" * len(CONTROLLERS))
