@@ -79,7 +79,7 @@ std::pair<std::string, std::string> EvaluateHandle(const PolicyHandle& policy,
   const LoadedPolicy loaded = UsedIn(trial, policy.loaded());
   const EvalReport report =
       EvaluatePolicy(loaded, trial, episodes, pool, std::ref(python_progress));
-  return {EvalJson({&report, 1}), EpisodesCsv({&report, 1})};
+  return {EvalJson(report), EpisodesCsv({&report, 1}, false)};
 }
 
 /// The numbers of a map as a new array (ny × nx).

@@ -51,12 +51,21 @@ LoadedPolicy GetPolicyIn(const TrialArguments& trial, PolicyArguments a) {
 
 std::vector<LoadedPolicy> GetPoliciesIn(const TrialArguments& trial,
                                         const std::vector<std::string>& names,
-                                        PolicyArguments controllers) {
+                                        PolicyArguments controllers,
+                                        std::vector<Undesigned>* undesigned) {
   controllers.control_period = trial.control_period;
-  std::vector<LoadedPolicy> policies = GetPolicies(names, controllers);
-  for (LoadedPolicy& loaded : policies) {
-    loaded = UsedIn(trial, loaded);
+  std::vector<LoadedPolicy> policies;
+  for (LoadedPolicy& loaded : GetPolicies(names, controllers, undesigned)) {
+    const Plant plant = PlantIn(trial, loaded);
+    try {
+      loaded = ForOtherSize(loaded, plant).value_or(loaded);
+    } catch (const Error& error) {
+      if (undesigned == nullptr || !loaded.design_for) throw;
+      undesigned->push_back({loaded.name, error.what()});
+      continue;
+    }
     SayIfCarriedOver(loaded);
+    policies.push_back(loaded);
   }
   return policies;
 }

@@ -31,10 +31,12 @@ void AddPolicy(CommandLine& line, PolicyArguments& a);
 /// Gets the policy of the arguments for a trial. If it is carried over to a plant of another size,
 /// says so on standard error. Throws as GetPolicy does.
 LoadedPolicy GetPolicyIn(const TrialArguments& trial, PolicyArguments a);
-/// The same for several, as GetPolicies gets them.
+/// The same for several, as GetPolicies gets them; `undesigned` also gets the controllers that
+/// cannot be designed for the plant of the trial.
 std::vector<LoadedPolicy> GetPoliciesIn(const TrialArguments& trial,
                                         const std::vector<std::string>& names,
-                                        PolicyArguments controllers);
+                                        PolicyArguments controllers,
+                                        std::vector<Undesigned>* undesigned = nullptr);
 
 /// What an argument for several policies takes: `policy.safetensors, run folders, …`.
 std::string PolicyWords();

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <cstdio>
 #include <functional>
 
 #include "agents/arguments.h"
@@ -27,10 +28,31 @@ struct EvalArguments {
   bool as_json = false;
 };
 
-/// Evaluates the policies on the same episodes.
-std::vector<EvalReport> Evaluate(const EvalArguments& a) {
-  const std::vector<LoadedPolicy> policies = GetPoliciesIn(a.trial, a.policies, a.controllers);
+/// The evaluations of the policies, and the controllers without one.
+struct Comparison {
   std::vector<EvalReport> reports;
+  std::vector<Undesigned> undesigned;
+};
+
+/// The reasons for which controllers could not be designed, in a line.
+std::string ReasonsOf(const std::vector<Undesigned>& undesigned) {
+  std::vector<std::string> reasons;
+  for (const auto& [name, reason] : undesigned) {
+    const std::string prefix = Concat(name, ": ");
+    reasons.push_back(reason.starts_with(prefix) ? reason : prefix + reason);
+  }
+  return Concat("not designed: ", Join(reasons, "; "));
+}
+
+/// Evaluates the policies on the same episodes. Of several, a controller that cannot be designed is
+/// left out, unless none is left.
+Comparison Evaluate(const EvalArguments& a) {
+  Comparison comparison;
+  auto& [reports, undesigned] = comparison;
+  const bool several = a.policies.size() > 1;
+  const std::vector<LoadedPolicy> policies =
+      GetPoliciesIn(a.trial, a.policies, a.controllers, several ? &undesigned : nullptr);
+  if (policies.empty()) throw Failure(ReasonsOf(undesigned));
   for (const LoadedPolicy& loaded : policies) {
     reports.push_back(PlanEvaluation(loaded, a.trial, a.episodes));
   }
@@ -40,7 +62,22 @@ std::vector<EvalReport> Evaluate(const EvalArguments& a) {
     EpisodeProgress progress(a.as_json);  // removed before the table is printed
     RunEvaluation(reports[i], policies[i], pool, std::ref(progress));
   }
-  return reports;
+  return comparison;
+}
+
+void PrintComparison(const EvalArguments& a, const Comparison& comparison) {
+  const auto& [reports, undesigned] = comparison;
+  const bool several = a.policies.size() > 1;
+  if (a.as_json) {
+    fmt::print("{}\n", several ? ComparisonJson(reports, undesigned) : EvalJson(reports.front()));
+    return;
+  }
+  if (several) {
+    PrintEvalComparison(reports, undesigned);
+  } else {
+    PrintEvalTable(reports.front());
+  }
+  if (!a.episodes_csv.empty()) fmt::print("  written        {}\n", Printable(a.episodes_csv));
 }
 
 int RunEval(const EvalArguments& a) {
@@ -50,19 +87,14 @@ int RunEval(const EvalArguments& a) {
         "--json: expected a file for --episodes-csv, got - (standard output), where the JSON goes");
   }
   if (!a.episodes_csv.empty()) CheckWritable("--episodes-csv", a.episodes_csv);
-  const std::vector<EvalReport> reports = Evaluate(a);
-  if (!a.episodes_csv.empty()) WriteOutput(a.episodes_csv, EpisodesCsv(reports));
-  if (to_output) return 0;  // only the rows, for another program
-  if (a.as_json) {
-    fmt::print("{}\n", EvalJson(reports));
-    return 0;
+  const Comparison comparison = Evaluate(a);
+  if (!a.episodes_csv.empty()) {
+    WriteOutput(a.episodes_csv, EpisodesCsv(comparison.reports, a.policies.size() > 1));
   }
-  if (reports.size() > 1) {
-    PrintEvalComparison(reports);
-  } else {
-    PrintEvalTable(reports.front());
-  }
-  if (!a.episodes_csv.empty()) fmt::print("  written        {}\n", Printable(a.episodes_csv));
+  // The rows on standard output are for another program.
+  if (!to_output) PrintComparison(a, comparison);
+  std::fflush(stdout);
+  if (!comparison.undesigned.empty()) throw Failure(ReasonsOf(comparison.undesigned));
   return 0;
 }
 
@@ -115,7 +147,8 @@ void AddEval(CommandLine& line) {
       "Several policies get the same episodes: start, plant and noise. The table and the JSON\n"
       "have the mean difference of each policy to the first, with a 95% bootstrap interval of\n"
       "pairs.\n"
-      "All need one plant and one goal; --plant, --goal set them.\n\n"
+      "All need one plant and one goal; --plant, --goal set them. A controller that cannot be\n"
+      "designed gets a row with the reason, and the exit code is 1.\n\n"
       "Controllers:\n{}\n"
       "The plant's flags, such as --mass2 1.3, change it; --set mass2=1.3 does the same, and\n"
       "wins over the flag.\n"

@@ -201,13 +201,17 @@ void PrintEvalTable(const EvalReport& report) {
   fmt::print("  ± is the standard deviation over the episodes\n");
 }
 
-void PrintEvalComparison(std::span<const EvalReport> reports) {
+void PrintEvalComparison(std::span<const EvalReport> reports,
+                         std::span<const Undesigned> undesigned) {
   const EvalReport& first = reports.front();
   std::vector<ComparisonRow> rows{
       {"", "success [%]", "return", "swing-up [s]", "torque change [N·m/s]"}};
   for (const EvalReport& report : reports) rows.push_back(FiguresRow(report));
   for (const EvalReport& report : reports.subspan(1)) rows.push_back(DifferencesRow(report, first));
-  const std::array<size_t, 5> widths = WidthsOf(rows);
+  std::array<size_t, 5> widths = WidthsOf(rows);
+  for (const Undesigned& controller : undesigned) {
+    widths[0] = std::max(widths[0], Columns(controller.name));
+  }
 
   fmt::print("The same {} for all\n", Counted(first.figures.episodes, "episode"));
   PrintConditions(first);
@@ -215,8 +219,13 @@ void PrintEvalComparison(std::span<const EvalReport> reports) {
   fmt::print("\n");
   const size_t figures = 1 + reports.size();  // rows before those of the differences
   for (const ComparisonRow& row : std::span(rows).first(figures)) PrintRow(row, widths);
-  fmt::print("\n  minus {}, in the same episodes\n", Printable(first.title));
-  for (const ComparisonRow& row : std::span(rows).subspan(figures)) PrintRow(row, widths);
+  for (const auto& [name, reason] : undesigned) {
+    fmt::print("  {:<{}}  not designed: {}\n", name, widths[0], Printable(reason));
+  }
+  if (reports.size() > 1) {
+    fmt::print("\n  minus {}, in the same episodes\n", Printable(first.title));
+    for (const ComparisonRow& row : std::span(rows).subspan(figures)) PrintRow(row, widths);
+  }
   fmt::print(
       "\n  ± is the standard deviation over the episodes; swing-up is a median.\n"
       "  Differences are means over the episodes, of swing-up over those in which both succeed.\n"

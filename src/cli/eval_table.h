@@ -13,6 +13,7 @@ bool ValueIsOff(double expected, double attained);
 void PrintEvalTable(const EvalReport& report);
 
 /// Prints several evaluations of the same episodes, and the difference of each to the first.
-void PrintEvalComparison(std::span<const EvalReport> reports);
+void PrintEvalComparison(std::span<const EvalReport> reports,
+                         std::span<const Undesigned> undesigned);
 
 }  // namespace upswing

@@ -116,6 +116,30 @@ class EvalTest(ProgramTest):
         difference = next(line for line in reversed(table) if "lqr" in line)
         self.assertRegex(difference, r"  none  ")
 
+    def test_a_controller_that_cannot_be_designed_is_a_row(self):
+        dry = ["--plant", "realaigym-c1", "--episodes", 3, "--physics", "closed-form"]
+        names = ["sac", "energy", "pfl"]
+        flags = ["--made-for", "realaigym-c1", "--made-for", "coulomb1=1", "--made-for", "coulomb2=1"]
+        reason = "lqr: found no region of attraction"
+        table = self.run_here("eval", *names, *dry, *flags)
+        self.assertEqual(table.returncode, 1)
+        self.assertRegex(table.stdout, rf"(?m)^  energy +not designed: {reason}")
+        self.assertRegex(table.stdout, r"(?m)^  sac  +\d")
+        self.assertIn(f"not designed: energy: {reason}", table.stderr)
+        done = self.run_here("eval", *names, *dry, *flags, "--json")
+        self.assertEqual(done.returncode, 1)
+        result = json.loads(done.stdout)
+        self.assertEqual([report["policy"] for report in result["policies"]], ["sac"])
+        self.assertEqual([row["policy"] for row in result["undesigned"]], ["energy", "pfl"])
+        rows = self.run_here("eval", *names, *dry, *flags, "--episodes-csv", "-")
+        self.assertEqual(rows.returncode, 1)
+        self.assertEqual([row["policy"] for row in csv.DictReader(rows.stdout.splitlines())], 3 * ["sac"])
+        # None is left, a controller by itself, and mistakes in arguments.
+        done = self.run_here("eval", "pfl", "energy", *dry, *flags)
+        self.assert_one_line(done, 1, reason)
+        self.refuse(["eval", "energy", *dry, *flags], reason)
+        self.refuse(["eval", "sac", "energy", *dry, "--made-for", "mass=heavy"], "--made-for", "heavy")
+
     def test_policies_that_cannot_share_episodes_are_refused(self):
         self.refuse(["eval", "sac", "missing"], "missing: no such file")
         self.refuse(["eval", "sac", "d3qn", "sac"], "sac: expected each policy once, got it twice")

@@ -12,7 +12,6 @@
 #include "base/text.h"
 #include "pendulum/observation.h"
 #include "pendulum/upright_modes.h"
-#include "runs/find_policy.h"
 #include "runs/plant_file.h"
 
 namespace upswing {
@@ -307,8 +306,10 @@ std::vector<PairedFigure> PairedFigures(const EvalReport& report, const EvalRepo
   return figures;
 }
 
-std::string EvalJson(std::span<const EvalReport> reports) {
-  if (reports.size() == 1) return PrintableJson(ReportJson(reports.front()));
+std::string EvalJson(const EvalReport& report) { return PrintableJson(ReportJson(report)); }
+
+std::string ComparisonJson(std::span<const EvalReport> reports,
+                           std::span<const Undesigned> undesigned) {
   ordered_json j;
   for (const EvalReport& report : reports) j["policies"].push_back(ReportJson(report));
   for (const EvalReport& report : reports.subspan(1)) {
@@ -318,16 +319,19 @@ std::string EvalJson(std::span<const EvalReport> reports) {
     }
     j["differences"].push_back(difference);
   }
+  for (const auto& [name, reason] : undesigned) {
+    j["undesigned"].push_back({{"policy", name}, {"reason", reason}});
+  }
   return PrintableJson(j);
 }
 
-std::string EpisodesCsv(std::span<const EvalReport> reports) {
+std::string EpisodesCsv(std::span<const EvalReport> reports, bool compared) {
   CsvTable csv;
   const bool has_goal =
       std::ranges::any_of(reports, [](const EvalReport& report) { return report.env.any_pose; });
   for (const EvalReport& report : reports) {
     for (size_t i = 0; i < report.episodes.size(); ++i) {
-      if (reports.size() > 1) csv.Add("policy", report.policy);
+      if (compared) csv.Add("policy", report.policy);
       csv.Add("episode", i);
       AddCells(report, report.episodes[i], has_goal, csv);
       csv.EndRow();

@@ -11,6 +11,7 @@
 #include "pendulum/pendulum_env.h"
 #include "report/statistics.h"
 #include "rl/train/evaluate.h"
+#include "runs/find_policy.h"
 
 /// Evaluations of a policy over many episodes, and their reports.
 namespace upswing {
@@ -77,12 +78,15 @@ struct PairedFigure {
 /// every figure but the values, whose unit may differ.
 std::vector<PairedFigure> PairedFigures(const EvalReport& report, const EvalReport& other);
 
-/// The report as a JSON document. Several reports, which have the same episodes, get a list of
-/// these documents, and the differences of each to the first.
-std::string EvalJson(std::span<const EvalReport> reports);
+/// The report as a JSON document.
+std::string EvalJson(const EvalReport& report);
+/// Reports with the same episodes as a list of these documents, with the differences of each to the
+/// first and the controllers that could not be designed.
+std::string ComparisonJson(std::span<const EvalReport> reports,
+                           std::span<const Undesigned> undesigned);
 
 /// A row for each episode, counted from 0. A missing figure is empty, such as the swing-up time of
-/// an episode that fails. Several reports have the policy in the first column.
-std::string EpisodesCsv(std::span<const EvalReport> reports);
+/// an episode that fails. If the reports are `compared`, the policy is in the first column.
+std::string EpisodesCsv(std::span<const EvalReport> reports, bool compared);
 
 }  // namespace upswing

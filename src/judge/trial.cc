@@ -42,8 +42,7 @@ PendulumState ParseStart(const std::string& text) {
 
 }  // namespace
 
-LoadedPolicy UsedIn(const TrialArguments& trial, const LoadedPolicy& loaded) {
-  if (loaded.is_foreign()) return loaded;
+Plant PlantIn(const TrialArguments& trial, const LoadedPolicy& loaded) {
   Plant plant = trial.plant.empty() ? loaded.plant : ReadPlantFile(trial.plant).plant;
   const Options options = OptionsOf(plant);
   SetFlags(options, trial.plant_flags);
@@ -56,7 +55,12 @@ LoadedPolicy UsedIn(const TrialArguments& trial, const LoadedPolicy& loaded) {
                options.aliases().end();
   });
   ApplyChanges(options, changes);
-  return ForOtherSize(loaded, plant).value_or(loaded);
+  return plant;
+}
+
+LoadedPolicy UsedIn(const TrialArguments& trial, const LoadedPolicy& loaded) {
+  if (loaded.is_foreign()) return loaded;
+  return ForOtherSize(loaded, PlantIn(trial, loaded)).value_or(loaded);
 }
 
 TrialConditions ConditionsOf(const std::vector<FlagValue>& flags) {

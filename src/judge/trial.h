@@ -34,7 +34,9 @@ struct TrialArguments {
   bool is_of_eval() const { return episode >= 0; }
 };
 
-/// A loaded policy for the plant of the trial, by file and flags (ForOtherSize). Throws BadInput.
+/// The plant of a loaded policy in the trial, by file and flags. Throws BadInput.
+Plant PlantIn(const TrialArguments& trial, const LoadedPolicy& loaded);
+/// A loaded policy for the plant of the trial (PlantIn, ForOtherSize). Throws as they do.
 LoadedPolicy UsedIn(const TrialArguments& trial, const LoadedPolicy& loaded);
 
 /// Disturbances of sensors and motor, and random plants.

@@ -113,8 +113,14 @@ PlantFile ChangeDesignPlant(const PolicyArguments& a, Plant& plant) {
   return file;
 }
 
-/// Designs the controller that the arguments name.
-LoadedPolicy DesignNamed(const PolicyArguments& a) {
+/// A controller before its design.
+struct ControllerPlan {
+  ControllerConfig config;
+  std::string title;
+};
+
+/// The plan of the controller that the arguments name. Throws BadInput for wrong arguments.
+ControllerPlan PlanNamed(const PolicyArguments& a) {
   ControllerConfig asked;
   SetFlags(OptionsOf(asked), a.flags);
   DesignPlant plant;
@@ -133,8 +139,26 @@ LoadedPolicy DesignNamed(const PolicyArguments& a) {
   ControllerConfig config = ControllerConfig::For(plant);
   SetFlags(OptionsOf(config), a.flags);
   config.swing_up_policy = swing_up;
-  return DesignController(a.name, config, TitleOf(a.name, config, made_for.name, made_for.plant),
-                          a);
+  return {config, TitleOf(a.name, config, made_for.name, made_for.plant)};
+}
+
+LoadedPolicy DesignNamed(const PolicyArguments& a) {
+  const ControllerPlan plan = PlanNamed(a);
+  return DesignController(a.name, plan.config, plan.title, a);
+}
+
+/// The policy that the arguments name. A controller that cannot be designed is added to
+/// `undesigned`, if there is such a list.
+std::optional<LoadedPolicy> GetOrExplain(const PolicyArguments& a,
+                                         std::vector<Undesigned>* undesigned) {
+  if (undesigned == nullptr || !IsController(a.name) || fs::exists(a.name)) return GetPolicy(a);
+  const ControllerPlan plan = PlanNamed(a);
+  try {
+    return DesignController(a.name, plan.config, plan.title, a);
+  } catch (const Error& error) {
+    undesigned->push_back({a.name, error.what()});
+    return std::nullopt;
+  }
 }
 
 /// Throws BadInput if a setting belongs to no controller in `names`.
@@ -177,7 +201,8 @@ std::vector<std::string> ShippedPolicies() {
 }
 
 std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
-                                      const PolicyArguments& controllers) {
+                                      const PolicyArguments& controllers,
+                                      std::vector<Undesigned>* undesigned) {
   CheckSettings(controllers, names);
   std::vector<LoadedPolicy> policies;
   std::set<fs::path> seen;  // files, and names of controllers
@@ -189,14 +214,16 @@ std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
       std::ranges::copy_if(controllers.flags, std::back_inserter(one.flags),
                            [&](const auto& flag) { return HasSection(name, SectionOf(flag)); });
     }
-    policies.push_back(GetPolicy(one));
-    ExpectPendulum(policies.back());
+    std::optional<LoadedPolicy> loaded = GetOrExplain(one, undesigned);
     std::error_code none;
-    const auto file = fs::canonical(policies.back().path, none);
+    const auto file = fs::canonical(loaded ? loaded->path : "", none);
     const fs::path key = none ? fs::path(name) : file;
     if (!seen.insert(key).second) {
       throw BadInput(Concat(Printable(name), ": expected each policy once, got it twice"));
     }
+    if (!loaded) continue;
+    ExpectPendulum(*loaded);
+    policies.push_back(*std::move(loaded));
   }
   return policies;
 }

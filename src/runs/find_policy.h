@@ -41,11 +41,18 @@ LoadedPolicy GetPolicy(const PolicyArguments& a);
 LoadedPolicy DesignController(const std::string& name, const ControllerConfig& config,
                               const std::string& title, const PolicyArguments& given = {});
 
+/// A controller that cannot be designed for its plant, and the reason in a line.
+struct Undesigned {
+  std::string name, reason;
+};
+
 /// Gets policies of the double pendulum by these names, each a PolicyArguments::name. Each
-/// controller gets those settings in `controllers` that it has. Throws BadInput if none of the
-/// policies has a given setting.
+/// controller gets those settings in `controllers` that it has. Controllers that cannot be designed
+/// are left out and added to `undesigned`; without this list, they throw. Throws BadInput if none
+/// of the policies has a given setting.
 std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
-                                      const PolicyArguments& controllers);
+                                      const PolicyArguments& controllers,
+                                      std::vector<Undesigned>* undesigned = nullptr);
 
 /// Loads a policy file, the best policy of a run folder, or a shipped policy. Throws as
 /// ReadPolicy does.
