@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "agents/arguments.h"
 #include "base/error.h"
 #include "base/text.h"
 #include "cli/commands.h"
@@ -145,12 +146,11 @@ void PrintDriver(const RunArguments& a, const LoadedPolicy& policy) {
              NameOf(RobotOf(policy)));
   const std::string change = ChangeOfSize(policy);
   if (!change.empty()) fmt::print("  {}\n", change);
-  const double decides =
-      static_cast<double>(CyclesIn(policy.control_period(), std::llround(a.hz))) / a.hz;
-  if (std::abs(decides - policy.control_period()) > 1e-6) {
-    fmt::print(
-        "  decides every {:.4g} s, a whole number of cycles; the policy was made for {:.4g} s\n",
-        decides, policy.control_period());
+  const double cycles = CyclesIn(policy.control_period(), std::llround(a.hz));
+  constexpr double kRounding = 1e-6;
+  if (std::abs(cycles - std::round(cycles)) > kRounding * cycles) {
+    fmt::print("  decides every {:.4g} s, which is {:.4g} cycles: at the cycle next to its end\n",
+               policy.control_period(), cycles);
   }
 }
 
@@ -224,6 +224,7 @@ int RunRun(const RunArguments& a) {
   if (!twin && a.compensation > 0)
     throw BadInput("--compensation: expected --twin with it, got none");
   const MachinePolicy policy = GetMachinePolicy(a.policy, a.robot, twin, std::llround(a.hz));
+  (void)CyclesIn(policy->control_period(), std::llround(a.hz));  // throws
   const std::string other = twin ? DifferencesFromTwin(*policy, *twin) : "";
   if (!other.empty()) fmt::print(stderr, "warning: {}\n", other);
   return Drive(a, policy, twin, address);
@@ -234,6 +235,9 @@ int RunRun(const RunArguments& a) {
 void AddRun(CommandLine& line) {
   RunArguments& a = line.Runs(RunRun);
   AddPolicy(line, a.policy);
+  Options period;
+  DescribeControlPeriod(period, &a.policy.control_period);
+  line.Arguments(period);
   line.Text("--link", a.link, "LINK",
             "machine: a twin (file or shipped plant), udp:HOST:PORT or serial:DEVICE[:BAUD] "
             "(default 921600 bit/s)");

@@ -353,6 +353,17 @@ class Run(ProgramTest):
         for flag, wrong in (("--max-velocity", 0), ("--brake-damping", -1), ("--velocity-share", "x")):
             self.refuse([*run, 0, "--link", TWIN, flag, wrong], f"{flag}: expected a number", f'"{wrong}"')
 
+    def test_control_periods_need_no_whole_cycles(self):
+        run = ["run", "energy", "--seconds", 0.1, "--max-torque", 0, "--link", TWIN]
+        usual = self.run_here(*run)
+        self.assertNotIn("decides every", usual.stdout)
+        short = self.run_here(*run, "--control-period", 0.0067)
+        self.assertEqual(short.returncode, 0, short.stderr)
+        self.assertIn("decides every 0.0067 s, which is 3.35 cycles", short.stdout)
+        self.refuse([*run, "--control-period", 0.0012], "--hz: expected 834 or more", "got 500")
+        self.refuse(["run", "sac", *run[2:], "--control-period", 0.01],
+                    "--control-period: expected 0.02 s", "got 0.01")
+
     def test_limits(self):
         done = self.run_here("run", "mpc", "--link", TWIN, "--max-velocity", 2)
         self.assert_one_line(done, 1, "velocity", "beyond the limit 2 rad/s")

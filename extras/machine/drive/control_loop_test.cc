@@ -7,6 +7,7 @@
 #include <new>
 #include <numbers>
 #include <thread>
+#include <vector>
 
 #include "base/error.h"
 #include "extras/machine/drive/fake_machine.h"
@@ -236,6 +237,36 @@ TEST(PerCycle, KeepsThePeriodOfAPolicy) {
   EXPECT_NE(first, second);
   EXPECT_EQ(late(49, {3.1, 0, 0, 0}), second);
   EXPECT_EQ(late(50, {3.1, 0, 0, 0}), first);
+}
+
+TEST(PerCycle, ActsInTheCyclesNextToThePeriodsOfAPolicy) {
+  for (const double cycles : {3.35, 3.17, 2.5, 1.05}) {
+    constexpr int64_t kHz = 500;
+    int64_t cycle = 0;
+    std::vector<int64_t> acts;
+    const auto law = [&](int64_t step, const PendulumState& /*state*/) {
+      EXPECT_EQ(step, std::ssize(acts)) << cycles;
+      acts.push_back(cycle);
+      return 0.0;
+    };
+    const MachineController controller = PerCycle({law, cycles / kHz}, kHz);
+    for (; cycle < 100; ++cycle) controller(cycle, {});
+    EXPECT_NEAR(static_cast<double>(acts.size()), 100 / cycles, 1) << cycles;
+    for (size_t step = 0; step < acts.size(); ++step) {
+      const double late = static_cast<double>(acts[step]) - static_cast<double>(step) * cycles;
+      EXPECT_LE(std::abs(late), 0.5 + 1e-9) << cycles;
+    }
+  }
+  const auto none = [](int64_t /*step*/, const PendulumState& /*state*/) { return 0.0; };
+  EXPECT_NO_THROW(PerCycle({none, 0.00195}, 500));  // which is a cycle, up to 5%
+  try {
+    PerCycle({none, 0.0012}, 500);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(),
+                 "--hz: expected 834 or more, for a cycle in 0.0012 s, the control period of the "
+                 "policy, got 500");
+  }
 }
 
 TEST(LogRing, KeepsTheOrderAcrossThreads) {

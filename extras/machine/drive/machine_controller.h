@@ -29,12 +29,13 @@ class MachineController {
   double period_;  // s
 };
 
-/// Cycles of a loop with `hz` cycles per second in a control period (s), rounded to the nearest.
-/// Throws BadInput if that changes the period by more than a tenth.
-int64_t CyclesIn(double control_period, int64_t hz);
+/// Cycles of a loop with `hz` cycles per second in a control period (s), not rounded. Throws
+/// BadInput if the period is shorter than a cycle.
+double CyclesIn(double control_period, int64_t hz);
 
-/// The controller at the rate of a loop: its steps are cycles, `hz` per second. It holds each
-/// torque for the cycles of a step of the given one. Throws as CyclesIn does.
+/// The controller at the rate of a loop: its steps are cycles, `hz` per second. It acts in the
+/// cycle next to the end of each control period of the given one, and holds its torque between.
+/// Throws as CyclesIn does.
 MachineController PerCycle(MachineController controller, int64_t hz);
 
 }  // namespace upswing::machine
