@@ -115,8 +115,21 @@ void EarnedTorque::MoveBlock(double torque) {
   block_.moved += block_.velocity * seen_.period;
 }
 
-Joints EarnedTorque::Pulse(double age) {
+void EarnedTorque::CountGap(double now) {
+  constexpr double kGapCycles = 1.5;
+  if (push_.time < 0) return;
+  const double beyond = now - push_.time - seen_.period;  // s
+  if (beyond < (kGapCycles - 1) * seen_.period) return;
+  impulse_ += push_.torque * beyond;
+  if (phase_ != Phase::kPush) return;
+  travel_ += impulse_ * beyond;
+  if (amplitude_ == config_.limit) at_limit_ += beyond;
+}
+
+Joints EarnedTorque::Pulse(double now, double age) {
   Joints torque{};
+  CountGap(now);
+  push_ = {0, now};
   if (proven_ || age > Time(kLongestBlind, kBlindCycles)) return torque;
   const double limit = config_.limit;
   if (phase_ == Phase::kRest) {
@@ -142,6 +155,7 @@ Joints EarnedTorque::Pulse(double age) {
   } else {
     proven_ = true;
   }
+  push_.torque = torque[motor_];
   return torque;
 }
 

@@ -75,9 +75,10 @@ class EarnedTorque {
   bool proven() const { return proven_; }
   /// Judges the answer to the pulses so far.
   Complaint JudgePulse();
-  /// The torques (N·m) of the next cycle of the pulses, with a last reading of this age (s). A
-  /// pulse waits for readings.
-  Joints Pulse(double age);
+  /// The torques (N·m) of the next cycle of the pulses, which begins at a time (s), with a last
+  /// reading of this age (s). A pulse waits for readings. After a gap between two cycles, it knows
+  /// for how long the last torque acted.
+  Joints Pulse(double now, double age);
   /// Judges the last cycle of a run.
   Complaint JudgeRun();
   /// The torques (N·m) that are permitted of the ones that the controller wants. With a twin, links
@@ -104,6 +105,11 @@ class EarnedTorque {
     double mass, friction, moved = 0, velocity = 0;
   };
   enum class Phase { kRest, kPush, kStop };
+  /// The torque of the last cycle of the pulses.
+  struct Push {
+    double torque = 0;  // N·m
+    double time = -1;   // s; negative: there was none
+  };
 
   bool PredictsPulse() const { return seen_.expected.known && config_.trust == TwinTrust::kAlways; }
   bool PredictsRun() const { return seen_.expected.known && config_.trust != TwinTrust::kNever; }
@@ -119,6 +125,8 @@ class EarnedTorque {
   Complaint JudgeJoint(int j);
   Complaint JudgeShare(int j);
   Complaint JudgeDirection(int j);
+  /// Counts the time for which the last torque of the pulse acted beyond a usual cycle.
+  void CountGap(double now);
   bool Answered() const { return joints_[0].answered && joints_[1].answered; }
 
   EarnedTorqueConfig config_;
@@ -130,6 +138,7 @@ class EarnedTorque {
   bool held_ = false;        // whether only torques that friction holds are permitted
   double held_at_ = 0;       // since when, s
   Phase phase_ = Phase::kRest;
+  Push push_;
   int motor_;             // joint of the controller's motor, 0 or 1
   double amplitude_ = 0;  // N·m
   double impulse_ = 0;    // of the push, N·m·s

@@ -90,9 +90,13 @@ void SteppedLoop::CheckReading(double time, const Joints& angle) const {
 }
 
 void SteppedLoop::LearnPeriod(double interval) {
-  constexpr double kShare = 0.1, kMost = 2;  // a gap counts as two usual intervals
-  if (period_ == 0) period_ = interval;
-  period_ += kShare * (std::min(interval, kMost * period_) - period_);
+  intervals_[known_intervals_ % intervals_.size()] = interval;
+  ++known_intervals_;
+  std::array<double, 15> sorted = intervals_;
+  const size_t count = std::min(known_intervals_, sorted.size());
+  const auto median = sorted.begin() + static_cast<std::ptrdiff_t>((count - 1) / 2);
+  std::nth_element(sorted.begin(), median, sorted.begin() + static_cast<std::ptrdiff_t>(count));
+  period_ = *median;
 }
 
 void SteppedLoop::Cycle(double now, const Joints& angle) {

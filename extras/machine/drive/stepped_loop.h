@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -65,14 +67,17 @@ class SteppedLoop {
   void CheckReading(double time, const Joints& angle) const;
   /// The controller, whose steps are ticks: it acts once in its control period.
   MachineController PerTick();
-  /// Updates the usual time between two readings by the last one, s.
+  /// Updates the usual time between two readings by the last one, s: the median of the last ones,
+  /// which a gap does not change.
   void LearnPeriod(double interval);
   void Cycle(double now, const Joints& angle);
 
   MachinePolicy policy_;
   std::optional<double> latency_;
   bool stop_asked_ = false;
-  double period_ = 0;   // usual time between two readings, s; 0: unknown
+  double period_ = 0;                   // usual time between two readings, s; 0: unknown
+  std::array<double, 15> intervals_{};  // the last ones, in a ring, s
+  size_t known_intervals_ = 0;
   bool begun_ = false;  // whether there was a reading
   double origin_ = 0;   // time 0 by the caller's clock, s
   double time_ = 0;     // of the last reading by the caller's clock, s

@@ -141,6 +141,59 @@ TEST(SteppedLoop, SingleGapsDoNotStopItAndLongOnesDo) {
   for (int i = 0; i < 100; ++i) EXPECT_EQ(bench.Step(0.002), (Joints{0, 0}));
 }
 
+/// The impulses of the first pulse in both directions (N·m·s) if a gap comes after `readings` of
+/// its push, after which the machine gets the torque of the last reading for `gap` (s).
+struct PulseImpulses {
+  double there = 0, back = 0;
+};
+PulseImpulses PulseWithGap(int readings, double gap) {
+  SteppedBench bench(/*compensation=*/0);
+  PulseImpulses impulses;
+  int pushed = 0;
+  double torque = 0;
+  while (bench.loop.state() != LoopState::kRunning && bench.machine.time() < 3) {
+    const bool in_gap = torque > 0 && ++pushed == readings;
+    const double step = in_gap ? gap : SteppedBench::kStep;
+    const double impulse = torque * step;
+    (impulse > 0 ? impulses.there : impulses.back) += std::abs(impulse);
+    torque = bench.Step(step)[0];
+    EXPECT_EQ(bench.loop.stopped(), "");
+    if (bench.loop.state() == LoopState::kRunning) break;
+  }
+  EXPECT_EQ(bench.loop.state(), LoopState::kRunning);
+  return impulses;
+}
+
+TEST(SteppedLoop, TheFirstPulseTakesBackTheImpulseOfAGap) {
+  for (const double gap : {SteppedBench::kStep, 0.02, 0.05}) {
+    for (const int readings : {5, 30, 50}) {
+      const auto [there, back] = PulseWithGap(readings, gap);
+      EXPECT_GT(there, 0);
+      EXPECT_NEAR(back / there, 1, 0.02) << gap << ", " << readings;
+    }
+  }
+}
+
+TEST(SteppedLoop, GapsDoNotChangeTheUsualTimeBetweenReadings) {
+  // The policy acts at the reading next to the end of its period, which the usual time decides.
+  for (const bool begins_with_gaps : {false, true}) {
+    SteppedBench bench(/*compensation=*/0);
+    for (int i = 0; begins_with_gaps && i < 3; ++i) bench.Step(0.07);
+    bench.Run(0.05);
+    const auto [there, back] = [&] {
+      PulseImpulses impulses;
+      while (bench.loop.state() != LoopState::kRunning && bench.machine.time() < 3) {
+        const double impulse = bench.Step(SteppedBench::kStep)[0] * SteppedBench::kStep;
+        if (bench.loop.state() == LoopState::kRunning) break;
+        (impulse > 0 ? impulses.there : impulses.back) += std::abs(impulse);
+      }
+      return impulses;
+    }();
+    EXPECT_GT(there, 0) << begins_with_gaps;
+    EXPECT_NEAR(back / there, 1, 0.02) << begins_with_gaps;
+  }
+}
+
 TEST(SteppedLoop, RefusesReadingsThatCannotBe) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   struct Case {

@@ -427,7 +427,7 @@ Joints Supervisor::BrakeTorque(const CycleFacts& facts) const {
 Joints Supervisor::Torque(const Joints& controller, const CycleFacts& facts) {
   torque_ = {};
   Joints wanted{};
-  if (state_ == LoopState::kProbing) wanted = earned_.Pulse(facts.age);
+  if (state_ == LoopState::kProbing) wanted = earned_.Pulse(facts.time, facts.age);
   if (state_ == LoopState::kRunning) wanted = earned_.Permitted(controller);
   if (state_ == LoopState::kBraking) wanted = earned_.Permitted(BrakeTorque(facts));
   if (!std::isfinite(wanted[0]) || !std::isfinite(wanted[1])) {
