@@ -243,6 +243,17 @@ void ScoreOlympics(const ScoreArguments& a, const Twin& twin, const MachinePolic
   if (beyond > 0) fmt::print("  beyond the limits       {}\n", ShareText(beyond, a.runs));
 }
 
+/// Throws BadInput unless a twin has about the size of RealAIGym's robots. Limits, resets and
+/// normalisers of versions 2 and 3 are for these.
+void ExpectUsualSize(const ScoreArguments& a, const Twin& twin) {
+  const Scale scale = ScaleOverUsual(twin.plant);
+  if (scale == Scale()) return;
+  throw BadInput(
+      fmt::format("--twin: expected a machine of about the size of RealAIGym's robots, for which "
+                  "--score-version {} is, got one with times × {:.3g} and torques × {:.3g}",
+                  a.score_version, scale.time, scale.torque));
+}
+
 int RunScore(const ScoreArguments& a) {
   if (a.policy.empty()) throw BadInput("realaigym score: expected a policy, got none");
   if (!a.csv.empty()) CheckWritable("--csv", a.csv);
@@ -253,6 +264,7 @@ int RunScore(const ScoreArguments& a) {
   ThreadPool pool(ResolveThreads(a.threads));
   std::optional<Twin> twin;
   if (!a.twin.empty()) twin = ReadTwin(a.twin, "--twin");
+  if (twin && !a.olympics()) ExpectUsualSize(a, *twin);
   const MachinePolicy policy =
       GetMachinePolicy(a.policy, a.robot, twin, a.olympics() ? kOlympicsHz : kBoardHz);
   const auto seed = static_cast<uint64_t>(a.seed);

@@ -175,6 +175,10 @@ class RealAIGym(ProgramTest):
         refuse(["realaigym", "score", "lqr", "--robot", "cartpole"], "--robot", "pendubot or acrobot")
         refuse(["realaigym", "score", "lqr", "--csv", "-", "--json"], "--json")
         refuse(["realaigym", "score", "lqr", "--no-pushes"], "--no-pushes", "--twin")
+        for version in (2, 3):
+            refuse(["realaigym", "score", "lqr", "--twin", "cloudpendulum", "--score-version", version],
+                   "--twin: expected a machine of about the size of RealAIGym's robots",
+                   f"--score-version {version} is", "times × 0.415 and torques × 0.0307")
         refuse(["realaigym", "score", "lqr", "--twin", "realaigym-twin", "--csv", "x.csv"], "--twin",
                "no --csv")
 
