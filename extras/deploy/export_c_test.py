@@ -205,7 +205,7 @@ class HeaderTest(ProgramTest):
                          "--csv", "rollout.csv")
             rows = read_csv(self.folder / "rollout.csv")
             for i, row in enumerate(rows):
-                states.extend(row[name] for name in ("qpos0", "qpos1", "qvel0", "qvel1"))
+                states.extend(row[name] for name in ("q1", "q2", "w1", "w2"))
                 begins.append(i == 0)
                 torques.append(row["torque"])
         self.assert_same(self.drive(states, begins, torques), torques)
@@ -269,7 +269,7 @@ class HeaderTest(ProgramTest):
                      "rollout.csv")
         rows = read_csv(self.folder / "rollout.csv")[:-1]
         numbers = array.array("f", (row[key] for row in rows
-                                    for key in ("qpos0", "qpos1", "qvel0", "qvel1")))
+                                    for key in ("q1", "q2", "w1", "w2")))
         done = subprocess.run([self.folder / "program"], check=False, input=numbers.tobytes(),
                               stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         self.assertEqual((done.returncode, done.stderr), (0, b""))
@@ -583,11 +583,10 @@ class SwingUpTest(ProgramTest):
         self.write("in_c.csv", text)
         self.succeed("simulate", AGENTS / "fast.safetensors", "--start", ",".join(map(str, start)),
                      "--physics", "closed-form", "--csv", "ours.csv")
-        names = {"q1": "qpos0", "q2": "qpos1", "w1": "qvel0", "w2": "qvel1", "torque": "torque"}
         for got, ours in zip(read_csv(self.folder / "in_c.csv")[:100],
                              read_csv(self.folder / "ours.csv")):
-            for name, column in names.items():
-                self.assertAlmostEqual(got[name], ours[column], delta=1e-9)
+            for name in ("q1", "q2", "w1", "w2", "torque"):
+                self.assertAlmostEqual(got[name], ours[name], delta=1e-9)
 
     def test_the_time_of_a_call_is_measured(self):
         self.build("fast", "time.c")

@@ -120,7 +120,7 @@ class Machine(ProgramTest):
         text = log(own, ["part", "t", "a", "b"])
         self.assertEqual(self.faults(text, "--columns", "columns.toml"), {})
         shown = self.run_here("machine", "check", "log.csv", "--columns", "columns.toml").stdout
-        self.assertIn("log.csv: 2000 rows, 4.00 s in 2 pieces\n", shown)
+        self.assertIn("log.csv: 2000 rows, 4.00 s in 2 pieces\n  units    t [ms]; a, b [deg]\n", shown)
         # The same file with other columns, and the columns of RealAIGym.
         self.refuse(["machine", "check", "log.csv"], "log.csv", "--columns", "pos_meas1")
         self.write("other.toml", "time = 't'\nangle1 = 'a'\nangle2 = 'c'\n")
@@ -128,6 +128,20 @@ class Machine(ProgramTest):
         self.write("wrong.toml", "time = 't'\nangel1 = 'a'\n")
         self.refuse(["machine", "check", "log.csv", "--columns", "wrong.toml"], "wrong.toml:2",
                     "did you mean angle1?")
+
+    def test_a_rollout_is_a_log(self):
+        for joint in (1, 2):
+            start = ["--start", "1,0.5,0,0", "--seconds", 10, "--actuated-joint", joint]
+            torques = [f"{2 * math.sin(0.05 * k) + math.sin(0.002 * k * k):.6g}" for k in range(500)]
+            self.write("torques.csv", "torque\n" + "\n".join(torques) + "\n")
+            out = self.succeed("simulate", "--torque", "torques.csv", *start, "--csv", "rollout.csv")
+            self.assertIn("rollout.csv: 501 rows", out)
+            shown = self.succeed("machine", "check", "rollout.csv")
+            self.assertIn("  units    t [s]; q1, q2 [rad]; w1, w2 [rad/s]; torque1, torque2 [N·m]\n", shown)
+            self.assertNotIn("fault", shown)
+        self.write("names.toml", "time = 't'\nangle1 = 'q1'\nangle2 = 'q2'\ncommanded1 = 'i_A'\n")
+        self.refuse(["machine", "check", "rollout.csv", "--columns", "names.toml"], "names.toml:4: commanded1",
+                    "Nm, N·m, mNm, mN·m", "factor", '"A"')
 
     def test_figure(self):
         self.write("log.csv", log(scaled(vel_meas2=-1)))

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <map>
-#include <numbers>
 #include <optional>
 #include <utility>
 
@@ -12,6 +12,7 @@
 #include "base/error.h"
 #include "base/format.h"
 #include "base/text.h"
+#include "extras/machine/logs/units.h"
 #include "os/file.h"
 #include "os/gzip.h"
 
@@ -22,29 +23,6 @@ namespace fs = std::filesystem;
 
 constexpr size_t kMostPieces = 10000;
 constexpr double kMostMagnitude = 1e12;  // larger numbers are garbage, and their squares overflow
-
-/// A unit that a column may have.
-struct LogUnit {
-  const char* name;
-  const char* quantity;
-  double scale;  // SI units in it
-};
-constexpr double kTurn = 2 * std::numbers::pi;
-constexpr LogUnit kUnits[] = {{"s", "time", 1},
-                              {"ms", "time", 1e-3},
-                              {"us", "time", 1e-6},
-                              {"ns", "time", 1e-9},
-                              {"rad", "angle", 1},
-                              {"deg", "angle", kTurn / 360},
-                              {"turn", "angle", kTurn},
-                              {"rad/s", "velocity", 1},
-                              {"deg/s", "velocity", kTurn / 360},
-                              {"turn/s", "velocity", kTurn},
-                              {"rpm", "velocity", kTurn / 60},
-                              {"Nm", "torque", 1},
-                              {"N·m", "torque", 1},
-                              {"mNm", "torque", 1e-3},
-                              {"mN·m", "torque", 1e-3}};
 
 /// A quantity of each joint: its key in TOML files, and its columns in RealAIGym's logs of 2023 and
 /// of 2022, without the joint's number.
@@ -60,17 +38,6 @@ constexpr JointQuantity kJointQuantities[] = {
     {"commanded", "tau_con", "tau", "torque", &LogColumns::commanded, &MachineLog::commanded},
     {"measured", "tau_meas", "", "torque", &LogColumns::measured, &MachineLog::measured},
     {"push", "tau_pert", "", "torque", &LogColumns::push, &MachineLog::push}};
-
-/// The scale of a unit. Throws BadInput, which begins with `place`, for another quantity's unit.
-double ScaleOf(const std::string& unit, std::string_view quantity, const std::string& place) {
-  std::vector<std::string> names;
-  for (const LogUnit& known : kUnits) {
-    if (quantity != known.quantity) continue;
-    if (unit == known.name) return known.scale;
-    names.emplace_back(known.name);
-  }
-  throw BadInput(Concat(place, "unit: expected ", Join(names, ", "), ", got \"", unit, "\""));
-}
 
 /// A TOML value for an error: a text in quotes, a number or truth value without.
 std::string Shown(const toml::node& node) {
@@ -91,55 +58,37 @@ std::string TextIn(const toml::node& node, const std::string& place) {
   throw BadInput(Concat(place, "expected the name of a column in quotes, got ", Shown(node)));
 }
 
-/// The scale that the end of a column's name states, such as `q1 [deg]`, `q1 (deg)` or `time_ms`; 1
-/// if it states none. Throws BadInput for brackets with another text than a unit or an index.
-double ScaleInName(std::string name, std::string_view quantity, const std::string& place) {
-  const bool has_brackets = name.ends_with(']') || name.ends_with(')');
-  if (has_brackets) name.pop_back();
-  const size_t before = name.find_last_of(has_brackets ? "[(" : "_ ");
-  if (before == std::string::npos) return 1;
-  const std::string unit = name.substr(before + 1);
-  if (has_brackets && !ParseNumber(unit)) return ScaleOf(unit, quantity, place);
-  for (const LogUnit& known : kUnits) {
-    if (quantity == known.quantity && unit == known.name) return known.scale;
-  }
-  return 1;
-}
-
-/// Reads `"name"` or `{column = "name", unit = "deg", factor = -1}`. An angle may have the keys
-/// `wrap` and `hanging`, too.
+/// Reads `"name"` or `{column = "name", unit = "deg", factor = -1}`. Clocks and angles may have the
+/// key `wrap`, angles `hanging`, too.
 LogColumn ColumnIn(const toml::node& node, std::string_view quantity, const std::string& place) {
+  const bool is_angle = quantity == "angle", wraps = is_angle || quantity == "time";
   LogColumn column;
+  std::optional<ColumnUnit> unit;
   const toml::table* table = node.as_table();
-  if (table == nullptr) {
-    column.name = TextIn(node, place);
-    column.scale = ScaleInName(column.name, quantity, place);
-    return column;
-  }
-  bool states_scale = false;
-  for (const auto& [key, value] : *table) {
+  if (table == nullptr) column.name = TextIn(node, place);
+  for (const auto& [key, value] : table == nullptr ? toml::table() : *table) {
     const std::string inner = Concat(place, key.str(), ": ");
     if (key == "column") {
       column.name = TextIn(value, inner);
     } else if (key == "unit") {
-      column.scale *= ScaleOf(TextOf(value).value_or(""), quantity, place);
-      states_scale = true;
+      unit = UnitNamed(TextOf(value).value_or(""), quantity, place);
     } else if (key == "factor") {
-      const double factor = NumberIn(value, {1e-9, 1e9}, inner);
-      column.scale *= factor;
-      states_scale = states_scale || std::abs(factor) != 1;
-    } else if (key == "wrap" && quantity == "angle") {
+      column.factor = NumberIn(value, {1e-9, 1e9}, inner);
+    } else if (key == "wrap" && wraps) {
       column.wrap = std::abs(NumberIn(value, {1e-9, 1e12}, inner));
-    } else if (key == "hanging" && quantity == "angle") {
+    } else if (key == "hanging" && is_angle) {
       column.hanging = NumberIn(value, {0, 1e12}, inner);
     } else {
-      throw BadInput(Concat(place, "expected column, unit",
-                            quantity == "angle" ? ", factor, wrap or hanging" : " or factor",
-                            ", got ", key.str()));
+      const char* keys = " or factor";
+      if (wraps) keys = is_angle ? ", factor, wrap or hanging" : ", factor or wrap";
+      throw BadInput(Concat(place, "expected column, unit", keys, ", got ", key.str()));
     }
   }
   if (column.name.empty()) throw BadInput(Concat(place, "expected a column, got none"));
-  if (!states_scale) column.scale *= ScaleInName(column.name, quantity, place);
+  if (!unit && std::abs(column.factor) != 1) unit = SiUnit(quantity);
+  if (!unit) unit = UnitInName(column.name, quantity, place);
+  column.unit = unit->name;
+  column.scale = unit->scale * column.factor;
   return column;
 }
 
@@ -202,16 +151,16 @@ void CheckColumns(const LogColumns& columns, const std::string& where) {
   add(columns.piece, "piece");
 }
 
-/// The columns of a log of RealAIGym, from the file's line of names.
-LogColumns RealAiGymColumns(const std::vector<std::string>& names, const std::string& where) {
-  const auto has = [&](const std::string& name) { return std::ranges::count(names, name) > 0; };
-  const bool is_old = !has("pos_meas1");
-  if (!has("time") || !has(is_old ? "pos1" : "pos_meas1")) {
-    throw BadInput(Concat(where,
-                          ": expected the columns time and pos_meas1 or pos1, or --columns FILE "
-                          "that names yours, got \"",
-                          Shortened(Join(names, ","), 200), "\""));
-  }
+using Names = std::vector<std::string>;
+
+bool HasName(const Names& names, const std::string& name) {
+  return std::ranges::find(names, name) != names.end();
+}
+
+/// The columns of a log of RealAIGym; nothing if the file's line of names is not that of one.
+std::optional<LogColumns> RealAiGymColumns(const Names& names) {
+  const bool is_old = !HasName(names, "pos_meas1");
+  if (!HasName(names, "time") || !HasName(names, is_old ? "pos1" : "pos_meas1")) return {};
   LogColumns columns;
   columns.time.name = "time";
   for (const JointQuantity& q : kJointQuantities) {
@@ -219,10 +168,48 @@ LogColumns RealAiGymColumns(const std::vector<std::string>& names, const std::st
     const bool needed = q.values == &MachineLog::angle;
     for (int joint = 0; joint < 2; ++joint) {
       const std::string column = Concat(name, joint + 1);
-      if (needed || has(column)) (columns.*q.columns)[joint].name = column;
+      if (needed || HasName(names, column)) (columns.*q.columns)[joint].name = column;
     }
   }
   return columns;
+}
+
+/// The columns of a rollout that `simulate` or the page wrote, also of version 0.5.0; nothing if
+/// the file's line of names is not that of one. Without torques of both joints, the motor is at
+/// joint 1, as on the page.
+std::optional<LogColumns> RolloutColumns(const Names& names) {
+  const auto have = [&](std::initializer_list<const char*> all) {
+    return std::ranges::all_of(all, [&](const char* name) { return HasName(names, name); });
+  };
+  const bool is_old = have({"t", "qpos0", "qpos1", "qvel0", "qvel1", "torque"});
+  if (!is_old && !have({"t", "q1", "q2", "w1", "w2", "torque"})) return {};
+  LogColumns columns;
+  columns.torque_follows = true;
+  columns.time.name = "t";
+  columns.angle[0].name = is_old ? "qpos0" : "q1";
+  columns.angle[1].name = is_old ? "qpos1" : "q2";
+  columns.velocity[0].name = is_old ? "qvel0" : "w1";
+  columns.velocity[1].name = is_old ? "qvel1" : "w2";
+  const bool both = have({"torque1", "torque2"});
+  columns.commanded[0].name = both ? "torque1" : "torque";
+  if (both) columns.commanded[1].name = "torque2";
+  return columns;
+}
+
+/// The columns of a file with known names. Throws BadInput.
+LogColumns KnownColumns(const Names& names, const std::string& where) {
+  std::optional<LogColumns> columns = RealAiGymColumns(names);
+  if (!columns) columns = RolloutColumns(names);
+  if (!columns) {
+    throw BadInput(Concat(where,
+                          ": expected the columns time and pos_meas1 or pos1, or --columns FILE "
+                          "that names yours, got \"",
+                          Shortened(Join(names, ","), 200), "\""));
+  }
+  ForEachColumn(*columns, [](const auto&, LogColumn& column, const char* quantity) {
+    if (!column.name.empty()) column.unit = SiUnit(quantity).name;
+  });
+  return *columns;
 }
 
 /// Turns numbers of a column into SI units. Throws BadInput for a huge one.
@@ -291,6 +278,23 @@ void Unwrap(std::vector<Joints>& angle, int joint, double wrap) {
   }
 }
 
+/// Undoes the wrapping of a clock (s) that begins again after `wrap` (s).
+void UnwrapClock(std::vector<double>& time, double wrap) {
+  if (wrap == 0) return;
+  double turns = 0, before = time.front();
+  for (double& x : time) {
+    if (x < before - wrap / 2) ++turns;
+    before = x;
+    x += turns * wrap;
+  }
+}
+
+/// Turns torques that act from a row's angles on into the command that is sent at their reading:
+/// that of the row before.
+void ToCyclesEnds(std::vector<Joints>& commanded) {
+  std::rotate(commanded.begin(), commanded.begin() + 1, commanded.end());
+}
+
 /// Makes the angles of a piece continuous, and those of joint 2 relative to link 1.
 void FinishAngles(const LogColumns& columns, MachineLog& piece) {
   const auto& [first, second] = columns.angle;
@@ -324,6 +328,26 @@ void StartClock(MachineLog& piece) {
   const double rounding = 4 * (std::nextafter(largest, 2 * kMostMagnitude) - largest);
   const double ticks = std::pow(10, std::min(15.0, -std::ceil(std::log10(rounding))));
   for (double& time : piece.time) time = std::round((time - begin) * ticks) / ticks;
+}
+
+/// The unit of each column: `t [ms]; q1, q2 [rad]; u [Nm] × 0.05`.
+std::string UnitsText(const LogColumns& columns) {
+  std::vector<std::string> texts, group;
+  std::string unit;  // of the group
+  const auto finish = [&] {
+    if (!group.empty()) texts.push_back(Concat(Join(group, ", "), unit));
+    group.clear();
+  };
+  ForEachColumn(columns, [&](const auto&, const LogColumn& column, const char*) {
+    if (column.name.empty()) return;
+    std::string own = Concat(" [", column.unit, "]");
+    if (column.factor != 1) own += Concat(" × ", FormatNumber(column.factor));
+    if (own != unit) finish();
+    unit = own;
+    group.push_back(column.name);
+  });
+  finish();
+  return Join(texts, "; ");
 }
 
 void CheckRows(const MachineLog& log, const std::string& where) {
@@ -367,7 +391,7 @@ LogColumns ParseLogColumns(std::string_view text, const std::string& where) {
 
 std::vector<MachineLog> ParseLog(std::string_view csv, const LogColumns* columns,
                                  const std::string& where) {
-  const LogColumns own = columns ? *columns : RealAiGymColumns(CsvNames(csv, where), where);
+  const LogColumns own = columns ? *columns : KnownColumns(CsvNames(csv, where), where);
   WholeLog whole = ReadRows(csv, own, where);
   const int rows = whole.log.rows();
   std::vector<MachineLog> pieces;
@@ -387,9 +411,12 @@ std::vector<MachineLog> ParseLog(std::string_view csv, const LogColumns* columns
     begin = end;
   }
   for (MachineLog& piece : pieces) {
+    UnwrapClock(piece.time, own.time.wrap * std::abs(own.time.scale));
     CheckRows(piece, where);
     StartClock(piece);
     FinishAngles(own, piece);
+    if (own.torque_follows) ToCyclesEnds(piece.commanded);
+    piece.units = UnitsText(own);
   }
   return pieces;
 }

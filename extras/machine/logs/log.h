@@ -29,6 +29,7 @@ struct MachineLog {
   std::vector<Joints> commanded;  // sent to the motors in this cycle, before clipping, N·m
   std::vector<Joints> measured;   // from the motors' currents, N·m
   std::vector<Joints> push;       // added to the commanded torque after clipping, N·m
+  std::string units = {};         // that were read, by column: `t [ms]; q1, q2 [deg]`
 
   int rows() const { return static_cast<int>(time.size()); }
 };
@@ -44,9 +45,11 @@ bool HasCommands(std::span<const MachineLog> logs);
 /// A column of a file and its unit.
 struct LogColumn {
   std::string name;    // empty: the file lacks the quantity
-  double scale = 1;    // SI units in the file's unit
-  double wrap = 0;     // an angle starts again after this much, in the file's unit; 0: it does not
+  double scale = 1;    // SI units in the file's unit, times the factor
+  double wrap = 0;     // it starts again after this much, in the file's unit; 0: it does not
   double hanging = 0;  // the angle that hangs, in the file's unit
+  double factor = 1;   // that the user states
+  std::string unit;    // the file's
 };
 
 /// The columns of a log file, by quantity and joint.
@@ -55,20 +58,22 @@ struct LogColumns {
   std::array<LogColumn, 2> angle, velocity, commanded, measured, push;
   std::string piece;      // column whose value changes where the next piece begins; may be empty
   bool absolute = false;  // whether angle and velocity of joint 2 are against the vertical
+  // Whether the torque of a row acts from its own angles on, as in a rollout of `simulate`.
+  bool torque_follows = false;
 };
 
 /// Parses a TOML text that names the columns of a file. Throws BadInput with `where` and the line.
 LogColumns ParseLogColumns(std::string_view toml, const std::string& where);
 
-/// Parses a CSV text. Without `columns`, the names must be those of RealAIGym's logs. Returns the
-/// pieces, each with at least two rows; most files have a single piece. The clock of each piece
-/// begins at 0. Throws BadInput with
-/// `where` and the line or row.
+/// Parses a CSV text. Without `columns`, the names must be those of RealAIGym's logs, or of a
+/// rollout that `simulate` or the page wrote. Returns the pieces, each with at least two rows; most
+/// files have a single piece. The clock of each piece begins at 0. Throws BadInput with `where` and
+/// the line or row.
 std::vector<MachineLog> ParseLog(std::string_view csv, const LogColumns* columns,
                                  const std::string& where);
 
 /// Reads a CSV file, which may be compressed by gzip. `columns` is a TOML file that names its
-/// columns, or empty for the names of RealAIGym. Throws BadInput.
+/// columns, or empty for names that ParseLog knows. Throws BadInput.
 std::vector<MachineLog> ReadLog(const std::filesystem::path& file,
                                 const std::filesystem::path& columns = {});
 

@@ -194,6 +194,150 @@ TEST(MachineLog, OwnColumnsAndUnits) {
   EXPECT_EQ(log.measured[1], (Joints{-2, 0}));
 }
 
+/// A column's name in a logger's header, and its scale; 0: refused.
+struct Header {
+  const char* name;
+  double scale;
+};
+
+/// The scale that a column has without a unit or a factor; 0 if it is refused.
+double ScaleIn(const std::string& key, const std::string& name) {
+  std::string toml;
+  for (const char* other : {"time", "angle1", "angle2", "velocity1", "commanded1"}) {
+    toml += Concat(other, " = \"", other == key ? name : Concat("other ", toml.size()), "\"\n");
+  }
+  try {
+    const LogColumns columns = ParseLogColumns(toml, "columns.toml");
+    if (key == "time") return columns.time.scale;
+    if (key == "angle1") return columns.angle[0].scale;
+    return key == "velocity1" ? columns.velocity[0].scale : columns.commanded[0].scale;
+  } catch (const Error& error) {
+    const std::string text = error.what();
+    EXPECT_NE(text.find("expected one of the units "), std::string::npos) << text;
+    EXPECT_NE(text.find("got the unit "), std::string::npos) << text;
+    return 0;
+  }
+}
+
+void ExpectScales(const std::string& key, const std::vector<Header>& headers) {
+  for (const auto& [name, scale] : headers)
+    EXPECT_EQ(ScaleIn(key, name), scale) << key << ": " << name;
+}
+
+TEST(MachineLog, UnitsInTheNamesOfLoggersAreReadOrRefused) {
+  constexpr double kDegree = std::numbers::pi / 180;
+  ExpectScales("time", {{"t", 1},          {"time", 1},           {"Time (s)", 1},
+                        {"timestamp", 1},  {"__time", 1},         {"header.stamp.secs", 1},
+                        {"time_sec", 1},   {"elapsedSeconds", 1}, {"Time, s", 1},
+                        {"time_ms", 1e-3}, {"t [us]", 1e-6},      {"%time", 1},
+                        {"timeMs", 0},     {"millis", 0},         {"micros()", 0},
+                        {"t/ms", 0},       {"time_usec", 0},      {"ms_since_boot", 0},
+                        {"us", 0},         {"stamp.nsecs", 0},    {"t_µs", 0},
+                        {"t_min", 0},      {"sample", 0},         {"tick", 0}});
+  ExpectScales("angle1", {{"q1", 1},
+                          {"theta_1", 1},
+                          {"pos_meas1", 1},
+                          {"/joint_states/position[0]", 1},
+                          {"axis0.encoder.pos_estimate", 1},
+                          {"theta_s", 1},
+                          {"q_A", 1},
+                          {"encoder", 1},
+                          {"angle_rad", 1},
+                          {"theta1Radians", 1},
+                          {"q1_deg", kDegree},
+                          {"Angle 1 (deg)", kDegree},
+                          {"q1_degs", 0},
+                          {"angle_degrees", 0},
+                          {"angleDeg", 0},
+                          {"theta1deg", 0},
+                          {"q1/deg", 0},
+                          {"q1 °", 0},
+                          {"Angle (deg) 1", 0},
+                          {"q_deg_1", 0},
+                          {"phi_deg_filtered", 0},
+                          {"enc1_counts", 0},
+                          {"encCounts", 0},
+                          {"ticks1", 0},
+                          {"pos_mrad", 0},
+                          {"pos_rev", 0},
+                          {"pot_V", 0}});
+  ExpectScales("velocity1", {{"w1", 1},
+                             {"dq1", 1},
+                             {"theta1_dot", 1},
+                             {"joint_vel[0]", 1},
+                             {"vel_estimate", 1},
+                             {"w1_rad/s", 1},
+                             {"w1_rad_s", 1},
+                             {"omega_rad_per_s", 1},
+                             {"w_rads", 1},
+                             {"w1_deg/s", kDegree},
+                             {"speed [rpm]", 2 * std::numbers::pi / 60},
+                             {"w1_degs", 0},
+                             {"w1_dps", 0},
+                             {"speedRPM", 0},
+                             {"RPM1", 0},
+                             {"w1_deg_per_s", 0},
+                             {"gyro_°/s", 0},
+                             {"w/(deg/s)", kDegree},
+                             {"w_rev/s", 0},
+                             {"tach_V", 0}});
+  ExpectScales(
+      "commanded1",
+      {{"u", 1},          {"tau_con1", 1},   {"effort[0]", 1},   {"controller.input_torque", 1},
+       {"iq", 1},         {"torque_Nm", 1},  {"u_N.m", 1},       {"torque (N·m)", 1},
+       {"u_mNm", 1e-3},   {"u/mNm", 0},      {"i_A", 0},         {"current_mA", 0},
+       {"motor_amps", 0}, {"u_oz-in", 0},    {"torque_ozin", 0}, {"u lb.ft", 0},
+       {"u_kg-cm", 0},    {"u_N-mm", 0},     {"Vm_V", 0},        {"pwm", 0},
+       {"duty_%", 0},     {"cmd_percent", 0}});
+}
+
+TEST(MachineLog, AUnitOrAFactorSettlesTheScale) {
+  const auto scale = [](const char* column) {
+    const std::string toml = Concat("time = \"t\"\nangle1 = \"a\"\nangle2 = \"b\"\n", column);
+    const LogColumns columns = ParseLogColumns(toml, "columns.toml");
+    return columns.commanded[0].scale;
+  };
+  EXPECT_EQ(scale(R"(commanded1 = {column = "u/mNm", unit = "mNm"})"), 1e-3);
+  EXPECT_EQ(scale(R"(commanded1 = {column = "i_A", factor = 0.05})"), 0.05);
+  EXPECT_EQ(scale(R"(commanded1 = {column = "u_oz-in", factor = -0.00706})"), -0.00706);
+  EXPECT_EQ(ComplaintAboutColumns("time = \"t\"\nangle1 = \"a\"\nangle2 = \"b\"\n"
+                                  "commanded1 = {column = \"u_oz-in\", factor = -1}\n"),
+            "columns.toml:4: commanded1: expected one of the units Nm, N·m, mNm, mN·m, as in "
+            "{column = \"u_oz-in\", unit = \"N·m\"}, or a factor, got the unit \"oz-in\"");
+}
+
+TEST(MachineLog, AClockOf32BitsGoesOnWhereItBeginsAgain) {
+  const LogColumns columns = ParseLogColumns(
+      "time = {column = \"t\", unit = \"us\", wrap = 4294967296}\nangle1 = \"a\"\n"
+      "angle2 = \"b\"\n",
+      "columns.toml");
+  const auto log = [&](const char* csv) { return ParseLog(csv, &columns, "log.csv").front(); };
+  const MachineLog wrapped =
+      log("t,a,b\n4294965296,0,0\n4294967294,0,0\n1998,0,0\n4000,0,0\n4294967000,0,0\n5,0,0\n");
+  const std::vector<double> expected{0, 0.001998, 0.003998, 0.006, 4294.969000, 4294.969301};
+  ASSERT_EQ(wrapped.rows(), 6);
+  for (size_t k = 0; k < 6; ++k) EXPECT_NEAR(wrapped.time[k], expected[k], 1e-9) << k;
+  // A clock that goes back a little is an error as before.
+  EXPECT_NE(Complaint([&] { log("t,a,b\n2000,0,0\n1000,0,0\n"); }).find("time: expected"),
+            std::string::npos);
+}
+
+TEST(MachineLog, ReadsRolloutsOfThisAndOfOlderVersions) {
+  const MachineLog now = Parsed(
+      "t,q1,q2,w1,w2,torque,energy,torque1,torque2\n0,1,2,3,4,9,0,0,9\n"
+      "0.02,1.5,2.5,3.5,4.5,8,0,0,8\n0.04,1.6,2.6,3.6,4.6,7,0,0,7\n");
+  EXPECT_EQ(now.angle.front(), (Joints{1, 2}));
+  EXPECT_EQ(now.velocity.back(), (Joints{3.6, 4.6}));
+  // A log's command is sent at the reading of the next row; a rollout's torque begins at its own.
+  EXPECT_EQ(now.commanded[0], (Joints{0, 8}));
+  EXPECT_EQ(now.commanded[1], (Joints{0, 7}));
+  EXPECT_EQ(now.units, "t [s]; q1, q2 [rad]; w1, w2 [rad/s]; torque1, torque2 [N·m]");
+  const MachineLog old =
+      Parsed("t,qpos0,qpos1,qvel0,qvel1,torque\n0,1,2,3,4,9\n0.02,1.5,2.5,3.5,4.5,8\n");
+  EXPECT_EQ(old.angle.back(), (Joints{1.5, 2.5}));
+  EXPECT_EQ(old.commanded[0], (Joints{8, 0}));
+}
+
 TEST(MachineLog, AbsoluteAnglesThatHangAtPi) {
   const LogColumns columns = ParseLogColumns(R"(
     time = "t"
