@@ -137,7 +137,7 @@ class Library(unittest.TestCase):
     def test_control_loop(self):
         program = self.build("control_loop")
         rows = list(csv.DictReader(run(UPSWING, "simulate", POLICY, "--seconds", 5).splitlines()))
-        states = "".join(f"{row['qpos0']} {row['qpos1']} {row['qvel0']} {row['qvel1']}\n"
+        states = "".join(f"{row['q1']} {row['q2']} {row['w1']} {row['w2']}\n"
                          for row in rows)
         torques = run(program, POLICY, input=states).splitlines()
         self.assertEqual(torques, [row["torque"] for row in rows])

@@ -119,7 +119,7 @@ class Environments(unittest.TestCase):
             env = gym.make(ID, physics=physics, mass2=1.2, delay=0.04).unwrapped
             env.reset(seed=0, options={"state": start})
             for k, torque in enumerate(schedule):
-                wanted = [float(rows[k][name]) for name in ("qpos0", "qpos1", "qvel0", "qvel1")]
+                wanted = [float(rows[k][name]) for name in ("q1", "q2", "w1", "w2")]
                 np.testing.assert_array_equal(env.state, wanted)
                 _, _, _, _, info = env.step(np.array([torque]))
                 self.assertEqual(info["torque"], float(rows[k]["torque"]))

@@ -46,7 +46,7 @@ class Policies(unittest.TestCase):
                 obs, _ = env.reset(seed=0, options={"state": start})
                 for row in rows[:-1]:
                     np.testing.assert_array_equal(
-                        env.state, [row[key] for key in ("qpos0", "qpos1", "qvel0", "qvel1")])
+                        env.state, [row[key] for key in ("q1", "q2", "w1", "w2")])
                     obs, _, _, _, info = env.step(policy.act(obs))
                     self.assertEqual(info["torque"], row["torque"])
 

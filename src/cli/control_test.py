@@ -20,7 +20,7 @@ ALL = "energy, hybrid, lqr, mpc, pfl, tvlqr"
 
 
 def deviation(row):
-    return [row["qpos0"] - math.pi, row["qpos1"], row["qvel0"], row["qvel1"]]
+    return [row["q1"] - math.pi, row["q2"], row["w1"], row["w2"]]
 
 
 class Lqr(ProgramTest):

@@ -123,7 +123,7 @@ class Task(ProgramTest):
                 for row in csv.DictReader(io.StringIO(text))]
         for row, x in zip(rows, rows[1:]):
             # A row's torque leads to the next row's state, and the reward's terms use both.
-            terms = reward_terms(x["qpos0"], x["qpos1"], x["qvel0"], x["qvel1"], row["torque"])
+            terms = reward_terms(x["q1"], x["q2"], x["w1"], x["w2"], row["torque"])
             self.assertEqual(names, list(terms))
             for name in names:
                 column = name if name.endswith("penalty") else f"{name}_reward"

@@ -350,8 +350,8 @@ class EvalTest(ProgramTest):
     def assert_same_episode(self, judged, rows):
         number = {name: float(text) for name, text in judged.items() if text}
         self.assertEqual(len(rows), 1001)
-        for name, column in zip(("q1", "q2", "w1", "w2"), ("qpos0", "qpos1", "qvel0", "qvel1")):
-            self.assertEqual(rows[0][column], number[name])
+        for name in ("q1", "q2", "w1", "w2"):
+            self.assertEqual(rows[0][name], number[name])
         # The rows of the first 10 s add up to the return, to the last digit.
         self.assertEqual(added(rows[:500], "reward"), number["return"])
         for name, column in zip(REWARD_TERMS, ("energy_reward", "height_reward", "balance_reward",
@@ -368,8 +368,8 @@ class EvalTest(ProgramTest):
         self.assertEqual(number["peak_torque"], max(map(abs, torques)))
         variation = sum(abs(b - a) for a, b in zip(torques, torques[1:]))
         self.assertAlmostEqual(number["torque_variation"], variation / 20, delta=1e-9)
-        for link, angle in (("tilt1_degrees", lambda row: row["qpos0"]),
-                            ("tilt2_degrees", lambda row: row["qpos0"] + row["qpos1"])):
+        for link, angle in (("tilt1_degrees", lambda row: row["q1"]),
+                            ("tilt2_degrees", lambda row: row["q1"] + row["q2"])):
             lean = [math.remainder(angle(row) - math.pi, 2 * math.pi) for row in rows[950:1000]]
             self.assertAlmostEqual(number[link], math.degrees(sum(lean) / 50), delta=1e-9)
 

@@ -164,7 +164,7 @@ class LinkTest(RunTest):
         (self.folder / "out.csv").symlink_to("precious/out.csv")
         self.succeed("simulate", "--seconds", "1", "--csv", "out.csv")
         self.assertTrue((self.folder / "out.csv").is_symlink())
-        self.assertIn("qpos0", (self.folder / "precious/out.csv").read_text(encoding="utf-8"))
+        self.assertIn("q1", (self.folder / "precious/out.csv").read_text(encoding="utf-8"))
 
 
 class CounterTest(RunTest):

@@ -89,7 +89,7 @@ class PlotTest(ProgramTest):
         # The longest stroke of joint 1 follows the numbers of `simulate`: pixels are linear in them.
         rows = list(csv.DictReader(self.succeed("simulate", self.policy, "--seconds", 2, "--start",
                                                 "3,0.5,-9,4").splitlines()))
-        velocities = [float(row["qvel0"]) for row in rows]
+        velocities = [float(row["w1"]) for row in rows]
         path = next(curve for curve in self.curves("out/phase.svg") if len(curve) > 20)
         low, high = path[1][1] - path[0][1], path[15][1] - path[0][1]
         self.assertAlmostEqual(low / high, (velocities[1] - velocities[0]) /

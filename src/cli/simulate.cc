@@ -12,6 +12,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "cli/commands.h"
+#include "cli/say.h"
 #include "judge/rollout.h"
 #include "os/streams.h"
 #include "pendulum/control_period.h"
@@ -59,10 +60,18 @@ std::vector<double> ReadTorqueFile(const std::string& path, double step) {
       }
       throw BadInput(Concat(where, ": row ", k + 1, ": ", Printable(time.name), ": expected ",
                             FormatNumber(expected), " s, because each torque acts for ",
-                            FormatNumber(step), " s, got ", FormatNumber(time.values[k])));
+                            FormatNumber(step), " s (--control-period), got ",
+                            FormatNumber(time.values[k])));
     }
   }
   return columns.front().values;
+}
+
+/// For how long each row of the torque file acts.
+std::string PeriodText(const SimulateArguments& a, size_t rows, double period) {
+  const char* hint = a.trial.control_period > 0 ? "" : "; --control-period sets another";
+  return fmt::format("{}: {} of {:.6g} s each, the control period{}", InputName(a.torque),
+                     Counted(rows, "torque"), period, hint);
 }
 
 int RunSimulate(const SimulateArguments& a) {
@@ -73,7 +82,13 @@ int RunSimulate(const SimulateArguments& a) {
   if (!a.policy.empty()) loaded.emplace(GetPolicyIn(a.trial, a.policy));
   RolloutConfig config = TrialEpisode(a.trial, loaded ? &*loaded : nullptr);
   const double period = config.env.control_period;
-  if (!a.torque.empty()) config.schedule = ReadTorqueFile(a.torque, period);
+  if (!a.torque.empty()) {
+    config.schedule = ReadTorqueFile(a.torque, period);
+    // The period of a plant of another size, which nothing else shows.
+    if (a.trial.control_period == 0 && period != kControlPeriod) {
+      SayError(PeriodText(a, config.schedule.size(), period));
+    }
+  }
 
   // The requested number of steps, or one step for each row of the schedule.
   const double scheduled = static_cast<double>(config.schedule.size()) * period;
@@ -91,6 +106,9 @@ int RunSimulate(const SimulateArguments& a) {
   WriteOutput(a.csv, RolloutCsv(rollout));
   if (IsStandardStream(a.csv)) return 0;
   fmt::print("{}: {} rows\n", Printable(a.csv), rollout.rows.size());
+  if (!a.torque.empty()) {
+    fmt::print("  schedule   {}\n", PeriodText(a, config.schedule.size(), period));
+  }
   fmt::print("  plant      {}\n", EpisodeText(rollout));
   fmt::print("  torque     {}\n", TorqueText(rollout));
   fmt::print("  reward     {}\n", RewardText(rollout));
@@ -118,11 +136,13 @@ void AddSimulate(CommandLine& line) {
   AddTrialOptions(line, a.trial, "noise, random plants and the start of --episode");
   line.Text("--csv", a.csv, "FILE", "CSV file to write; -: standard output (default -)");
   line.Notes(
-      "Columns: t [s], qpos0, qpos1 [rad], qvel0, qvel1 [rad/s], torque [N·m], energy [J],\n"
-      "height of the tip [m], inverted (0 or 1), the reward and its five terms. The torque\n"
+      "Columns: t [s], q1, q2 [rad], w1, w2 [rad/s], torque [N·m], energy [J],\n"
+      "height of the tip [m], inverted (0 or 1), the reward and its five terms, and the torque at\n"
+      "each joint, torque1 and torque2 [N·m]. The torque\n"
       "is what the motor applies over the next control period, after its delay and within its\n"
       "limit. The reward is that of this period: of this torque and the next row's state, 0\n"
-      "in the last row. The rewards of the first 10 s add up to the return of `eval`.\n");
+      "in the last row. The rewards of the first 10 s add up to the return of `eval`.\n\n"
+      "`machine check` and `machine identify` read this file as a log.\n");
   line.Examples(
       "  ./upswing simulate runs/d3qn-seed1 --csv rollout.csv\n"
       "  ./upswing simulate --torque torques.csv --start 0.1,-0.05,0,0 --seconds 10\n"

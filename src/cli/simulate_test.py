@@ -11,9 +11,10 @@ from pathlib import Path
 from testing import ROOT, ProgramTest, read_tensors, small, write_tensors
 
 REFERENCE = ROOT / "src/mujoco/testdata/mujoco_trajectory.csv"
-COLUMNS = ["t", "qpos0", "qpos1", "qvel0", "qvel1", "torque", "energy", "height", "inverted",
+COLUMNS = ["t", "q1", "q2", "w1", "w2", "torque", "energy", "height", "inverted",
            "reward", "energy_reward", "height_reward", "balance_reward", "velocity_penalty",
-           "torque_penalty"]
+           "torque_penalty", "torque1", "torque2"]
+REWARDS = COLUMNS[9:15]
 STATE = COLUMNS[1:5]
 CAPSULE_INERTIA = 0.025995421686746994  # kg·m², across a link of 1 kg
 ARMATURE = 0.01  # kg·m²
@@ -43,8 +44,8 @@ def energy(plant, row):
 
 
 def height(plant, row):
-    return (-plant["length1"] * math.cos(row["qpos0"])
-            - plant["length2"] * math.cos(row["qpos0"] + row["qpos1"]))
+    return (-plant["length1"] * math.cos(row["q1"])
+            - plant["length2"] * math.cos(row["q1"] + row["q2"]))
 
 
 def tilt(angle):
@@ -60,8 +61,8 @@ def expected_terms(plant, row, torque=0):
     e = energy(plant, row)
     h = height(plant, row)
     limit = math.radians(30)
-    inverted = tilt(row["qpos0"]) <= limit and tilt(row["qpos0"] + row["qpos1"]) <= limit
-    speeds = row["qvel0"]**2 + row["qvel1"]**2
+    inverted = tilt(row["q1"]) <= limit and tilt(row["q1"] + row["q2"]) <= limit
+    speeds = row["w1"]**2 + row["w2"]**2
     return {
         "energy": e,
         "height": h,
@@ -87,17 +88,18 @@ class SimulateTest(ProgramTest):
         for row, after in zip(rows, rows[1:]):
             expected = expected_terms(plant, row)
             rewards = expected_terms(plant, after, row["torque"])
-            for name, value in (expected | {name: rewards[name] for name in COLUMNS[10:]}).items():
+            for name, value in (expected | {name: rewards[name] for name in REWARDS[1:]}).items():
                 self.assertAlmostEqual(row[name], value, delta=1e-12 * max(1, abs(value)), msg=name)
-            self.assertAlmostEqual(row["reward"], sum(row[name] for name in COLUMNS[10:]),
+            self.assertAlmostEqual(row["reward"], sum(row[name] for name in REWARDS[1:]),
                                    delta=1e-12)
-        self.assertEqual({rows[-1][name] for name in COLUMNS[9:]}, {0})
+        self.assertEqual({rows[-1][name] for name in REWARDS}, {0})
 
     # ---- Physics and reward.
 
     def test_reference_trajectory_is_reproduced(self):
         rows = self.reference_rollout("--seconds", 10)
-        reference = [numbers(row) for row in parse(REFERENCE.read_text(encoding="utf-8"))]
+        text = REFERENCE.read_text(encoding="utf-8").replace("qpos0,qpos1,qvel0,qvel1", ",".join(STATE))
+        reference = [numbers(row) for row in parse(text)]
         self.assertEqual((len(rows), len(reference)), (501, 501))
         for row, expected in zip(rows, reference):
             self.assertEqual((row["t"], row["torque"]), (expected["t"], expected["torque"]))
@@ -136,7 +138,7 @@ class SimulateTest(ProgramTest):
     def test_energy_of_the_capsules_is_conserved_without_damping(self):
         # The column `energy` is that of thin rods; MuJoCo's links are capsules with armature.
         def capsule_energy(row):
-            w1, w2 = row["qvel0"], row["qvel1"]
+            w1, w2 = row["w1"], row["w2"]
             more = CAPSULE_INERTIA - 1 * 0.5**2 / 12
             return energy(STANDARD, row) + 0.5 * (more * (w1**2 + (w1 + w2)**2)
                                                   + ARMATURE * (w1**2 + w2**2))
@@ -155,7 +157,7 @@ class SimulateTest(ProgramTest):
                        "damping2=0.3", "gravity=9", "torque_limit=4"):
             with self.subTest(change=change):
                 changed = self.reference_rollout("--set", change)[-1]
-                self.assertGreater(abs(changed["qpos0"] - usual["qpos0"]), 1e-6)
+                self.assertGreater(abs(changed["q1"] - usual["q1"]), 1e-6)
 
     def test_set_of_both_is_set_of_each(self):
         for name in ("mass", "length", "damping"):
@@ -242,6 +244,31 @@ class SimulateTest(ProgramTest):
                     "bad.csv: row 1: t: expected")
         self.refuse(["simulate", "--torque", self.write("bad.csv", "torque,torque\n1,2\n")],
                     'bad.csv:1: expected one column "torque", got 2')
+
+    def test_the_period_of_a_torque_file_is_printed(self):
+        self.write("n.csv", "torque\n1\n2\n3\n")
+        self.write("small.toml", "[plant]\nmass = 0.01\nlength = 0.05\narmature = 1e-6\n"
+                                 "damping = 6e-5\ntorque_limit = 0.005\n")
+        run = ["simulate", "--torque", "n.csv", "--csv", "out.csv"]
+        usual = self.run_here(*run)
+        self.assertIn("n.csv: 3 torques of 0.02 s each, the control period;", usual.stdout)
+        self.assertEqual(usual.stderr, "")
+        small = self.run_here(*run, "--plant", "small.toml")
+        step = float(parse((self.folder / "out.csv").read_text(encoding="utf-8"))[1]["t"])
+        self.assertIn(f"n.csv: 3 torques of {step:.6g} s each, the control period; --control-period",
+                      small.stderr)
+        given = self.run_here(*run, "--plant", "small.toml", "--control-period", 0.005)
+        self.assertIn("n.csv: 3 torques of 0.005 s each", given.stdout)
+        self.assertEqual(given.stderr, "")
+
+    def test_rewards_add_up_to_the_printed_sums(self):
+        for flags in ([], ["--control-period", 0.007], ["--torque-limit", 3]):
+            out = self.succeed("simulate", "energy", *flags, "--seconds", 14, "--csv", "out.csv")
+            rows = [numbers(row) for row in parse((self.folder / "out.csv").read_text(encoding="utf-8"))]
+            period = rows[1]["t"]
+            first = sum(row["reward"] for row in rows[:round(10 / period)])
+            self.assertIn(f"{sum(row['reward'] for row in rows):.6g} in 14", out)
+            self.assertIn(f"{first:.6g} in the first 10 s", out)
 
     def test_seconds_may_be_shorter_than_the_schedule(self):
         short = self.reference_rollout("--seconds", 1)

@@ -65,7 +65,7 @@ class States(ViewTest):
                           ["lqr", "--start", "3.1,0,0,0", "--made-for", "mass2=1.1"]):
             with self.subTest(arguments):
                 rows = csv.DictReader(self.succeed("simulate", *arguments, "--seconds", 1.5).splitlines())
-                expected = [[row[name] for name in ("qpos0", "qpos1", "qvel0", "qvel1", "torque")]
+                expected = [[row[name] for name in ("q1", "q2", "w1", "w2", "torque")]
                             for row in rows]
                 seen = self.answers(times, *arguments)
                 self.assertEqual([row[0] for row in seen], times)

@@ -155,16 +155,19 @@ std::string RolloutCsv(const Rollout& rollout) {
   for (const RolloutRow& row : rollout.rows) {
     const PendulumState& s = row.state;
     csv.Add("t", row.t);
-    csv.Add("qpos0", s.q1);
-    csv.Add("qpos1", s.q2);
-    csv.Add("qvel0", s.w1);
-    csv.Add("qvel1", s.w2);
+    csv.Add("q1", s.q1);
+    csv.Add("q2", s.q2);
+    csv.Add("w1", s.w1);
+    csv.Add("w2", s.w2);
     csv.Add("torque", row.torque);
     csv.Add("energy", Energy(rollout.plant, s));
     csv.Add("height", TipHeight(rollout.plant, s));
     csv.Add("inverted", row.inverted ? 1 : 0);
     csv.Add("reward", row.reward);
     for (size_t k = 0; k < kRewardTerms; ++k) csv.Add(kTerms[k], row.terms[k] + 0.0);  // no -0
+    const bool at_first = rollout.plant.actuated_joint == 1;
+    csv.Add("torque1", at_first ? row.torque : 0);
+    csv.Add("torque2", at_first ? 0 : row.torque);
     csv.EndRow();
   }
   return csv.text();

@@ -96,7 +96,7 @@ std::string TorqueText(const Rollout& rollout);
 std::string RewardText(const Rollout& rollout);
 
 /// A rollout as CSV, one row for each state: t, state, torque, energy, height, whether it is
-/// inverted, reward and its terms.
+/// inverted, reward and its terms, torque at each joint.
 std::string RolloutCsv(const Rollout& rollout);
 
 /// The judgement of `eval` on the environment's own episode, such as `success, upright from 2.34 s

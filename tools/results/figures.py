@@ -628,7 +628,7 @@ def measure(program):
         with open(CSV / name, "w", newline="", encoding="utf-8") as file:
             csv.writer(file, lineterminator="\n").writerows([header, *lines])
 
-    names = {"t": "t", "qpos0": "q1", "qpos1": "q2", "torque": "torque", "inverted": "inverted", "reward": "reward",
+    names = {"t": "t", "q1": "q1", "q2": "q2", "torque": "torque", "inverted": "inverted", "reward": "reward",
              "energy_reward": "energy", "height_reward": "height", "balance_reward": "balance",
              "velocity_penalty": "velocity_penalty", "torque_penalty": "torque_penalty"}
     rows = csv.DictReader(run("simulate", agents / "d3qn.safetensors", "--seconds", 6, "--csv", "-").splitlines())
@@ -639,7 +639,7 @@ def measure(program):
         text = run("simulate", agents / "any-pose.safetensors", "--start", ",".join(map(str, (*POSES[start], 0, 0))),
                    "--goal", goal, "--seconds", 6, "--csv", "-")
         for row in csv.DictReader(text.splitlines()):
-            lines.append([start, goal, *(f"{float(row[name]):.5g}" for name in ("t", "qpos0", "qpos1", "inverted"))])
+            lines.append([start, goal, *(f"{float(row[name]):.5g}" for name in ("t", "q1", "q2", "inverted"))])
     write("poses.csv", ["from", "to", "t", "q1", "q2", "inverted"], lines)
 
     with tempfile.TemporaryDirectory() as folder:

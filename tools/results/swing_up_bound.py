@@ -195,7 +195,7 @@ def motion(policy, episode):
                            check=True, capture_output=True, text=True, cwd=ROOT).stdout
     rows = list(csv.DictReader(io.StringIO(table)))
     columns = [[float(row[name]) for row in rows]
-               for name in ("qpos0", "qpos1", "qvel0", "qvel1", "torque", "reward")]
+               for name in ("q1", "q2", "w1", "w2", "torque", "reward")]
     return np.array(columns[:4]).T, np.array(columns[4][:-1]), np.array(columns[5][:-1])
 
 

@@ -31,7 +31,7 @@ test("writes CSV with time from the history's start", () => {
   history.add(moment(3));
   history.add({ ...moment(3.02), state: { q1: 0.1, q2: -1 / 3, w1: 0, w2: 2 } });
   expect(history.csv()).toBe(
-    't,qpos0,qpos1,qvel0,qvel1,torque\n0.00,0,0,0,0,1.25\n0.02,0.1,-0.3333333333333333,0,2,1.25\n',
+    't,q1,q2,w1,w2,torque\n0.00,0,0,0,0,1.25\n0.02,0.1,-0.3333333333333333,0,2,1.25\n',
   );
 });
 

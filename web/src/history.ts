@@ -59,7 +59,7 @@ export class History {
         ...[q1, q2, velocity * w1, velocity * w2, newtonMetres * torque],
       ].join(),
     );
-    return ['t,qpos0,qpos1,qvel0,qvel1,torque', ...rows].join('\n') + '\n';
+    return ['t,q1,q2,w1,w2,torque', ...rows].join('\n') + '\n';
   }
 }
 

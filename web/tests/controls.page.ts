@@ -179,7 +179,7 @@ test('the trajectory can be saved', async ({ stage: page }) => {
   const download = page.waitForEvent('download');
   await page.getByRole('button', { name: 'Save CSV' }).click();
   const csv = readFileSync(await (await download).path(), 'utf8').split('\n');
-  expect(csv[0]).toBe('t,qpos0,qpos1,qvel0,qvel1,torque');
+  expect(csv[0]).toBe('t,q1,q2,w1,w2,torque');
   expect(csv.length).toBeGreaterThan(5);
 });
 
