@@ -6,6 +6,7 @@ import type { State } from './pendulum';
 
 /// Formulas of the core, compared with the C++ program.
 
+const COLUMNS = 15; // of a rollout, without the torque of each joint
 const PLANT = { ...pendulum.NOMINAL, mass1: 1.2, length2: 0.4, gravity: 5, torque_limit: 3 };
 
 /// Rows of a policy's rollout on PLANT: t, state, torque, energy, height, inverted, reward, its terms.
@@ -17,7 +18,7 @@ function rows(policy = 'pfl', ...goal: string[]): number[][] {
     .trim()
     .split('\n')
     .slice(1)
-    .map((row) => row.split(',').map(Number));
+    .map((row) => row.split(',').slice(0, COLUMNS).map(Number));
 }
 
 /// Equal within the rounding of sines and cosines.

@@ -9,7 +9,7 @@ import { Fields } from './fields';
 ///
 /// Units are those of the pendulum of size 1 (size.ts), where they are SI units.
 
-export const CONTROL_PERIOD = 0.02; // s between two actions by default; see Policy.period
+export { CONTROL_PERIOD } from './period';
 export const CAPSULE_RADIUS = 0.04; // of both links, m
 export const ARMATURE = 0.01; // of both joints, kg·m²
 

@@ -38,9 +38,6 @@ export interface UpdateExample {
   capacity: number;
 }
 
-/// Time between two steps by default, s; the setting control_period.
-export const CONTROL_PERIOD = 0.02;
-
 /// Settings by their names in the program, such as { learning_rate: '1e-3' }.
 export type LearnSettings = Readonly<Record<string, string>>;
 

@@ -1,5 +1,5 @@
 import { Core } from '../core';
-import { CONTROL_PERIOD } from './learner';
+import { CONTROL_PERIOD } from '../period';
 import { Learner } from './learner';
 import type { LearnSettings, Report, UpdateExample } from './learner';
 
