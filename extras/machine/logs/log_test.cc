@@ -254,6 +254,8 @@ TEST(MachineLog, UnitsInTheNamesOfLoggersAreReadOrRefused) {
                           {"q1 °", 0},
                           {"Angle (deg) 1", 0},
                           {"q_deg_1", 0},
+                          {"Angle_deg_", 0},
+                          {"pos_qc", 0},
                           {"phi_deg_filtered", 0},
                           {"enc1_counts", 0},
                           {"encCounts", 0},
@@ -283,12 +285,12 @@ TEST(MachineLog, UnitsInTheNamesOfLoggersAreReadOrRefused) {
                              {"tach_V", 0}});
   ExpectScales(
       "commanded1",
-      {{"u", 1},          {"tau_con1", 1},   {"effort[0]", 1},   {"controller.input_torque", 1},
-       {"iq", 1},         {"torque_Nm", 1},  {"u_N.m", 1},       {"torque (N·m)", 1},
-       {"u_mNm", 1e-3},   {"u/mNm", 0},      {"i_A", 0},         {"current_mA", 0},
-       {"motor_amps", 0}, {"u_oz-in", 0},    {"torque_ozin", 0}, {"u lb.ft", 0},
-       {"u_kg-cm", 0},    {"u_N-mm", 0},     {"Vm_V", 0},        {"pwm", 0},
-       {"duty_%", 0},     {"cmd_percent", 0}});
+      {{"u", 1},          {"tau_con1", 1},  {"effort[0]", 1},   {"controller.input_torque", 1},
+       {"iq", 1},         {"torque_Nm", 1}, {"u_N.m", 1},       {"torque (N·m)", 1},
+       {"u_mNm", 1e-3},   {"u/mNm", 0},     {"i_A", 0},         {"current_mA", 0},
+       {"motor_amps", 0}, {"u_oz-in", 0},   {"torque_ozin", 0}, {"u lb.ft", 0},
+       {"u_kg-cm", 0},    {"u_N-mm", 0},    {"Vm_V", 0},        {"Current_A_", 0},
+       {"pwm", 0},        {"duty_%", 0},    {"cmd_percent", 0}});
 }
 
 TEST(MachineLog, AUnitOrAFactorSettlesTheScale) {

@@ -52,7 +52,7 @@ constexpr const char* kAngleOthers[] = {
     "deg degs degree degrees mdeg millideg millidegrees rad/s deg/s rpm",
     "mrad mrads millirad urad microrad grad grads gon arcmin arcsec mm cm",
     "turn turns rev revs revolution revolutions rotations",
-    "count counts cnt cnts tick ticks pulse pulses cpr ppr lsb steps quadcounts increments bits",
+    "count counts cnt cnts tick ticks pulse pulses cpr ppr lsb steps qc quadcounts increments bits",
     "pct percent % volt volts mv"};
 constexpr const char* kAngleCertain[] = {"deg degs degree degrees mrad counts ticks"};
 constexpr const char* kVelocitySi[] = {"rad/s rads rad/sec rad/second radian/s radians/s",
@@ -144,6 +144,7 @@ Begin BeginAt(std::string_view name, size_t at) {
 /// Whether a text is a letter for a unit, which only counts after a separator. Joints may have the
 /// names A and V, but seldom.
 bool IsLetterOf(std::string_view text, std::string_view quantity) {
+  while (!text.empty() && !IsOfWord(text.back())) text.remove_suffix(1);
   if (quantity == "time") return text == "h";
   return text == "V" || (quantity == "torque" && (text == "A" || text == "W" || text == "N"));
 }
