@@ -104,8 +104,7 @@ nb::tuple MapHandle(const PolicyHandle& policy, const SettingTexts& settings,
   SetArguments(own, arguments);
   if (!x.empty()) a.x = x;
   if (!y.empty()) a.y = y;
-  for (const FlagValue& flag : FlagsOf(settings))
-    a.trial.set.push_back(flag.name + "=" + flag.text);
+  for (const FlagValue& flag : FlagsOf(settings)) a.set.push_back(flag.name + "=" + flag.text);
   a.trial.plant = plant;
   a.trial.unknown_plant = unknown_plant;
   PythonProgress python_progress(progress);
@@ -114,7 +113,7 @@ nb::tuple MapHandle(const PolicyHandle& policy, const SettingTexts& settings,
   std::string json;
   {
     const nb::gil_scoped_release unlocked;
-    const LoadedPolicy loaded = UsedIn(a.trial, policy.loaded());
+    const LoadedPolicy loaded = UsedIn(a.PlantTrial(), policy.loaded());
     map = PlanMap(a, loaded);
     const std::filesystem::path folder =
         out.empty() ? std::filesystem::path() : FigureFolder(out, loaded, map.folder_name());

@@ -65,7 +65,8 @@ int RunMapCommand(const MapCommand& a) {
     throw BadInput(Concat("--out: expected a folder for several maps, got none; policies: ",
                           Join(a.policies, ", ")));
   }
-  const std::vector<LoadedPolicy> policies = GetPoliciesIn(a.trial, a.policies, a.controllers);
+  const std::vector<LoadedPolicy> policies =
+      GetPoliciesIn(a.PlantTrial(), a.policies, a.controllers);
   std::vector<MapResult> maps;
   for (const LoadedPolicy& loaded : policies) maps.push_back(PlanMap(a, loaded));
   CheckSameAxes(maps);
@@ -101,7 +102,7 @@ void AddMap(CommandLine& line) {
   a.Describe(own);
   line.Arguments(own);
   AddPlant(line, a.trial.plant);
-  AddSet(line, a.trial.set, "value of a quantity on neither axis, such as q1=178");
+  AddSet(line, a.set, "value of a quantity on neither axis, such as q1=178");
   AddPlantFlags(line, a.trial.plant_flags);
   AddPhysics(line, a.trial.physics);
   AddUnknownPlant(line, a.trial.unknown_plant);

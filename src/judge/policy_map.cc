@@ -85,7 +85,6 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
   TrialArguments trial = a.trial;
   // These change config.point, not the environments.
   trial.plant_flags.clear();
-  trial.set.clear();
   config.env = TrialEnvironments(trial, &loaded);
   config.point.plant = config.env.plants.front();
   config.point.disturbance = config.env.disturbance(0);
@@ -110,7 +109,7 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
     const std::string where = FlagOf(flag.name);
     for (const Option* option : options.Find(flag.name, where)) expect_no_axis(*option, where);
   }
-  for (const Option* option : ApplyChanges(options, a.trial.set)) {
+  for (const Option* option : ApplyChanges(options, a.set)) {
     config.start_given |= option->section == "start";
     expect_no_axis(*option, Concat("--set ", option->name));
   }
@@ -130,6 +129,19 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
 void MapArguments::Describe(Options& o) {
   o.Add(&episodes, "episodes", {1, 100000}, "", "number of episodes per cell").usual =
       "10; 1 if the start is given";
+}
+
+TrialArguments MapArguments::PlantTrial() const {
+  TrialArguments of_plant = trial;
+  Plant plant;
+  const Options options = OptionsOf(plant);
+  for (const std::string& change : set) {
+    const std::string_view name = std::string_view(change).substr(0, change.find('='));
+    const bool is_alias = std::ranges::find(options.aliases(), name, &Options::AliasEntry::name) !=
+                          options.aliases().end();
+    if (is_alias || options.Get(name) != nullptr) of_plant.set.push_back(change);
+  }
+  return of_plant;
 }
 
 MapResult PlanMap(const MapArguments& a, const LoadedPolicy& loaded) {

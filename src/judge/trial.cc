@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
-#include <string_view>
 
 #include "base/error.h"
 #include "base/text.h"
@@ -46,15 +44,7 @@ Plant PlantIn(const TrialArguments& trial, const LoadedPolicy& loaded) {
   Plant plant = trial.plant.empty() ? loaded.plant : ReadPlantFile(trial.plant).plant;
   const Options options = OptionsOf(plant);
   SetFlags(options, trial.plant_flags);
-  // Of a map, --set also changes states and sensors.
-  std::vector<std::string> changes;
-  std::ranges::copy_if(trial.set, std::back_inserter(changes), [&](const std::string& change) {
-    const std::string_view name = std::string_view(change).substr(0, change.find('='));
-    return options.Get(name) != nullptr ||
-           std::ranges::find(options.aliases(), name, &Options::AliasEntry::name) !=
-               options.aliases().end();
-  });
-  ApplyChanges(options, changes);
+  ApplyChanges(options, trial.set);
   return plant;
 }
 
