@@ -31,6 +31,7 @@ except ImportError as missing:
 MOST_BYTES, MOST_MESH_BYTES = 1 << 20, 1 << 24  # of an XML file, of all meshes
 MOST_INCLUDES, MOST_ELEMENTS, MOST_DEPTH = 20, 5000, 100
 
+NO_END = "centre of mass, because the link has neither sites nor shapes"
 MOTIONS, PERIODS = 200, 50  # compared motions; control periods of each
 TURNS = 4 * math.pi  # rad; a joint limit that is further away does not count
 ALIGNED = 1e-4  # rad, largest angle between directions that count as parallel
@@ -318,7 +319,7 @@ class Pendulum:
             far = [(self._distance(end), f"end of geom {printable(model.geom(k).name)}".strip())
                    for k in range(model.ngeom) if model.geom_bodyid[k] in bodies for end in self._ends(k)]
         if not far or max(far)[0] < 1e-6:
-            far = [(self.c2, "centre of mass, because the link has neither sites nor shapes")]
+            far = [(self.c2, NO_END)]
         return max(far)
 
     def _distance(self, point: Any) -> float:
@@ -644,7 +645,7 @@ def toml_of(p: Pendulum, parameters: list[Parameter], remarks: list[str]) -> str
             + "".join(parameter.line() for parameter in parameters))
 
 
-def remarks_of(p: Pendulum, motor: Motor, left_out: list[str]) -> list[str]:
+def remarks_of(p: Pendulum, motor: Motor, left_out: list[str], length2_given: bool) -> list[str]:
     """Lines about the angles and torques of the file in terms of the plant's, and about everything left out."""
     remarks = []
     for k, sign in enumerate((1, p.sign2)):
@@ -652,6 +653,8 @@ def remarks_of(p: Pendulum, motor: Motor, left_out: list[str]) -> list[str]:
         remarks.append(f"q{k + 1} = {zero}{p.shown[k]} [rad], the angle from the file's zero pose")
     if motor.turns:
         remarks.append(f"A positive control is a {'positive' if motor.turns > 0 else 'negative'} torque here.")
+    if p.l2_from == NO_END and not length2_given:
+        remarks.append(f"length2 is {p.l2:g} m, the distance to the {NO_END}; --length2 sets it")
     return remarks + [f"Left out by --drop: {text}" if "--" not in text else f"Left out: {text}"
                       for text in left_out]
 
@@ -677,6 +680,15 @@ def remove_features(p: Pendulum, leave_out: set[str], convert_friction: bool) ->
     return removed
 
 
+def steps_for(plant: str) -> int:
+    """The Runge-Kutta steps in a control period that the program takes for a plant (TOML)."""
+    print(json.dumps({"toml": plant}), flush=True)
+    answer = sys.stdin.readline()
+    if not answer:  # the program refuses the plant
+        sys.exit(1)
+    return int(answer)
+
+
 def read_plant(job: dict[str, Any]) -> dict[str, Any]:
     """The plant of a file as TOML, with the files read and random motions of the file's model."""
     document = Document(Path(job["file"]), set(job["drop"]))
@@ -688,8 +700,10 @@ def read_plant(job: dict[str, Any]) -> dict[str, Any]:
     coulomb = frictionloss * 2 / math.pi if converted else np.zeros(2)
     p.measure()
     motor = Motor(p, document, job)
-    remarks = remarks_of(p, motor, left_out + motor.left_out)
-    physics = Physics(**job["physics"])
+    remarks = remarks_of(p, motor, left_out + motor.left_out, job["length2"] is not None)
+    parameters = parameters_of(p, motor, coulomb, job["length2"])
+    steps = steps_for(toml_of(p, parameters, []))
+    physics = Physics(timestep=job["control_period"] / steps, steps=steps, friction_slope=job["friction_slope"])
     starts, torques = random_motions(p, motor)
     angles = move(p, motor, physics, starts, torques, coulomb)
     if converted:
@@ -701,7 +715,6 @@ def read_plant(job: dict[str, Any]) -> dict[str, Any]:
                        f"rad (median) and {other.max():.2g} rad (largest) from MuJoCo's")
     if not np.all(np.isfinite(angles)):
         raise Refusal(f"MuJoCo's motion diverges in Runge-Kutta steps of {physics.timestep:g} s")
-    parameters = parameters_of(p, motor, coulomb, job["length2"])
     return {"toml": toml_of(p, parameters, remarks), "remarks": remarks, "starts": starts.tolist(),
             "torques": torques.tolist(), "angles": angles.tolist(),
             "files": [str(file) for file in document.files]}

@@ -39,7 +39,7 @@ constexpr std::array kDroppable{
 constexpr double kTolerance = 1e-6;
 
 struct PlantArguments {
-  std::string model, out;
+  std::string model, out = "-";
   std::vector<std::string> drop;
   double motor = 0;                      // 0: not given
   double torque_limit = 0, length2 = 0;  // N·m, m; 0: not given
@@ -47,7 +47,7 @@ struct PlantArguments {
 };
 
 /// The instructions of the Python program. Throws BadInput.
-nlohmann::json JobOf(const PlantArguments& a, int steps) {
+nlohmann::json JobOf(const PlantArguments& a) {
   for (const std::string& name : a.drop) {
     if (std::ranges::find(kDroppable, name) != kDroppable.end()) continue;
     throw BadInput(Concat("--drop: expected one of ", Join(kDroppable, ", "), ", got \"",
@@ -65,10 +65,8 @@ nlohmann::json JobOf(const PlantArguments& a, int steps) {
           {"torque_limit", given(a.torque_limit)},
           {"length2", given(a.length2)},
           {"convert_friction", a.convert_friction},
-          {"physics",
-           {{"timestep", kControlPeriod / steps},
-            {"steps", steps},
-            {"friction_slope", kFrictionSlope}}}};
+          {"control_period", kControlPeriod},
+          {"friction_slope", kFrictionSlope}};
 }
 
 /// Largest difference (rad) between the motions of a plant in this program and those of the model.
@@ -92,22 +90,15 @@ double LargestDifference(const Plant& plant, const nlohmann::json& read) {
   return largest;
 }
 
-/// What the Python program read, or nothing if it failed; `code` is then the exit code. `steps`: of
-/// the physics in a control period.
-std::optional<nlohmann::json> ReadModel(const PlantArguments& a, int steps, int& code) {
-  InstallSignalHandlers("");
-  PythonChild reader(
-      "plant", PlantProgram(),
-      JobOf(a, steps).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+/// The next object of the Python program, or nothing if it failed; `code` is then the exit code.
+std::optional<nlohmann::json> NextOf(PythonChild& reader, int& code) {
   const std::optional<std::string> line = reader.Next();
+  nlohmann::json read = line ? nlohmann::json::parse(*line, nullptr, false) : nlohmann::json();
+  if (read.is_object()) return read;
   code = reader.Finish();
   if (StopSignal() != 0) code = 128 + StopSignal();
   if (code != 0) return std::nullopt;
-  nlohmann::json read = line ? nlohmann::json::parse(*line, nullptr, false) : nlohmann::json();
-  if (!read.is_object()) {
-    throw Failure("plant: Python read nothing: expected UPSWING_PYTHON to name a Python");
-  }
-  return read;
+  throw Failure("plant: Python read nothing: expected UPSWING_PYTHON to name a Python");
 }
 
 /// Throws BadInput if --out is a file that the model includes.
@@ -124,17 +115,20 @@ void ExpectNoPart(const std::string& out, const nlohmann::json& files) {
 int RunPlant(const PlantArguments& a) {
   CheckWritable("--out", a.out);
   int code = 0;
-  std::optional<nlohmann::json> read = ReadModel(a, kPhysicsSteps, code);
+  InstallSignalHandlers("");
+  PythonChild reader("plant", PlantProgram(),
+                     JobOf(a).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  const std::optional<nlohmann::json> model = NextOf(reader, code);
+  if (!model) return code;
+  const std::string where = Concat("plant of ", Printable(a.model));
+  const Plant plant = ParsePlantFile((*model)["toml"].get<std::string>(), where).plant;
+  // Both have to take the steps that the plant needs.
+  reader.Answer(Concat(PhysicsStepsFor(plant, kControlPeriod, where)));
+  const std::optional<nlohmann::json> read = NextOf(reader, code);
   if (!read) return code;
+  if (code = reader.Finish(); code != 0) return code;
   ExpectNoPart(a.out, (*read)["files"]);
 
-  const auto toml = (*read)["toml"].get<std::string>();
-  const std::string where = Concat("plant of ", Printable(a.model));
-  const Plant plant = ParsePlantFile(toml, where).plant;
-  // Both have to take the steps that the plant needs.
-  const int steps = PhysicsStepsFor(plant, kControlPeriod, where);
-  if (steps != kPhysicsSteps) read = ReadModel(a, steps, code);
-  if (!read) return code;
   const size_t motions = (*read)["starts"].size();
   const double difference = LargestDifference(plant, *read);
   const std::string check = fmt::format(
@@ -143,8 +137,9 @@ int RunPlant(const PlantArguments& a) {
     throw Failure(Concat(Printable(a.model), ": ", check, ", expected at most ", kTolerance,
                          ": the model has something that a plant file cannot hold"));
   }
-  const std::string text = Concat("# Plant of ", Printable(a.model),
-                                  ", read by `upswing plant`.\n# ", check, ".\n", toml);
+  const std::string text =
+      Concat("# Plant of ", Printable(a.model), ", read by `upswing plant`.\n# ", check, ".\n",
+             (*read)["toml"].get<std::string>());
   if (IsStandardStream(a.out)) {
     WriteOutput(a.out, text);
     return 0;
@@ -164,8 +159,7 @@ void AddPlantCommand(CommandLine& line) {
   line.Text("model", a.model, "FILE.xml|FILE.urdf",
             "MJCF or URDF file of a double pendulum, with its includes and meshes in its folder");
   line.Require("model");
-  line.Text("--out", a.out, "FILE", "plant file (TOML) to write; -: standard output");
-  line.Require("--out");
+  line.Text("--out", a.out, "FILE", "plant file (TOML) to write; -: standard output (default -)");
   line.Repeated("--drop", a.drop, "NAME",
                 Concat("property to leave out, because a plant file cannot hold it (repeatable): ",
                        Join(kDroppable, ", ")));

@@ -119,8 +119,13 @@ class Numbers(PlantCommandTest):
             conaffinity="0"/></body>
             </body></worldbody><actuator><motor joint="a" ctrlrange="-1 1" gear="0.001"/></actuator>
             </mujoco>""")
+        # One Python reads the model, and learns how many steps the plant needs.
+        python = Path(self.write("python.sh", f'#!/bin/sh\necho >>count\nexec {PYTHON} "$@"\n'))
+        (self.folder / python).chmod(0o755)
         self.assertIn("random motions of 1 s differ from MuJoCo's by at most", self.succeed(
-            "plant", "small.xml", "--out", "small.toml", env=self.ENVIRONMENT))
+            "plant", "small.xml", "--out", "small.toml",
+            env=os.environ | {"UPSWING_PYTHON": str(self.folder / python)}))
+        self.assertEqual((self.folder / "count").read_text(), "\n")
 
     def test_zero_poses_and_signs(self):
         """Horizontal, upright, folded, another axis: the comparison with MuJoCo proves the angles."""
@@ -189,18 +194,22 @@ class Numbers(PlantCommandTest):
 
     def test_length_and_standard_output(self):
         self.assert_close(self.read(model(), "--length2", "0.3")[0], length2=0.3, center2=0.25)
-        self.assertEqual(tomllib.loads(self.succeed("plant", "model.xml", "--out", "-", env=self.ENVIRONMENT))[
-            "plant"]["length2"], 0.5)
+        for out in ([], ["--out", "-"]):
+            self.assertEqual(tomllib.loads(self.succeed("plant", "model.xml", *out, env=self.ENVIRONMENT))[
+                "plant"]["length2"], 0.5)
         inertial = '<inertial pos="0 0 -0.11" mass="0.9" diaginertia="0.01 0.01 0.01"/>'
         text = re.sub(r'<geom name="rod2".*?/>', inertial, model())
         self.assert_close(self.read(text)[0], length2=0.11, center2=0.11, inertia2=0.01)
-        self.assertIn("neither sites nor shapes", self.toml)
+        remark = "length2 is 0.11 m, the distance to the centre of mass, because the link has neither sites nor shapes"
+        self.assertIn(f"# {remark}; --length2 sets it\n", self.toml)
+        self.assertNotIn(remark, self.read(text, "--length2", "0.4")[1])
 
     def test_robot_of_urdf(self):
         plant, comments = self.read(robot(), name="r.urdf")
         self.assert_close(plant, mass1=0.5, mass2=0.4, length1=0.3, center1=0.2, center2=0.15, inertia1=0.004,
                           inertia2=0.002, damping1=0.01, damping2=0.02, torque_limit=4, actuated_joint=2)
         self.assertIn("q1 = J1", comments)
+        self.assertIn("length2 is 0.15 m, the distance to the centre of mass", comments)
         self.no_plant(robot(effort=0), "--torque-limit", name="r.urdf")
         self.no_plant(robot(drives="J1 J2"), "two motors", name="r.urdf")
         self.no_plant(robot(drives=""), "--motor", name="r.urdf")
@@ -380,7 +389,6 @@ class Strangers(PlantCommandTest):
     def test_arguments(self):
         self.write("model.xml", model())
         for arguments, *words in (
-                (["model.xml"], "plant: expected --out FILE (plant file"),
                 (["--out", "x.toml"], "expected FILE.xml|FILE.urdf"),
                 (["model.xml", "--out", "no/x.toml"], "--out no/x.toml", "No such file"),
                 (["model.xml", "--out", "x.toml", "--drop", "spring"], "--drop: expected one of stiffness", '"spring"'),
