@@ -33,8 +33,10 @@ struct Shape {
     const Manipulator body = ManipulatorOf(plant);
     const double inertia = unit.torque * unit.time * unit.time, damping = unit.torque * unit.time;
     limit = std::log(plant.torque_limit / unit.torque);
-    rest = {body.J1 / inertia,
-            body.J2 / inertia,
+    // J2 may be negative with rotors, but not the diagonal of the mass matrix.
+    const MassMatrix M = body.Mass(1);
+    rest = {M.M11 / inertia,
+            M.M22 / inertia,
             body.b / inertia,
             body.G1 / unit.torque,
             body.G2 / unit.torque,

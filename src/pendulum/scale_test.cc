@@ -23,6 +23,7 @@ Plant ImageOf(const Plant& plant, double length, double mass, double time) {
     image.*I *= inertia;
   }
   for (double Plant::*d : {&Plant::damping1, &Plant::damping2}) image.*d *= torque * time;
+  for (double Plant::*f : {&Plant::coulomb1, &Plant::coulomb2}) image.*f *= torque;
   image.gravity *= length / (time * time);
   image.torque_limit *= torque;
   return image;
@@ -76,7 +77,9 @@ TEST(Scale, OnlyPlantsOfAnotherSizeAreCarriedOver) {
 TEST(Scale, ImagesOfNearSizesAreCarriedOver) {
   Rng rng(1, "test");
   for (int n = 0; n < 100; ++n) {
-    const Plant plant = n == 0 ? Plant() : OwnLinks(rng);
+    Plant plant = n == 0 ? Plant() : OwnLinks(rng);
+    if (n % 3 == 1) plant.rotor_inertia = 0.002 * plant.mass1;  // heavy ones
+    if (n % 3 == 2) plant.coulomb2 = 0.1 * plant.mass2;
     for (const double length : {0.4, 0.6, 0.8, 0.95, 1.05, 1.2, 1.5, 2.0, 2.5}) {
       for (const double mass : {1.0, length, 1 / length, length * length * length}) {
         const double time = std::sqrt(length);
