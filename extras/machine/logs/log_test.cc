@@ -256,6 +256,8 @@ TEST(MachineLog, UnitsInTheNamesOfLoggersAreReadOrRefused) {
                           {"q_deg_1", 0},
                           {"Angle_deg_", 0},
                           {"pos_qc", 0},
+                          {"pos_cdeg", 0},
+                          {"angledeg", 0},
                           {"phi_deg_filtered", 0},
                           {"enc1_counts", 0},
                           {"encCounts", 0},
@@ -302,10 +304,14 @@ TEST(MachineLog, AUnitOrAFactorSettlesTheScale) {
   EXPECT_EQ(scale(R"(commanded1 = {column = "u/mNm", unit = "mNm"})"), 1e-3);
   EXPECT_EQ(scale(R"(commanded1 = {column = "i_A", factor = 0.05})"), 0.05);
   EXPECT_EQ(scale(R"(commanded1 = {column = "u_oz-in", factor = -0.00706})"), -0.00706);
-  EXPECT_EQ(ComplaintAboutColumns("time = \"t\"\nangle1 = \"a\"\nangle2 = \"b\"\n"
-                                  "commanded1 = {column = \"u_oz-in\", factor = -1}\n"),
-            "columns.toml:4: commanded1: expected one of the units Nm, N·m, mNm, mN·m, as in "
-            "{column = \"u_oz-in\", unit = \"N·m\"}, or a factor, got the unit \"oz-in\"");
+  EXPECT_EQ(
+      ComplaintAboutColumns("time = \"t\"\nangle1 = \"a\"\nangle2 = \"b\"\n"
+                            "commanded1 = {column = \"u_oz-in\", factor = -1}\n"),
+      "columns.toml:4: commanded1: expected one of the units Nm, N·m, mNm, mN·m, or a factor, "
+      "got the unit \"oz-in\"");
+  EXPECT_EQ(ComplaintAboutColumns("time = \"t\"\nangle1 = \"Q1_DEG_\"\nangle2 = \"b\"\n"),
+            "columns.toml:2: angle1: expected one of the units rad, deg, turn, or a factor, as in "
+            "{column = \"Q1_DEG_\", unit = \"deg\"}, got the unit \"DEG\"");
 }
 
 TEST(MachineLog, AClockOf32BitsGoesOnWhereItBeginsAgain) {
@@ -449,11 +455,14 @@ TEST(MachineLog, BadColumnFilesGetOneLineWithThePlace) {
   for (const std::string name : {"w [degrees/s]", "w (1/min)", "w (raw)"}) {
     EXPECT_EQ(
         ComplaintAboutColumns(Concat(good, "velocity1 = {column = \"", name, "\", factor = -1}\n")),
-        Concat("columns.toml:4: velocity1: unit: expected rad/s, deg/s, turn/s, rpm, got \"",
+        Concat("columns.toml:4: velocity1: expected one of the units rad/s, deg/s, turn/s, rpm, or "
+               "a factor, got the unit \"",
                name.substr(3, name.size() - 4), "\""));
   }
-  EXPECT_EQ(ComplaintAboutColumns(good + "commanded1 = \"u [mN m]\"\n"),
-            "columns.toml:4: commanded1: unit: expected Nm, N·m, mNm, mN·m, got \"mN m\"");
+  EXPECT_EQ(
+      ComplaintAboutColumns(good + "commanded1 = \"u [mN m]\"\n"),
+      "columns.toml:4: commanded1: expected one of the units Nm, N·m, mNm, mN·m, or a factor, "
+      "as in {column = \"u [mN m]\", unit = \"mNm\"}, got the unit \"mN m\"");
   EXPECT_EQ(ParseLogColumns(good + "commanded1 = \"u[1]\"\n", "").commanded[0].scale, 1);
   EXPECT_EQ(ComplaintAboutColumns(good + "velocity1 = {unit = \"rpm\"}\n"),
             "columns.toml:4: velocity1: expected a column, got none");

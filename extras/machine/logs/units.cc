@@ -175,7 +175,9 @@ std::string OtherUnitAtEnd(const std::string& name, std::string_view quantity) {
   const std::string all = Normalized(name);
   for (const char* word :
        {"deg", "degrees", "degree", "rpm", "counts", "ticks", "millis", "micros"}) {
-    if (all.ends_with(word) && Has(words.others, word)) return word;
+    if (!all.ends_with(word) || !Has(words.others, word)) continue;
+    const auto before = std::ranges::find_if_not(name.rbegin(), name.rend(), IsOfWord);
+    return {before.base(), name.end()};
   }
   return "";
 }
@@ -203,6 +205,15 @@ std::string NamesOf(std::string_view quantity) {
   return Join(names, ", ");
 }
 
+/// How to state a word for a known unit, such as `DEG`; empty for other words.
+std::string Example(const std::string& column, const std::string& word, std::string_view quantity) {
+  for (const LogUnit& unit : kUnits) {
+    if (quantity != unit.quantity || Normalized(word) != Normalized(unit.name)) continue;
+    return Concat(", as in {column = \"", Printable(column), "\", unit = \"", unit.name, "\"}");
+  }
+  return "";
+}
+
 std::optional<ColumnUnit> Find(std::string_view name, std::string_view quantity) {
   for (const LogUnit& unit : kUnits) {
     if (quantity == unit.quantity && name == unit.name) return ColumnUnit{unit.name, unit.scale};
@@ -228,18 +239,19 @@ ColumnUnit UnitInName(const std::string& column, std::string_view quantity,
   const bool has_brackets = name.ends_with(']') || name.ends_with(')');
   if (has_brackets) name.pop_back();
   const size_t before = name.find_last_of(has_brackets ? "[(" : "_ ");
+  std::string other;
   if (before != std::string::npos) {
     const std::string end = name.substr(before + 1);
-    if (has_brackets && !end.empty() && !ParseNumber(end)) return UnitNamed(end, quantity, place);
     if (const auto unit = Find(end, quantity)) return *unit;
+    if (has_brackets && !ParseNumber(end)) other = end;
   }
-  std::string other = OtherUnitAtEnd(column, quantity);
+  if (other.empty()) other = OtherUnitAtEnd(column, quantity);
   if (other.empty()) other = OtherUnitWithin(column, quantity);
   if (other.empty()) return SiUnit(quantity);
-  throw BadInput(Concat(place, "expected one of the units ", NamesOf(quantity),
-                        ", as in {column = \"", Printable(column), "\", unit = \"",
-                        SiUnit(quantity).name, "\"}, or a factor, got the unit \"",
-                        Printable(other), "\""));
+  while (other.size() > 1 && !IsOfWord(other.back())) other.pop_back();
+  throw BadInput(Concat(place, "expected one of the units ", NamesOf(quantity), ", or a factor",
+                        Example(column, other, quantity), ", got the unit \"", Printable(other),
+                        "\""));
 }
 
 }  // namespace upswing::machine
