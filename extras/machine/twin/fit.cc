@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "base/format.h"
 #include "base/text.h"
+#include "extras/machine/logs/check.h"
 #include "extras/machine/twin/fit_covariance.h"
 #include "extras/machine/twin/fit_prior.h"
 #include "extras/machine/twin/levenberg_marquardt.h"
@@ -85,15 +86,18 @@ FitResult Fit(std::span<const MachineLog> logs, const Twin& first, const Structu
   const FitParameters parameters = ParametersOf(logs, first, structure, config.adapts);
   const ShootingModel model(logs, parameters, config.windows, pool);
   ExpectWindows(model, logs, config.windows.seconds);
-  FitPrior prior =
-      config.adapts ? FitPrior::OfNewSession(parameters, first) : FitPrior::OfMachine(parameters);
+  const double cycle = UsualCycle(logs);
+  FitPrior prior = config.adapts ? FitPrior::OfNewSession(parameters, first, cycle)
+                                 : FitPrior::OfMachine(parameters, cycle);
   LevenbergMarquardt solver(model, prior);
   Minimise(solver, config, 0, progress);
+  solver.Centre();
   for (int round = 1; round < kRounds && parameters.HasDeviations(); ++round) {
     EstimateBetweenSessions(model, LinearizationAt(model, solver), solver.point().theta, prior);
     solver.Restart();
     Minimise(solver, config, round, progress);
   }
+  solver.Centre();
   if (progress) progress(kRounds, kRounds);
   const FitResult result = ResultOf(model, prior, solver, config.adapts);
   ExpectMeaning(result);

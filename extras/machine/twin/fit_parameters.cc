@@ -108,6 +108,24 @@ Twin FitParameters::TwinAt(const VectorXd& theta, std::optional<int> session) co
   return twin;
 }
 
+VectorXd FitParameters::Centred(const VectorXd& theta, std::span<const int> seen) const {
+  VectorXd centred = theta;
+  if (seen.empty()) return centred;
+  for (const int i : IndicesOfMachine()) centred(i) = values_[i].differs ? 0 : theta(i);
+  const double share = 1 / static_cast<double>(seen.size());
+  for (const int s : seen) {
+    const Twin own = TwinAt(theta, s);
+    for (const int i : IndicesOfSession(s)) {
+      centred(i) = NumberIn(own, values_[i].name);
+      centred(values_[i].machine) += share * centred(i);
+    }
+  }
+  for (const int s : seen) {
+    for (const int i : IndicesOfSession(s)) centred(i) -= centred(values_[i].machine);
+  }
+  return centred;
+}
+
 Session FitParameters::SessionAt(const VectorXd& theta, int session) const {
   const Twin own = TwinAt(theta, session);
   Session result;

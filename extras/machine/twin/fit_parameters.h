@@ -74,6 +74,10 @@ class FitParameters {
   /// The twin of a session: the machine's values and the session's deviations, within their ranges.
   /// Without a session, the machine's values only.
   Twin TwinAt(const Eigen::VectorXd& theta, std::optional<int> session) const;
+  /// θ with the machine's values at the means over the `seen` sessions, and the same values of
+  /// sessions. No other machine's values have smaller deviations, in any norm that all sessions
+  /// share.
+  Eigen::VectorXd Centred(const Eigen::VectorXd& theta, std::span<const int> seen) const;
   /// The values of a session that differ from the machine's.
   Session SessionAt(const Eigen::VectorXd& theta, int session) const;
 

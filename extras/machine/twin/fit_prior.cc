@@ -28,9 +28,16 @@ bool IsCogging(const std::string& name) {
   return name.starts_with("sine") || name.starts_with("cosine");
 }
 
+bool IsTimeOfMotor(const std::string& name) {
+  return name == "delay" || name == "lag" || name == "current_delay";
+}
+
 /// Encoders' zeros in rad, dry friction in N·m, times in s. Friction and inertia are in units of
-/// `scale`; times are those of motors and buses of any size.
-Deviations DeviationsOf(const std::string& name, const Scale& scale) {
+/// `scale`. Times are those of motors and buses of any size, or of slow loops: a log may put a
+/// torque a cycle or two from its moment.
+Deviations DeviationsOf(const std::string& name, const Scale& scale, double cycle) {
+  constexpr double kUsualCycle = 0.002;  // s, for which the times below are
+
   static const std::map<std::string, Deviations, std::less<>> kDeviations{
       {"zero1", {0.05, 0.05}},          {"zero2", {0.05, 0.05}},
       {"coulomb1", {0.03, 0.1}},        {"coulomb2", {0.03, 0.1}},
@@ -42,6 +49,7 @@ Deviations DeviationsOf(const std::string& name, const Scale& scale) {
   const auto found = kDeviations.find(name);
   if (found == kDeviations.end()) return {0, 0};
   double unit = 1;
+  if (IsTimeOfMotor(name)) unit = std::max(1.0, cycle / kUsualCycle);
   if (name.starts_with("coulomb")) unit = scale.torque;
   if (name.starts_with("damping")) unit = scale.torque * scale.time;
   if (name == "armature" || name == "current_inertia") {
@@ -50,17 +58,13 @@ Deviations DeviationsOf(const std::string& name, const Scale& scale) {
   return {found->second.sessions * unit, found->second.guess * unit};
 }
 
-bool IsTimeOfMotor(const std::string& name) {
-  return name == "delay" || name == "lag" || name == "current_delay";
-}
-
 /// The covariance (k × k) of a session's k deviations that an identification assumes at first.
-MatrixXd FirstBetweenSessions(const FitParameters& parameters) {
+MatrixXd FirstBetweenSessions(const FitParameters& parameters, double cycle) {
   const std::vector<int> own = parameters.IndicesOfSession(0);
   VectorXd deviations(std::ssize(own));
   for (int k = 0; k < static_cast<int>(own.size()); ++k) {
     const FitValue& value = parameters[own[k]];
-    const double known = DeviationsOf(value.name, parameters.scale()).sessions;
+    const double known = DeviationsOf(value.name, parameters.scale(), cycle).sessions;
     deviations(k) = known > 0 ? known : std::abs(parameters.FirstNumber(value.name)) / 10;
   }
   return deviations.cwiseAbs2().asDiagonal();
@@ -68,7 +72,7 @@ MatrixXd FirstBetweenSessions(const FitParameters& parameters) {
 
 /// The covariance (n × n) of θ in a new session: a multiple of the twin's covariance, wide for
 /// values without one.
-MatrixXd CovarianceOfNewSession(const FitParameters& parameters, const Twin& twin) {
+MatrixXd CovarianceOfNewSession(const FitParameters& parameters, const Twin& twin, double cycle) {
   const int n = parameters.size();
   const auto of_twin = [&](int i, int j) {
     return kNewSession * CovarianceOf(twin, parameters[i].name, parameters[j].name);
@@ -80,7 +84,7 @@ MatrixXd CovarianceOfNewSession(const FitParameters& parameters, const Twin& twi
       if (is_known(i) && is_known(j)) covariance(i, j) = of_twin(i, j);
     }
     if (!is_known(i)) {
-      const double wide = DeviationsOf(parameters[i].name, parameters.scale()).guess;
+      const double wide = DeviationsOf(parameters[i].name, parameters.scale(), cycle).guess;
       covariance(i, i) = std::pow(wide > 0 ? wide : parameters.guess()(i) / 2, 2);
     }
     covariance(i, i) *= 1 + 1e-4;  // positive in spite of rounding
@@ -93,23 +97,23 @@ MatrixXd CovarianceOfNewSession(const FitParameters& parameters, const Twin& twi
 FitPrior::FitPrior(const FitParameters& parameters)
     : parameters_(&parameters), inverse_(MatrixXd::Zero(parameters.size(), parameters.size())) {}
 
-FitPrior FitPrior::OfMachine(const FitParameters& parameters) {
+FitPrior FitPrior::OfMachine(const FitParameters& parameters, double cycle) {
   FitPrior prior(parameters);
   // Motors take milliseconds. Without reported torques, much larger delays can imitate friction.
   // Harmonics that a log hardly tells apart stay small.
   for (const int i : parameters.IndicesOfMachine()) {
     const std::string& name = parameters[i].name;
     if (IsTimeOfMotor(name) || IsCogging(name))
-      prior.inverse_(i, i) = std::pow(DeviationsOf(name, parameters.scale()).guess, -2);
+      prior.inverse_(i, i) = std::pow(DeviationsOf(name, parameters.scale(), cycle).guess, -2);
   }
-  prior.first_between_sessions_ = FirstBetweenSessions(parameters);
+  prior.first_between_sessions_ = FirstBetweenSessions(parameters, cycle);
   prior.SetBetweenSessions(prior.first_between_sessions_);
   return prior;
 }
 
-FitPrior FitPrior::OfNewSession(const FitParameters& parameters, const Twin& twin) {
+FitPrior FitPrior::OfNewSession(const FitParameters& parameters, const Twin& twin, double cycle) {
   FitPrior prior(parameters);
-  prior.inverse_ = CovarianceOfNewSession(parameters, twin).inverse();
+  prior.inverse_ = CovarianceOfNewSession(parameters, twin, cycle).inverse();
   return prior;
 }
 

@@ -10,12 +10,13 @@ namespace upswing::machine {
 /// A normal distribution of θ about the first guess, as (θ - guess)' P (θ - guess) in the cost.
 class FitPrior {
  public:
-  /// The prior of an identification: the motors' times are of milliseconds, and sessions deviate
-  /// little from the machine. Other values have none. `parameters` must outlive the prior.
-  static FitPrior OfMachine(const FitParameters& parameters);
+  /// The prior of an identification: the motors' times are of milliseconds or of some cycles of the
+  /// logs (`cycle`, s), and sessions deviate little from the machine. Other values have none.
+  /// `parameters` must outlive the prior.
+  static FitPrior OfMachine(const FitParameters& parameters, double cycle);
   /// The prior of an adaptation: today's machine is one more session of the twin's. Values without
   /// a covariance have a wide one.
-  static FitPrior OfNewSession(const FitParameters& parameters, const Twin& twin);
+  static FitPrior OfNewSession(const FitParameters& parameters, const Twin& twin, double cycle);
 
   /// P (n × n), the inverse covariance; rows of values without a prior are 0.
   const Eigen::MatrixXd& inverse() const { return inverse_; }

@@ -161,6 +161,34 @@ TEST(Fit, FindsTheMachineBehindItsLogs) {
   EXPECT_GE(share, 0.9);
 }
 
+/// A log of a simulation has the torque of a row act from its time on, a cycle before that of a
+/// machine's log. In a slow loop such a delay is long. All logs are of one session, so the
+/// machine's values are that session's.
+TEST(Fit, FindsTheDelayOfASlowLoop) {
+  ThreadPool pool(2);
+  Rng rng(19, "slow loop");
+  Twin machine = SomeMachine(rng);
+  machine.sensors.quantum = 1e-8;
+  machine.sensors.zero1 = machine.sensors.zero2 = 0;
+  machine.loop = {.period = 0.02};
+  machine.actuator.delay = -0.02;
+  machine.actuator.lag = 0;
+  std::vector<MachineLog> logs = LogsOf(machine, 2, 5, 600);
+  for (MachineLog& log : logs) log.measured.clear();
+  Structure structure{"", kValues, {"coulomb1", "coulomb2", "zero1", "zero2"}};
+  std::erase_if(structure.values, [](const auto& name) { return name.starts_with("current"); });
+  const FitResult fit = Fit(logs, FirstGuess(), structure, kWindowsInARow, &pool);
+  EXPECT_NEAR(fit.twin.actuator.delay + fit.twin.actuator.lag, -0.02, 0.001);
+  for (const std::string name : {"center1", "center2", "inertia1", "inertia2", "armature",
+                                 "damping1", "damping2", "coulomb1", "coulomb2"}) {
+    EXPECT_NEAR(ValueOf(fit.twin, name) / ValueOf(machine, name), 1, 0.01) << name;
+  }
+  ASSERT_EQ(fit.twin.sessions.size(), 1u);
+  for (const auto& [setting, number] : fit.twin.sessions.front().values) {
+    EXPECT_NEAR(number, ValueOf(fit.twin, setting), 1e-12) << setting;
+  }
+}
+
 /// The machine of today has other zeros, friction and lag. A log of 5 s shows them.
 /// Torques of up to 0.06 N·m at harmonics that are close to each other.
 TEST(Fit, FindsTheCoggingOfTheMotors) {

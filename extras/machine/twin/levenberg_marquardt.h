@@ -23,6 +23,8 @@ class LevenbergMarquardt {
   bool Step(double tolerance);
   /// Forgets the damping, for a cost that has changed.
   void Restart() { damping_ = kFirstDamping; }
+  /// Puts the machine's values at the means of its sessions (FitParameters::Centred).
+  void Centre() { point_.theta = model_.parameters().Centred(point_.theta, model_.SeenSessions()); }
 
  private:
   static constexpr double kFirstDamping = 1e-3;
