@@ -26,6 +26,17 @@ Options PlantFlags(Plant& plant) {
   return flags;
 }
 
+/// Warns of a plant that is not to be trusted. The command reports a file that cannot be read.
+void WarnOfPlant(const std::string& plant) {
+  std::string distrust;
+  try {
+    distrust = ReadPlantFile(plant).distrust;
+  } catch (const Error&) {
+    return;
+  }
+  WarnOfDistrust(plant, distrust);
+}
+
 /// Says how a policy is carried over to a plant of another size.
 void SayIfCarriedOver(const LoadedPolicy& loaded) {
   const Scale& ratio = loaded.carried_over;
@@ -123,10 +134,18 @@ void AddSet(CommandLine& line, std::vector<std::string>& set, const std::string&
   line.Repeated("--set", set, "NAME=VALUE", help + " (repeatable)");
 }
 
+void WarnOfDistrust(const std::string& name, const std::string& distrust) {
+  if (distrust.empty()) return;
+  SayError(Concat("warning: ", Printable(name), ": not to be trusted: ", Printable(distrust)));
+}
+
 void AddPlant(CommandLine& line, std::string& plant) {
   line.Text("--plant", plant, "FILE|NAME",
             Concat("plant file (TOML with a table [plant]) or shipped plant (",
                    Join(NamesOf(EmbeddedPlants()), ", "), "), which other flags change"));
+  line.Check([&plant] {
+    if (!plant.empty()) WarnOfPlant(plant);
+  });
 }
 
 void AddUnknownPlant(CommandLine& line, bool& unknown_plant) {

@@ -65,7 +65,11 @@ void AddSet(CommandLine& line, std::vector<std::string>& set,
 /// Adds a flag for each setting of a plant. Their values are appended to `flags`.
 void AddPlantFlags(CommandLine& line, std::vector<FlagValue>& flags);
 
-/// Adds --plant, the argument of ReadPlantFile.
+/// Warns of a plant or twin called `name` that is not to be trusted: `distrust` says why; empty: it
+/// is to be trusted.
+void WarnOfDistrust(const std::string& name, const std::string& distrust);
+
+/// Adds --plant, the argument of ReadPlantFile. Warns if the plant is not to be trusted.
 void AddPlant(CommandLine& line, std::string& plant);
 
 /// Adds --unknown-plant: on another plant, observations are still scaled as in training.

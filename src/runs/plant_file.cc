@@ -23,16 +23,22 @@ constexpr size_t kMostPlantBytes = 1 << 20;
 constexpr std::array<std::string_view, 5> kOtherTables{"actuator", "cogging", "sensors", "loop",
                                                        "sessions"};
 
-/// Removes kOtherTables and the machine's name. Throws BadInput unless each table left is one of a
-/// plant file.
+/// Takes the text of a key out of a table; empty: the table lacks it. Throws BadInput for another
+/// type.
+std::string TakeText(toml::table& table, std::string_view key, const std::string& where) {
+  const toml::node* node = table.get(key);
+  if (node == nullptr) return {};
+  if (!node->is_string()) {
+    throw BadInput(Concat(PlaceOf(*node, where), ": ", key, ": expected a text, got another type"));
+  }
+  std::string text = node->as_string()->get();
+  table.erase(key);
+  return text;
+}
+
+/// Removes kOtherTables. Throws BadInput unless each table left is one of a plant file.
 void TakeOwnTables(toml::table& table, const std::string& where) {
   std::vector<std::string> known{"plant", "disturbance", "covariance"};
-  if (const toml::node* name = table.get("name")) {
-    if (!name->is_string()) {
-      throw BadInput(Concat(PlaceOf(*name, where), ": name: expected a text, got another type"));
-    }
-    table.erase("name");
-  }
   for (const std::string_view other : kOtherTables) {
     known.emplace_back(other);
     if (table[other].is_table()) table.erase(other);
@@ -63,8 +69,10 @@ std::vector<FlagValue> PlantFile::PlantFlags() const {
 
 PlantFile ParsePlantFile(std::string_view toml, const std::string& where) {
   toml::table table = ParseToml(toml, where);
-  TakeOwnTables(table, where);
   PlantFile file;
+  TakeText(table, "name", where);
+  file.distrust = TakeText(table, kDistrustKey, where);
+  TakeOwnTables(table, where);
   Disturbance disturbance;
   const Covariance covariance = TakeCovariance(table, where);
   const Options of_plant = OptionsOf(file.plant);

@@ -17,6 +17,9 @@ struct PlantFile {
   // The settings of [disturbance]; with a covariance of the plant, also the setting `posterior`.
   std::vector<FlagValue> conditions;
 
+  // Why the plant is not to be trusted, as the program says that identified it; empty: it is.
+  std::string distrust;
+
   // Settings that change the motion of every machine and that the file leaves out, with their
   // defaults: `armature 0.01 kg·m², gravity 9.81 m/s²`; empty: none.
   std::string left_out;
@@ -26,6 +29,9 @@ struct PlantFile {
 
   std::string name;  // for messages
 };
+
+/// The key of a plant file that holds PlantFile::distrust.
+inline constexpr const char* kDistrustKey = "distrust";
 
 /// A file of configs/plants/, compiled into the program.
 struct ShippedPlant {

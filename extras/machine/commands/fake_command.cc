@@ -47,6 +47,7 @@ int RunFake(const FakeArguments& a) {
   if (!a.stuck.empty()) ParseStuck(a.stuck, config.machine);
   const auto seed = static_cast<uint64_t>(a.seed);
   Twin twin = ReadTwin(a.twin, "fake");
+  WarnOfDistrust(twin.name, twin.distrust);
   if (a.draw) {
     Rng rng(seed, "loop: machine");
     twin = DrawTwin(twin, rng);

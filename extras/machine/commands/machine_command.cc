@@ -185,6 +185,23 @@ void ShowErrors(const MachineArguments& a, std::span<const MachineLog> logs,
   }
 }
 
+nlohmann::ordered_json JudgementJson(const Judgement& j) {
+  return {{"explains", NameOf(j.explanation)},
+          {"sentence", SentenceOf(j)},
+          {"windows", j.windows},
+          {"seconds", j.seconds},
+          {"noise_rad", j.noise},
+          {"error_rad", j.error},
+          {"times_noise", j.times_noise},
+          {"unexplained_share", j.share},
+          {"unexplained_share_of_steps", j.step_share}};
+}
+
+/// Says why a twin is not to be trusted, with the name of its file.
+void SayDistrust(const std::string& file, const std::string& distrust) {
+  SayError(Concat(Printable(file), ": not to be trusted: ", Printable(distrust)));
+}
+
 constexpr std::array kHorizons{0.2, 0.5, 1.0};
 
 /// Reads the logs. Says a line about each one with faults, and then sets `is_faulty`.
@@ -215,6 +232,7 @@ void Validate(const MachineArguments& a, bool& is_faulty) {
                           Printable(file), "\""));
   }
   const Twin twin = ReadTwin(file, "machine validate");
+  WarnOfDistrust(file, twin.distrust);
   const std::vector<Twin> others = ReadOthers(a);
   const std::vector<MachineLog> logs = ReadAndWarn(a, is_faulty);
   std::vector<Predictor> predictors{PredictorOf(twin.name, twin, logs)};
@@ -232,7 +250,10 @@ void Validate(const MachineArguments& a, bool& is_faulty) {
     }
   }
   if (!a.csv.empty()) WriteNamedFile(a.csv, MotionCsv(logs, predictors));
-  ShowErrors(a, logs, predictors, rows, {}, pool);
+  const Judgement judgement = Judge(logs, predictors.front().twins, "these logs", &pool);
+  if (!judgement.explains()) is_faulty = true;
+  if (!a.as_json) fmt::print("{}\n", SentenceOf(judgement));
+  ShowErrors(a, logs, predictors, rows, {{"judgement", JudgementJson(judgement)}}, pool);
 }
 
 int RunValidate(const MachineArguments& a) { return RunOnLogs(Validate, a); }
@@ -269,8 +290,8 @@ void PrintTwin(const Identification& found) {
 }
 
 void PrintIdentification(const Identification& found, size_t logs) {
-  fmt::print("{} in {}\n", Counted(found.fit.windows, "window"),
-             Counted(static_cast<int64_t>(logs), "log"));
+  fmt::print("{} in {}; {}\n", Counted(found.fit.windows, "window"),
+             Counted(static_cast<int64_t>(logs), "log"), SentenceOf(found.judgement));
   if (!found.structures.empty()) {
     fmt::print("\nmodel                                    error on left-out runs, {:.2g} s, rad\n",
                found.seconds);
@@ -289,22 +310,14 @@ nlohmann::ordered_json IdentificationJson(const Identification& found, const std
   }
   return {{"twin", file},
           {"windows", found.fit.windows},
+          {"judgement", JudgementJson(found.judgement)},
+          {"distrust", found.fit.twin.distrust},
           {"structures", structures},
           {"chosen", found.chosen}};
 }
 
-/// Warns of a twin that predicts worse than the values that the fit began with, or is no machine.
-void WarnOfTwin(const Twin& twin, std::span<const ErrorRow> rows) {
-  const Plant& plant = twin.plant;
-  const auto warn = [](const char* name, double center, double length) {
-    if (center <= length) return;
-    SayError(
-        fmt::format("warning: {} is {:.3f} m, beyond its link of {:.3f} m; machine check finds "
-                    "wrong signs and units",
-                    name, center, length));
-  };
-  warn("center1", plant.center1, plant.length1);
-  warn("center2", plant.center2, plant.length2);
+/// Warns of a twin that predicts worse than the values that the fit began with.
+void WarnOfTwin(std::span<const ErrorRow> rows) {
   // The row of all runs and the longest predictions comes last.
   const ErrorRow* last = nullptr;
   for (const ErrorRow& row : rows) last = row.reported ? last : &row;
@@ -367,20 +380,22 @@ Predictor PredictorOfFit(const Identification& found, std::span<const MachineLog
 void FitTwin(const MachineArguments& a, bool& is_faulty) {
   CheckFitArguments(a);
   const Twin first = ReadFirst(a);
+  WarnOfDistrust(Adapts(a) ? a.twin : a.plant, first.distrust);
   const std::vector<Twin> others = ReadOthers(a);
   const std::vector<MachineLog> logs = ReadAndWarn(a, is_faulty);
   ThreadPool pool(ResolveThreads(a.threads));
-  const Identification found = FitShowingProgress(a, logs, first, pool);
+  Identification found = FitShowingProgress(a, logs, first, pool);
+  std::string& distrust = found.fit.twin.distrust;
+  if (is_faulty) distrust = Concat("its logs have faults", distrust.empty() ? "" : "; ", distrust);
   WriteNamedFile(a.out, TwinText(found.fit.twin));
 
   std::vector<Predictor> predictors{PredictorOfFit(found, logs),
                                     PredictorOf(first.name, first, logs)};
   AddOthers(others, a, logs, predictors);
   const auto rows = CompareErrors(logs, predictors, kHorizons, &pool);
-  WarnOfTwin(found.fit.twin, rows);
-  if (is_faulty) {
-    SayError(Concat(Printable(a.out), ": not to be trusted, because its logs have faults"));
-  }
+  WarnOfTwin(rows);
+  if (!distrust.empty()) SayDistrust(a.out, distrust);
+  is_faulty = !distrust.empty();
   if (!a.as_json) PrintIdentification(found, logs.size());
   ShowErrors(a, logs, predictors, rows, IdentificationJson(found, a.out), pool);
 }
@@ -456,7 +471,9 @@ void AddIdentify(CommandLine& line) {
       "ones are a second measurement. Cross-validation chooses the model. The twin's\n"
       "covariance includes the differences between sessions. If the plant file has slots and\n"
       "poles in a table [cogging], the fit finds the cogging of motors without gears.\n"
-      "Exit code: 0, or 1 if the twin's logs have faults; see machine check.\n");
+      "A sentence says how well the twin explains logs that the fit has not seen.\n"
+      "Exit code: 0, or 1 if the twin is not to be trusted: it does not explain the logs, has a\n"
+      "value that no machine has, or its logs have faults. The file then says why.\n");
   line.Examples(
       "  ./upswing machine identify logs/*.csv --plant realaigym-c1 --out twin.toml\n"
       "  ./upswing machine identify run1.csv run2.csv --plant arm.toml --out arm-twin.toml \\\n"
@@ -473,7 +490,7 @@ void AddAdapt(CommandLine& line) {
   line.Notes(
       "Fits the twin of today to 10 to 30 s of today's logs. The covariance of TWIN says how\n"
       "much each value may change. A plant file has none: all values may change widely.\n"
-      "Exit code: 0, or 1 if the twin's logs have faults; see machine check.\n");
+      "Exit code: 0, or 1 if the twin is not to be trusted, as for machine identify.\n");
   line.Examples(
       "  ./upswing machine adapt twin.toml first.csv --out today.toml\n"
       "  ./upswing machine adapt realaigym-c1 run1.csv run2.csv --out today.toml\n"
@@ -490,7 +507,8 @@ void AddValidate(CommandLine& line) {
   AddPredictions(line, a);
   line.Notes(
       "Prints the median error of predictions over 0.2, 0.5 and 1 s, by session.\n"
-      "Exit code: 0, or 1 if the logs have faults; see machine check.\n");
+      "A sentence says how well the twin explains the logs.\n"
+      "Exit code: 0, or 1 if it does not explain them, or if they have faults.\n");
   line.Examples("  ./upswing machine validate twin.toml new/*.csv --against realaigym-c1\n");
 }
 

@@ -216,6 +216,7 @@ int RunRun(const RunArguments& a) {
   if (in_process || !a.twin.empty())
     twin =
         a.twin.empty() ? ReadTwin(address.place, "--link", kLinkForms) : ReadTwin(a.twin, "--twin");
+  if (twin) WarnOfDistrust(twin->name, twin->distrust);
   if (in_process && !a.twin.empty()) {
     throw BadInput("--twin: expected a link by UDP or a serial line with it, got a twin as --link");
   }

@@ -293,8 +293,12 @@ class LearningSession {
       if (logs_.size() == 1 || ErrorOf(guess) < ErrorOf(twin_)) twin_ = guess;
       const FitResult fit = FitLogs(window);
       Adopt(fit.twin);
+      const Judgement judgement =
+          Judge(logs_, PredictorOf("", twin_, logs_).twins, "the logs of the fit", pool_);
+      twin_.distrust = DistrustOf(judgement, twin_, logs_);
       WriteFileAtomically(out_ / "twin.toml", TwinText(twin_));
       SayTwin(fit.error);
+      say_("  " + SentenceOf(judgement));
     });
   }
 

@@ -17,6 +17,7 @@ constexpr double kFirstLag = 0.005;  // s
 /// those of capsules, are replaced by these.
 Twin WithoutResults(const Twin& first) {
   Twin twin = first;
+  twin.distrust.clear();
   twin.sessions.clear();
   twin.uncertain.clear();
   twin.covariance.clear();

@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "extras/machine/logs/check.h"
+#include "extras/machine/twin/physics_rules.h"
 
 namespace upswing::machine {
 namespace {
@@ -147,6 +148,60 @@ class CrossValidation {
   FitCounter& counter_;
 };
 
+/// Rows `first` to before `last` of a log.
+MachineLog PartOf(const MachineLog& log, int first, int last) {
+  const auto part = [&](const auto& values) {
+    if (values.empty()) return values;
+    return std::decay_t<decltype(values)>(values.begin() + first, values.begin() + last);
+  };
+  MachineLog own;
+  own.name = log.name;
+  own.first_row = log.first_row + first;
+  own.time = part(log.time);
+  own.angle = part(log.angle);
+  own.velocity = part(log.velocity);
+  own.commanded = part(log.commanded);
+  own.measured = part(log.measured);
+  own.push = part(log.push);
+  return own;
+}
+
+/// Judges a fit of this structure by the middle third of each log. A second fit does not see these
+/// parts. Nothing if one of the parts has too few windows: a fit without a prior needs one for each
+/// value.
+std::optional<Judgement> JudgeByMiddles(std::span<const MachineLog> logs, const Twin& first,
+                                        const Structure& structure, FitConfig config,
+                                        ThreadPool* pool) {
+  std::vector<MachineLog> middles, others;
+  for (const MachineLog& log : logs) {
+    const int begin = log.rows() / 3, end = 2 * log.rows() / 3;
+    if (begin < 2) continue;
+    others.push_back(PartOf(log, 0, begin));
+    middles.push_back(PartOf(log, begin, end));
+    others.push_back(PartOf(log, end, log.rows()));
+  }
+  config.windows.hop = config.windows.seconds;
+  config.tolerance = std::max(1e-4, config.tolerance);
+  try {
+    const FitResult fit = Fit(others, first, structure, config, pool);
+    const int fewest = config.adapts ? 4 : static_cast<int>(structure.values.size());
+    if (fit.windows < fewest) return std::nullopt;
+    const Judgement judgement = Judge(middles, PredictorOf("", fit.twin, middles).twins,
+                                      "the left-out parts of the logs", pool);
+    if (judgement.windows > 0) return judgement;
+  } catch (const Error&) {  // no window
+  }
+  return std::nullopt;
+}
+
+Judgement JudgeFit(const Identification& found, std::span<const MachineLog> logs, const Twin& first,
+                   const Structure& structure, const FitConfig& config, ThreadPool* pool) {
+  if (!found.left_out.empty()) return Judge(logs, found.left_out, "the left-out logs", pool);
+  const auto by_parts = JudgeByMiddles(logs, first, structure, config, pool);
+  if (by_parts) return *by_parts;
+  return Judge(logs, PredictorOf("", found.fit.twin, logs).twins, "the logs of the fit", pool);
+}
+
 /// The least change between rows of joint 1, which is a step of the encoder or of the reports;
 /// nothing if no row differs.
 std::optional<double> LeastChange(std::span<const MachineLog> logs,
@@ -243,7 +298,19 @@ Identification Identify(std::span<const MachineLog> logs, const Twin& first,
   }
   result.fit = Fit(logs, first, structures[result.chosen], config.fit, pool, counter.NextPart());
   MeasureLoop(logs, result.fit.twin);
+  result.judgement = JudgeFit(result, logs, first, structures[result.chosen], config.fit, pool);
+  result.fit.twin.distrust = DistrustOf(result.judgement, result.fit.twin, logs);
   return result;
+}
+
+std::string DistrustOf(const Judgement& judgement, const Twin& twin,
+                       std::span<const MachineLog> logs) {
+  const bool reports = std::ranges::any_of(
+      logs, [](const MachineLog& log) { return !log.commanded.empty() && !log.measured.empty(); });
+  std::vector<std::string> reasons;
+  if (!judgement.explains()) reasons.push_back(SentenceOf(judgement));
+  for (const std::string& line : OutsidePhysics(twin, reports)) reasons.push_back(line);
+  return Join(reasons, "; ");
 }
 
 void MeasureLoop(std::span<const MachineLog> logs, Twin& twin) {

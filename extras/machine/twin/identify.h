@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "extras/machine/twin/fit.h"
+#include "extras/machine/twin/judgement.h"
 #include "extras/machine/twin/validate.h"
 
 /// Identification with a choice of the model's structure on runs that were left out.
@@ -38,13 +39,22 @@ struct Identification {
   double seconds = 1;                      // length of the windows that choose it
   // The twin of the other folds for each log; empty without cross-validation.
   std::vector<Twin> left_out;
+  // On the left-out runs; without a cross-validation, on the middle third of each log, by a fit to
+  // the rest; if that has no windows, on the logs of the fit.
+  Judgement judgement;
 };
 
-/// Identifies a twin from logs. Throws BadInput if they have no usable motion, or if there are too
-/// few for a cross-validation.
+/// Identifies a twin from logs and judges it. A twin that does not explain its logs, or has values
+/// outside physics, says so (Twin::distrust). Throws BadInput if they have no usable motion, or if
+/// there are too few for a cross-validation.
 Identification Identify(std::span<const MachineLog> logs, const Twin& first,
                         const IdentifyConfig& config, ThreadPool* pool,
                         const Progress& progress = nullptr);
+
+/// Why a twin of these logs is not to be trusted, in one line: its judgement, and the values
+/// outside physics. Empty: nothing speaks against it.
+std::string DistrustOf(const Judgement& judgement, const Twin& twin,
+                       std::span<const MachineLog> logs);
 
 /// Sets the twin's loop timing, and the steps of its angles and reported torques, to those of the
 /// logs.

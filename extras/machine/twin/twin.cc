@@ -165,12 +165,19 @@ Twin ParseTwin(std::string_view text, const std::string& where) {
     }
     twin.name = name->as_string()->get();
   }
+  if (const toml::node* distrust = table.get(kDistrustKey)) {
+    if (!distrust->is_string()) {
+      throw BadInput(Concat(PlaceOf(*distrust, where), ": ", kDistrustKey,
+                            ": expected a text, got another type"));
+    }
+    twin.distrust = distrust->as_string()->get();
+  }
   Covariance covariance = TakeCovariance(table, where);
   twin.uncertain = std::move(covariance.names);
   twin.covariance = std::move(covariance.values);
   if (const toml::node* sessions = table.get("sessions")) ReadSessions(*sessions, where, twin);
   // The disturbance follows from the other values.
-  for (const char* key : {"name", "sessions", "disturbance"}) table.erase(key);
+  for (const char* key : {"name", kDistrustKey, "sessions", "disturbance"}) table.erase(key);
   ApplyTable(OptionsOf(twin), table, where, /*flat=*/false);
   if (!has_plant) throw BadInput(Concat(where, ": expected a table [plant], got none"));
   CheckCogging(twin.cogging, where);
@@ -186,7 +193,9 @@ Twin ReadTwin(const std::string& name, const std::string& flag, const std::strin
 }
 
 std::string TwinText(const Twin& twin) {
-  std::string text = Concat("name = ", Quoted(twin.name), "\n\n");
+  std::string text = Concat("name = ", Quoted(twin.name), "\n");
+  if (!twin.distrust.empty()) text += Concat(kDistrustKey, " = ", Quoted(twin.distrust), "\n");
+  text += "\n";
   text += OptionsOf(twin).Toml(/*comments=*/true, [&](const Option& option) {
     return option.section != "cogging" || twin.cogging.any();
   });

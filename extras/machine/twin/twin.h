@@ -78,6 +78,7 @@ std::string SessionOf(const std::string& log);
 /// A machine's model, and how certain its values are.
 struct Twin {
   std::string name = "twin";
+  std::string distrust;  // why the twin is not to be trusted, in one line; empty: it is
   Plant plant;
   Actuator actuator;
   Cogging cogging;

@@ -58,17 +58,6 @@ std::vector<double> ErrorsIn(const MachineLog& log, const Twin& twin,
   return errors;
 }
 
-/// Whether a log has the reported or commanded torques of all its motors.
-bool HasDrive(const MachineLog& log, bool reported) {
-  if (reported && log.measured.empty()) return false;
-  for (const int joint : {0, 1}) {
-    const bool measured = HasTorque(log.measured, joint);
-    if (reported && !measured && HasTorque(log.commanded, joint)) return false;
-    if (!reported && measured && log.commanded.empty()) return false;
-  }
-  return true;
-}
-
 /// The windows of a log; none if it lacks the torques that drive a prediction.
 std::vector<LogWindow> WindowsOf(const MachineLog& log, const Twin& twin, double seconds,
                                  bool reported = false) {
@@ -208,6 +197,16 @@ Predictor PredictorOf(const std::string& name, const Twin& twin, std::span<const
   Predictor predictor{name, {}};
   for (const MachineLog& log : logs) predictor.twins.push_back(InSession(twin, log));
   return predictor;
+}
+
+bool HasDrive(const MachineLog& log, bool reported) {
+  if (reported && log.measured.empty()) return false;
+  for (const int joint : {0, 1}) {
+    const bool measured = HasTorque(log.measured, joint);
+    if (reported && !measured && HasTorque(log.commanded, joint)) return false;
+    if (!reported && measured && log.commanded.empty()) return false;
+  }
+  return true;
 }
 
 bool HasWindows(const MachineLog& log, const Twin& twin, double seconds) {

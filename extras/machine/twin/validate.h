@@ -23,6 +23,9 @@ struct Predictor {
 /// A predictor with the same twin for all logs, in each log's session if the twin knows it.
 Predictor PredictorOf(const std::string& name, const Twin& twin, std::span<const MachineLog> logs);
 
+/// Whether a log has the reported or commanded torques of all its motors.
+bool HasDrive(const MachineLog& log, bool reported);
+
 /// Whether a log has windows of `seconds` in which a twin, driven by commanded or reported torques,
 /// can predict its motion.
 bool HasWindows(const MachineLog& log, const Twin& twin, double seconds);
