@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 
+#include "extras/machine/twin/motion.h"
 #include "pendulum/posterior.h"
 
 namespace upswing::machine {
@@ -29,10 +30,17 @@ Twin WithoutResults(const Twin& first) {
   return twin;
 }
 
-/// The value that a fit begins with. The model counts lags below 10 µs as equal, so the derivative
-/// at lag 0 is 0.
+/// The range of a value in a fit. A torque without lag jumps between two steps of the integration,
+/// which then do not see the derivative by the delay. A lag of a step is as good.
+Range FitRange(const Option& option) {
+  Range range = UncertainRange(option);
+  if (option.name == "lag") range.low = kMotionStep;
+  return range;
+}
+
+/// The value that a fit begins with.
 double FirstGuessOf(const Option& option) {
-  return option.name == "lag" && option.number() == 0 ? kFirstLag : option.number();
+  return option.name == "lag" && option.number() < kMotionStep ? kFirstLag : option.number();
 }
 
 double NumberIn(Twin twin, const std::string& name) { return OptionsOf(twin).Get(name)->number(); }
@@ -64,7 +72,7 @@ FitParameters::FitParameters(const Twin& first, const Structure& structure,
     const bool differs = std::ranges::count(structure.of_session, name) > 0;
     const int machine = size();
     values_.push_back(
-        {.name = name, .machine = machine, .differs = differs, .range = UncertainRange(option)});
+        {.name = name, .machine = machine, .differs = differs, .range = FitRange(option)});
     guess.push_back(FirstGuessOf(option));
     if (!differs) continue;
     for (int s = 0; s < sessions_.size(); ++s) {
@@ -103,7 +111,7 @@ Twin FitParameters::TwinAt(const VectorXd& theta, std::optional<int> session) co
     const Option& option = *options.Get(values_[i].name);
     double& value = *std::get<double*>(option.target);
     value = owner ? value + theta(i) : theta(i);
-    const Range range = UncertainRange(option);
+    const Range range = FitRange(option);
     value = std::clamp(value, range.low, range.high);
   }
   return twin;
