@@ -363,6 +363,8 @@ class Run(ProgramTest):
         self.refuse([*run, "--control-period", 0.0012], "--hz: expected 834 or more", "got 500")
         self.refuse(["run", "sac", *run[2:], "--control-period", 0.01],
                     "--control-period: expected 0.02 s", "got 0.01")
+        self.refuse(["run", "sac", "--link", "cloudpendulum", "--control-period", 0.02],
+                    "--control-period: expected 0.00", "the control period of sac on this machine, got 0.02")
 
     def test_limits(self):
         done = self.run_here("run", "mpc", "--link", TWIN, "--max-velocity", 2)

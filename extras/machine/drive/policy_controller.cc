@@ -72,14 +72,23 @@ MachinePolicy GetMachinePolicy(PolicyArguments a, const std::string& robot,
     a.plant = WithoutDryFriction(twin->plant);
     if (asked) a.plant->actuated_joint = static_cast<int>(*asked);
     if (IsController(a.name) && a.control_period == 0 && hz > 0) {
-      const double period = kControlPeriod * TaskScaleOf(*a.plant).time;
-      const double cycles = std::max(1.0, std::round(period * static_cast<double>(hz)));
+      const double usual = kControlPeriod * TaskScaleOf(*a.plant).time;
+      const double cycles = std::max(1.0, std::round(usual * static_cast<double>(hz)));
       a.control_period = cycles / static_cast<double>(hz);
     }
   }
+  const double asked_period = IsController(a.name) ? 0 : std::exchange(a.control_period, 0);
   LoadedPolicy loaded = GetPolicy(a);
   ExpectPendulum(loaded);
   if (twin) loaded = ForOtherSize(loaded, *a.plant).value_or(loaded);
+  constexpr double kSamePeriod = 1e-3;  // relative; natural periods have many digits
+  const double period = loaded.control_period();
+  if (asked_period > 0 && std::abs(asked_period - period) > kSamePeriod * period) {
+    throw BadInput(fmt::format(
+        "--control-period: expected {:.6g} s, the control period of {}{}, got {}", period,
+        Printable(loaded.name), loaded.carried_over == Scale() ? "" : " on this machine",
+        FormatNumber(asked_period)));
+  }
   auto policy = std::make_shared<const LoadedPolicy>(std::move(loaded));
   const Robot own = RobotOf(*policy);
   if (own == asked.value_or(own)) return policy;
