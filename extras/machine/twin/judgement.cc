@@ -253,6 +253,11 @@ std::string SentenceOf(const Judgement& j) {
   const std::string error = fmt::format("{:.2g} rad over {:.2g} s", j.error, j.seconds);
   const std::string times = fmt::format("{:.2g} times the encoders' noise", j.times_noise);
   const std::string share = fmt::format("{:.2g}% of the motion", 100 * j.share);
+  constexpr double kWithoutNoise = 1e4;  // times: the logs of a simulation
+  if (j.explains() && j.times_noise > kWithoutNoise) {
+    return fmt::format("the model explains {} to {}: {}; the angles have no noise", j.logs, share,
+                       error);
+  }
   switch (j.explanation) {
     case Explanation::kToNoise:
       return fmt::format("the model explains {} to the encoders' noise: {}", j.logs, error);
