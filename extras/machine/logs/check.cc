@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <iterator>
 #include <set>
 #include <system_error>
@@ -12,6 +14,7 @@
 #include "base/json.h"
 #include "base/sample.h"
 #include "base/text.h"
+#include "extras/machine/logs/smooth_motion.h"
 
 namespace upswing::machine {
 namespace {
@@ -59,6 +62,75 @@ void CheckClockUnit(double usual, const Reporter& report) {
   report(Severity::kFault, text);
 }
 
+/// Whether a clock counts rows instead of measuring them: nearly all cycles are equal.
+bool IsNominal(const std::vector<Cycle>& cycles, double usual) {
+  constexpr double kEqual = 1e-3, kMost = 0.99;  // of a cycle, share of the cycles
+  const auto equal = std::ranges::count_if(
+      cycles, [&](const Cycle& cycle) { return std::abs(cycle.seconds - usual) < kEqual * usual; });
+  return static_cast<double>(equal) > kMost * static_cast<double>(cycles.size());
+}
+
+/// Steps of an angle between rows, compared with the steps around them.
+struct Step {
+  double usual;    // mean of the step before and the one after, rad
+  double changes;  // by which these two differ, rad
+  double more;     // by which the step is longer than the usual one, rad
+
+  /// Whether the step is that of two cycles between those of one.
+  bool IsDouble() const {
+    constexpr double kNear = 0.35;
+    return std::abs(more / usual - 1) < kNear && std::abs(changes / usual) < kNear;
+  }
+};
+
+/// The steps of a joint's angle to the rows 2 to rows - 2 of all pieces.
+std::vector<Step> StepsOf(Pieces pieces, int joint) {
+  std::vector<Step> steps;
+  for (const MachineLog& log : pieces) {
+    const auto step = [&](int k) { return log.angle[k][joint] - log.angle[k - 1][joint]; };
+    for (int k = 2; k + 1 < log.rows(); ++k) {
+      const double usual = (step(k - 1) + step(k + 1)) / 2;
+      steps.push_back({usual, step(k + 1) - step(k - 1), step(k) - usual});
+    }
+  }
+  return steps;
+}
+
+/// Reports rows that are lost without a trace in the clock: both joints then move twice as far.
+void CheckLostRows(Pieces pieces, const Reporter& report) {
+  constexpr double kClear = 8;                 // standard deviations of a step without a loss
+  constexpr double kOverEncoder = 6;           // steps of the encoder
+  constexpr double kNormal = 0.6745;           // median of the size of a normal number
+  constexpr double kMuch = 2e-3, kFewest = 5;  // share of the clear steps, rows
+  const std::array steps{StepsOf(pieces, 0), StepsOf(pieces, 1)};
+  Joints least{};  // clear steps, rad
+  for (const int joint : {0, 1}) {
+    std::vector<double> sizes;
+    for (const Step& step : steps[joint]) sizes.push_back(std::abs(step.more));
+    if (sizes.empty()) return;
+    least[joint] = std::max(kClear * QuartilesOf(std::move(sizes)).median / kNormal,
+                            kOverEncoder * RoughnessOf(pieces, joint));
+  }
+  double clear = 0, lost = 0;
+  for (size_t k = 0; k < steps[0].size(); ++k) {
+    bool is_clear = false, is_double = true;
+    for (const int joint : {0, 1}) {
+      const Step& step = steps[joint][k];
+      if (!(std::abs(step.usual) > least[joint])) continue;
+      is_clear = true;
+      is_double = is_double && step.IsDouble();
+    }
+    clear += is_clear;
+    lost += is_clear && is_double;
+  }
+  if (lost < kFewest || lost < kMuch * clear) return;
+  report(Severity::kFault,
+         fmt::format("about {:.2g}% of the rows are lost, but the clock counts on: write the time "
+                     "of each row",
+                     100 * lost / (lost + clear)),
+         {}, {{"lost_share", lost / (lost + clear)}});
+}
+
 /// Cycles that are longer count as gaps, s.
 double GapOf(double usual) { return std::max(0.05, 20 * usual); }
 
@@ -100,17 +172,24 @@ void CheckLostCycles(const std::vector<Cycle>& cycles, double usual, const Repor
          RangeOf(*longest), {{"lost", lost}, {"places", places}});
 }
 
-void CheckGaps(const std::vector<Cycle>& cycles, double usual, const Reporter& report) {
-  constexpr int kMostGaps = 10;  // with a line each
+/// Reports gaps. A model of the motion leaves them out, but after a long one little is left.
+void CheckGaps(const std::vector<Cycle>& cycles, double usual, double own_time,
+               const Reporter& report) {
+  constexpr int kMostGaps = 10;                 // with a line each
+  constexpr double kLong = 4, kUnknown = 0.25;  // own times of the motion; s, without motion
+  const double fault = kLong * (own_time > 0 ? own_time : kUnknown);
+  const auto severity = [&](double seconds) {
+    return seconds > fault ? Severity::kFault : Severity::kWarning;
+  };
   int gaps = 0;
   for (const Cycle& cycle : cycles) {
     if (cycle.seconds <= GapOf(usual)) continue;
     ++gaps;
     if (gaps > kMostGaps) continue;
-    report(Severity::kFault, fmt::format("a gap of {:.4g} s", cycle.seconds), RangeOf(cycle),
+    report(severity(cycle.seconds), fmt::format("a gap of {:.4g} s", cycle.seconds), RangeOf(cycle),
            {{"gap", cycle.seconds}});
   }
-  if (gaps > kMostGaps) report(Severity::kFault, Counted(gaps - kMostGaps, "more gap"));
+  if (gaps > kMostGaps) report(Severity::kWarning, Counted(gaps - kMostGaps, "more gap"));
 }
 
 }  // namespace
@@ -165,7 +244,8 @@ void CheckClock(Pieces pieces, Findings& findings) {
   CheckClockUnit(usual, report);
   CheckStandingClock(cycles, report);
   CheckLostCycles(cycles, usual, report);
-  CheckGaps(cycles, usual, report);
+  if (IsNominal(cycles, usual)) CheckLostRows(pieces, report);
+  CheckGaps(cycles, usual, OwnTime(pieces), report);
 }
 
 bool LogCheck::faulty() const {

@@ -133,6 +133,11 @@ std::vector<double> ValuesOf(Pieces pieces, std::vector<Joints> MachineLog::*qua
 /// Range of a joint's angle over all pieces: largest minus smallest, rad.
 double AngleRange(Pieces pieces, int joint);
 
+/// How rough a joint's angle is, rad: the median of its second differences that are not 0. Of an
+/// encoder it is about its step, of angles that are printed with few digits at least the last
+/// digit.
+double RoughnessOf(Pieces pieces, int joint);
+
 /// Step of a joint's encoder, rad: the smallest distance of two values. Nothing if other distances
 /// are not multiples of it.
 std::optional<double> QuantumOf(Pieces pieces, int joint);

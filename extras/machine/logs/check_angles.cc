@@ -7,6 +7,7 @@
 
 #include "base/sample.h"
 #include "extras/machine/logs/check.h"
+#include "extras/machine/logs/smooth_motion.h"
 
 namespace upswing::machine {
 namespace {
@@ -37,10 +38,12 @@ bool IsSameReading(const MachineLog& log, int k) {
          !(log.velocity.empty() && log.measured.empty());
 }
 
-/// All repeats of at least five readings.
+/// All repeats of at least five readings that are long enough to mislead a model of the motion.
 std::vector<Repeat> RepeatsOf(Pieces pieces, int joint) {
   constexpr int kReadings = 5;
+  constexpr double kLong = 0.1;  // of the own time of the motion
   const double cycle = UsualCycle(pieces);
+  const double least = kLong * OwnTime(pieces);
   std::vector<Repeat> repeats;
   for (const MachineLog& piece : pieces) {
     const auto difference = [&](int k) { return SpeedTo(piece, joint, k, cycle); };
@@ -50,7 +53,7 @@ std::vector<Repeat> RepeatsOf(Pieces pieces, int joint) {
         ++last;
         if (!IsSameReading(piece, last)) ++readings;
       }
-      if (readings >= kReadings) {
+      if (readings >= kReadings && piece.time[last] - piece.time[first] >= least) {
         constexpr double kJump = 2.5;  // cycles of the motion that follows
         // The change of speed may fall into two cycles.
         repeats.push_back(
@@ -74,7 +77,8 @@ bool IsSudden(const Repeat& repeat, double quantum) {
 }
 
 /// Finds repeats within motion: at the end of the range the encoder saturates, elsewhere it sticks.
-void CheckRepeats(Pieces pieces, int joint, double quantum, const Reporter& report) {
+void CheckRepeats(Pieces pieces, int joint, const Reporter& report) {
+  const double quantum = RoughnessOf(pieces, joint);
   const auto [low, high] = std::ranges::minmax(ValuesOf(pieces, &MachineLog::angle, joint));
   constexpr double kPi = std::numbers::pi;
   /// Repeats of one cause.
@@ -139,7 +143,9 @@ std::vector<Jump> JumpsOf(Pieces pieces, int joint) {
     for (int k = 1; k < log.rows(); ++k) {
       const double seconds = log.time[k] - log.time[k - 1];
       const double size = log.angle[k][joint] - log.angle[k - 1][joint];
-      if (std::abs(size) < kLeast || seconds > 5 * cycle) continue;
+      // The speed before a row that follows a gap is not known.
+      const bool after_gap = k >= 2 && log.time[k - 1] - log.time[k - 2] > 5 * cycle;
+      if (std::abs(size) < kLeast || seconds > 5 * cycle || after_gap) continue;
       const double speed_before = SpeedFrom(log, joint, k - 3);
       const double speed_after = SpeedFrom(log, joint, k + 1);
       const double speed = std::max(speed_before, speed_after);
@@ -194,7 +200,7 @@ void CheckJumps(Pieces pieces, int joint, const Reporter& report) {
   });
 }
 
-/// Reports speeds that no pendulum reaches.
+/// Reports speeds that no pendulum reaches: it would turn round several times within a swing.
 void CheckSpeeds(Pieces pieces, int joint, const Reporter& report) {
   std::vector<double> speeds;
   for (const MachineLog& piece : pieces) {
@@ -204,15 +210,28 @@ void CheckSpeeds(Pieces pieces, int joint, const Reporter& report) {
   }
   if (speeds.empty()) return;
   std::ranges::sort(speeds);
-  constexpr double kFast = 60;  // rad/s
+  constexpr double kFast = 25;  // rad in the time of a swing's radian
   const double speed = Quantile(speeds, 0.99);
-  if (speed <= kFast) return;
+  if (speed * OwnTime(pieces) <= kFast) return;
   report(Severity::kFault,
          fmt::format("moves at {:.4g} rad/s: suspect degrees or counts (key unit)", speed), {},
          {{"speed", speed}});
 }
 
 }  // namespace
+
+double RoughnessOf(Pieces pieces, int joint) {
+  constexpr double kRounding = 1e-9;  // rad
+  std::vector<double> bends;
+  for (const MachineLog& piece : pieces) {
+    for (int k = 1; k + 1 < piece.rows(); ++k) {
+      const double bend = std::abs(piece.angle[k + 1][joint] - 2 * piece.angle[k][joint] +
+                                   piece.angle[k - 1][joint]);
+      if (bend > kRounding) bends.push_back(bend);
+    }
+  }
+  return bends.empty() ? 0 : QuartilesOf(std::move(bends)).median;
+}
 
 std::optional<double> QuantumOf(Pieces pieces, int joint) {
   std::vector<double> values = ValuesOf(pieces, &MachineLog::angle, joint);
@@ -246,7 +265,7 @@ void CheckAngles(Pieces pieces, Findings& findings) {
                          2 * std::numbers::pi / *quantum),
              {}, {{"quantum", *quantum}});
     }
-    CheckRepeats(pieces, joint, quantum.value_or(0), report);
+    CheckRepeats(pieces, joint, report);
     CheckJumps(pieces, joint, report);
     CheckSpeeds(pieces, joint, report);
   }

@@ -38,7 +38,19 @@ MachineLog GoodLog() {
 }
 
 /// The findings about a log.
-Findings Check(const MachineLog& log) { return CheckLog("log.csv", std::span(&log, 1)).findings; }
+Findings CheckAll(const MachineLog& log) {
+  return CheckLog("log.csv", std::span(&log, 1)).findings;
+}
+
+/// The same without those of the equations of motion: the smooth motion of GoodLog is none of a
+/// pendulum.
+Findings Check(const MachineLog& log) {
+  Findings findings = CheckAll(log);
+  std::erase_if(findings, [](const Finding& finding) {
+    return !finding.numbers.empty() && finding.numbers.front().first == "unexplained";
+  });
+  return findings;
+}
 
 /// A number of a finding by its name; -1 if it has none.
 double NumberOf(const Finding& finding, const std::string& name) {
@@ -98,7 +110,7 @@ TEST(MachineCheck, DelayLagAndGainOfTheTorque) {
   const Findings found = Check(log);
   EXPECT_EQ(found[3].text,
             "measured follows commanded after 3 rows and a lag of 5 ms, gain 0.80, correlation "
-            "1.000");
+            "1.000: the motors give another torque than commanded (key factor of commanded)");
 }
 
 TEST(MachineCheck, LostCyclesAndGaps) {
@@ -111,7 +123,7 @@ TEST(MachineCheck, LostCyclesAndGaps) {
   MachineLog log = GoodLog();
   skip(3)(log);
   EXPECT_EQ(Check(log)[1].text, "3 cycles (0.06%) lost at 1 place, longest 8 ms");
-  const Finding gap = OnlyFinding(skip(100), "a gap of 0.202 s");
+  const Finding gap = OnlyFinding(skip(100), "a gap of 0.202 s", Severity::kWarning);
   ASSERT_TRUE(gap.rows);
   EXPECT_EQ(gap.rows->first, 1000);  // rows count from 1
   EXPECT_EQ(gap.rows->last, 1001);
@@ -128,7 +140,7 @@ TEST(MachineCheck, ManyGapsGetALineTogether) {
   MachineLog log = GoodLog();
   for (int k = 0; k < log.rows(); ++k) log.time[k] += k / 200 / 2.0;  // 24 gaps
   const Findings found = Check(log);
-  EXPECT_EQ(std::ranges::count(found, Severity::kFault, &Finding::severity), 11);
+  EXPECT_EQ(std::ranges::count(found, Severity::kWarning, &Finding::severity), 11);
   EXPECT_TRUE(std::ranges::count(found, "14 more gaps", &Finding::text) == 1);
 }
 
@@ -214,7 +226,7 @@ TEST(MachineCheck, UnitsAndSignOfTorques) {
         log.measured.clear();
         Times(&MachineLog::commanded, 1, 1000)(log);
       },
-      "suspect mN·m");
+      "suspect mN·m if", Severity::kWarning);
 }
 
 TEST(MachineCheck, AmperesCommandsWithinOneAndSwappedTorques) {
@@ -336,30 +348,6 @@ TEST(MachineCheck, MotionThatGrowsWithoutTorque) {
       "the log has no torque", Severity::kWarning);
 }
 
-TEST(MachineCheck, PiecesAreNotJoined) {
-  const MachineLog whole = GoodLog();
-  std::vector<MachineLog> pieces(2, whole);
-  pieces[1].first_row = 5001;
-  const LogCheck check = CheckLog("two.csv", pieces);
-  EXPECT_EQ(check.rows, 10000);
-  EXPECT_NEAR(check.seconds, 2 * 9.998, 1e-9);
-  EXPECT_FALSE(check.faulty());
-  for (const Finding& f : check.findings) EXPECT_EQ(f.severity, Severity::kNote) << f.text;
-  for (int k = 1000; k < 5000; ++k) pieces[1].time[k] += 0.3;
-  const LogCheck gap = CheckLog("two.csv", pieces);
-  EXPECT_TRUE(gap.faulty());
-  const auto json = nlohmann::json::parse(CheckJson(std::span(&gap, 1)));
-  const auto& log = json["logs"][0];
-  EXPECT_EQ(log["pieces"], 2);
-  EXPECT_EQ(log["faulty"], true);
-  const auto& findings = log["findings"];
-  const auto fault = std::ranges::find_if(
-      findings, [](const auto& finding) { return finding["severity"] == "fault"; });
-  ASSERT_NE(fault, findings.end());
-  EXPECT_EQ((*fault)["rows"], (std::vector<int>{6000, 6001}));
-  EXPECT_EQ((*fault)["aspect"], "clock");
-}
-
 /// A log of a pendulum's equations of motion from a start, with torques at joint 1.
 MachineLog Simulated(const PendulumState& start, const std::function<double(double)>& torque,
                      double seconds, const Plant& of = {}) {
@@ -385,7 +373,7 @@ TEST(MachineCheck, SignsByTheEquationsOfMotion) {
     MachineLog log = Simulated({}, push, 10);
     for (Joints& q : log.angle) q = {angle1 * q[0], angle2 * q[1]};
     for (Joints& u : log.commanded) u[0] *= torque;
-    Findings found = Check(log);
+    Findings found = CheckAll(log);
     std::erase_if(found, [](const Finding& f) { return f.severity == Severity::kNote; });
     return found;
   };
@@ -401,7 +389,7 @@ TEST(MachineCheck, SignsByTheEquationsOfMotion) {
 /// The faults of a log by their aspects and joints.
 std::string FaultsOf(const MachineLog& log) {
   std::string faults;
-  for (const Finding& f : Check(log)) {
+  for (const Finding& f : CheckAll(log)) {
     if (f.severity == Severity::kFault) faults += AboutText(f) + ": " + f.text + "\n";
   }
   return faults;
@@ -424,8 +412,8 @@ TEST(MachineCheck, TheEquationsOfMotionNameEachChangeOfTheColumns) {
     }
   };
   expect([](Joints& q, Joints&) { q[0] += kPi; }, {"angle 1: suspect another zero"});
-  expect([](Joints& q, Joints&) { q[0] += 0.8; }, {"angle 1: suspect another zero, 0.7"});
-  expect([](Joints& q, Joints&) { q[1] -= 1; }, {"angle 2: suspect another zero, -0.9"});
+  expect([](Joints& q, Joints&) { q[0] += 0.8; }, {"angle 1: suspect another zero, 0.80"});
+  expect([](Joints& q, Joints&) { q[1] -= 1; }, {"angle 2: suspect another zero, -1.0"});
   expect([](Joints& q, Joints&) { q[1] += q[0]; },
          {"angle 2: suspect an angle against the vertical"});
   expect([](Joints& q, Joints&) { q[1] -= q[0]; }, {"angle 2: suspect an angle against link 1"});
@@ -486,6 +474,30 @@ TEST(MachineCheck, AMotorWithoutTorquesInTheLogIsAFault) {
 /// Torques at joint 1 that swing both links.
 double SwingTorque(double t) { return 3 * std::sin(3 * t) + 2 * std::sin(7 * t); }
 
+TEST(MachineCheck, PiecesAreNotJoined) {
+  MachineLog whole = Simulated({}, SwingTorque, 10);
+  std::vector<MachineLog> pieces(2, whole);
+  pieces[1].first_row = 5001;
+  const LogCheck check = CheckLog("two.csv", pieces);
+  EXPECT_EQ(check.rows, 10000);
+  EXPECT_NEAR(check.seconds, 2 * 9.998, 1e-9);
+  EXPECT_FALSE(check.faulty());
+  for (const Finding& f : check.findings) EXPECT_EQ(f.severity, Severity::kNote) << f.text;
+  for (int k = 1000; k < 5000; ++k) pieces[1].time[k] += 3;
+  const LogCheck gap = CheckLog("two.csv", pieces);
+  EXPECT_TRUE(gap.faulty());
+  const auto json = nlohmann::json::parse(CheckJson(std::span(&gap, 1)));
+  const auto& log = json["logs"][0];
+  EXPECT_EQ(log["pieces"], 2);
+  EXPECT_EQ(log["faulty"], true);
+  const auto& findings = log["findings"];
+  const auto fault = std::ranges::find_if(
+      findings, [](const auto& finding) { return finding["severity"] == "fault"; });
+  ASSERT_NE(fault, findings.end());
+  EXPECT_EQ((*fault)["rows"], (std::vector<int>{6000, 6001}));
+  EXPECT_EQ((*fault)["aspect"], "clock");
+}
+
 /// Each `stride`-th row of a log, with angles in steps of an encoder.
 MachineLog Sampled(const MachineLog& log, int stride, double counts) {
   const double step = 2 * std::numbers::pi / counts;
@@ -494,9 +506,138 @@ MachineLog Sampled(const MachineLog& log, int stride, double counts) {
     const Joints& q = log.angle[k];
     sampled.time.push_back(log.time[k]);
     sampled.angle.push_back({step * std::round(q[0] / step), step * std::round(q[1] / step)});
-    sampled.commanded.push_back(log.commanded[k]);
+    if (!log.commanded.empty()) sampled.commanded.push_back(log.commanded[k]);
   }
   return sampled;
+}
+
+/// A log of 30 swings of a machine like the default plant, of another size, driven at joint 1. The
+/// masses grow with the cube of the length. `torque` changes the command at a share of the log.
+MachineLog OfSize(double length, const std::function<double(double u, double share)>& torque,
+                  double seconds = 8) {
+  const double mass = std::pow(length, 3), time = std::sqrt(length);
+  const double unit = mass * length;  // of a torque
+  Plant plant;
+  plant.mass1 *= mass;
+  plant.mass2 *= mass;
+  plant.length1 *= length;
+  plant.length2 *= length;
+  plant.damping1 *= unit * time;
+  plant.damping2 *= unit * time;
+  plant.armature *= unit * time * time;
+  const Manipulator m = ManipulatorOf(plant);
+  MachineLog log;
+  PendulumState x;
+  const double h = 0.002 * time;
+  for (int k = 0; k < seconds * 500; ++k) {
+    const double t = 0.002 * k, u = unit * SwingTorque(t);
+    log.time.push_back(k * h);
+    log.angle.push_back({x.q1, x.q2});
+    log.commanded.push_back({u, 0});
+    // The command of a row is sent while the angles of the next one are read.
+    const double before = k > 1 ? log.commanded[k - 2][0] : 0;
+    const double acts = unit * torque(before / unit, t / seconds);
+    const auto acceleration = [&](const PendulumState& s, double) {
+      return m.Acceleration(s, {acts, 0});
+    };
+    x = RungeKuttaStep(x, acceleration(x, 0), h, acceleration);
+  }
+  return log;
+}
+
+double AsCommanded(double u, double) { return u; }
+
+TEST(MachineCheck, AGoodLogHasNoFaultWhateverItsSizeRateEncoderAndDigits) {
+  for (const double length : {0.1, 4.0}) {
+    const MachineLog exact = OfSize(length, AsCommanded);
+    for (const int stride : {1, 10}) {
+      for (const double counts : {512, 2400, 65536}) {
+        for (const int digits : {3, 9}) {
+          MachineLog log = Sampled(exact, stride, counts);
+          const double unit = std::pow(10, -digits);
+          for (Joints& q : log.angle) {
+            q = {unit * std::round(q[0] / unit), unit * std::round(q[1] / unit)};
+          }
+          EXPECT_EQ(FaultsOf(log), "") << length << " times, every " << stride << "th row, "
+                                       << counts << " counts, " << digits << " digits";
+        }
+      }
+    }
+  }
+}
+
+TEST(MachineCheck, FaultsOfTheWiringAreNamedForEachSize) {
+  using Change = std::function<void(MachineLog&)>;
+  const auto each = [](const std::function<void(Joints & q, double share)>& change) {
+    return [change](MachineLog& log) {
+      for (int k = 0; k < log.rows(); ++k) change(log.angle[k], k / double(log.rows()));
+    };
+  };
+  // Shifts a column by rows: the values come later.
+  const auto delay = [](std::vector<Joints> MachineLog::*column, int joint, int rows) {
+    return [=](MachineLog& log) {
+      for (int k = log.rows() - 1; k >= 0; --k) {
+        (log.*column)[k][joint] = (log.*column)[std::max(0, k - rows)][joint];
+      }
+    };
+  };
+  struct Fault {
+    const char* text;
+    Change change;
+    std::function<double(double u, double share)> torque = AsCommanded;
+  };
+  const std::vector<Fault> faults{
+      {"angle 2: suspect an angle of 2 times the true one",
+       each([](Joints& q, double) { q[1] *= 2; })},
+      {"angle 1: suspect an angle of 2 times the true one",
+       each([](Joints& q, double) { q[0] *= 2; })},
+      {"angle 2: suspect an angle of 0.5 times the true one",
+       each([](Joints& q, double) { q[1] /= 2; })},
+      {"angle 2: suspect an angle of 3 times the true one",
+       each([](Joints& q, double) { q[1] *= 3; })},
+      {"angle 2: suspect an angle of 0.898", each([](Joints& q, double) { q[1] *= 0.9; })},
+      {"angle 2: suspect angles that are", delay(&MachineLog::angle, 1, 12)},
+      {"later than they act", delay(&MachineLog::commanded, 0, 30)},
+      {"angle 2: suspect an encoder that slips",
+       each([](Joints& q, double share) { q[1] += share > 0.55 ? 0.1 : 0; })},
+      {"angle 2: suspect an encoder that drifts",
+       each([](Joints& q, double share) { q[1] += 0.4 * share; })},
+      {"torque 1: suspect an offset", [](MachineLog&) {}, [](double u, double) { return u + 0.4; }},
+      {"motors that saturate near", [](MachineLog&) {},
+       [](double u, double) { return std::clamp(u, -1.6, 1.6); }},
+      {"a dead band", [](MachineLog&) {},
+       [](double u, double) { return std::copysign(std::max(0.0, std::abs(u) - 1.5), u); }},
+      {"a sign that turns near", [](MachineLog&) {},
+       [](double u, double share) { return share > 0.5 ? -u : u; }},
+      {"rows are lost, but the clock counts on", [](MachineLog& log) {
+         const MachineLog all = log;
+         Rng rng(7, "lost rows");
+         log.angle.clear();
+         log.commanded.clear();
+         for (int k = 0; k < all.rows(); ++k) {
+           if (rng.Uniform() < 0.1) continue;
+           log.angle.push_back(all.angle[k]);
+           log.commanded.push_back(all.commanded[k]);
+         }
+         log.time.resize(log.angle.size());
+       }}};
+  for (const double length : {0.1, 4.0}) {
+    for (const Fault& fault : faults) {
+      MachineLog log = Sampled(OfSize(length, fault.torque), 1, 8192);
+      fault.change(log);
+      const std::string found = FaultsOf(log);
+      EXPECT_NE(found.find(fault.text), std::string::npos)
+          << length << " times, " << fault.text << ":\n"
+          << found;
+    }
+  }
+}
+
+TEST(MachineCheck, MotorsThatAreOffHaveNoEffect) {
+  MachineLog log = Simulated(
+      {1.5, -0.5, 0, 0}, [](double) { return 0; }, 8);
+  for (int k = 0; k < log.rows(); ++k) log.commanded[k] = {SwingTorque(log.time[k]), 0};
+  EXPECT_NE(FaultsOf(log).find("no effect on the motion"), std::string::npos) << FaultsOf(log);
 }
 
 /// The first row after `time` (s) at which a joint turns round: an encoder that sticks from there
@@ -746,21 +887,39 @@ TEST(MachineCheck, TheMeasuredDataHaveNoFaults) {
   const auto real = RealData();
   if (real.empty()) GTEST_SKIP() << "no measured data in UPSWING_REAL or ../shared/real";
   int logs = 0;
-  for (const char* folder : {"C.1/sysid", "C.1/swingup", "C.1/pushed", "A.0/free_decay"}) {
+  for (const char* folder :
+       {"C.1/sysid", "C.1/swingup", "C.1/pushed", "A.0/free_decay", "cloudpendulum"}) {
     for (const auto& entry : std::filesystem::directory_iterator(real / folder)) {
-      const auto pieces = ReadLog(entry.path());
+      if (entry.path().extension() != ".gz") continue;
+      auto pieces = ReadLog(entry.path());
       const LogCheck check = CheckLog(entry.path(), pieces);
       for (const Finding& f : check.findings) {
         EXPECT_NE(f.severity, Severity::kFault) << entry.path() << ": " << f.text;
         // In this log dry friction holds joint 2, the only such log.
-        EXPECT_EQ(f.aspect == Aspect::kMotion,
-                  entry.path().stem() == "20230629-143906.csv" && f.aspect == Aspect::kMotion)
-            << entry.path() << ": " << f.text;
+        if (f.aspect != Aspect::kMotion || f.severity == Severity::kNote) continue;
+        EXPECT_EQ(entry.path().stem(), "20230629-143906.csv") << f.text;
       }
       ++logs;
     }
   }
-  EXPECT_EQ(logs, 45);
+  EXPECT_EQ(logs, 49);
+}
+
+TEST(MachineCheck, MeasuredLogsOfCoarseEncodersHaveNoFaults) {
+  const auto real = RealData();
+  if (real.empty()) GTEST_SKIP() << "no measured data in UPSWING_REAL or ../shared/real";
+  for (const char* file : {"C.1/sysid/20230629-143339.csv.gz", "C.1/sysid/20230629-143704.csv.gz",
+                           "cloudpendulum/FreeFall_02.csv.gz"}) {
+    const MachineLog exact = ReadLog(real / file).front();
+    for (const double counts : {512, 1024, 2400}) {
+      EXPECT_EQ(FaultsOf(Sampled(exact, 1, counts)), "") << file << ", " << counts << " counts";
+    }
+    MachineLog printed = exact;
+    printed.velocity.clear();
+    for (Joints& q : printed.angle)
+      q = {std::round(1e4 * q[0]) / 1e4, std::round(1e4 * q[1]) / 1e4};
+    EXPECT_EQ(FaultsOf(printed), "") << file << ", 4 digits";
+  }
 }
 
 }  // namespace

@@ -1,0 +1,356 @@
+#include "extras/machine/logs/weak_form.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "base/sample.h"
+#include "extras/machine/logs/check.h"
+#include "pendulum/regressor.h"
+
+namespace upswing::machine {
+namespace {
+
+// Times in natural times of the machine.
+constexpr double kBlock = 0.08;        // of a knot
+constexpr double kWindowLength = 1.6;  // of a window
+constexpr double kLongestGap = 0.5;    // between knots of a window
+constexpr double kFrictionTime = 10;   // velocity of dry friction, in its tanh(time · velocity)
+constexpr double kTurnOfBlock = 0.25;  // largest angle between two knots, rad
+constexpr int kMostWindows = 400;      // more would only take longer
+constexpr int kPointsOfBlock = 3;
+
+/// Torques of a row after a reading, N·m. `place`: of the row in the log, from 0 to 1.
+Joints Read(const TorqueReading& reading, const Joints& torque, double place) {
+  Joints read{};
+  const double flip = reading.flips_at >= 0 && place > reading.flips_at ? -1 : 1;
+  for (const int j : {0, 1}) {
+    double u = flip * reading.sign[j] * torque[reading.swapped ? 1 - j : j];
+    if (reading.largest > 0) u = std::clamp(u, -reading.largest, reading.largest);
+    if (reading.dead_band > 0) u = std::copysign(std::max(0.0, std::abs(u) - reading.dead_band), u);
+    read[j] = u;
+  }
+  return read;
+}
+
+/// Columns whose coefficients are not negative come first.
+constexpr int kNotNegative = weak::kZero1;
+
+/// Minimises ½ xᵀ gram x - targetᵀ x, where x is not negative but for the indices in `is_free`
+/// (Lawson and Hanson, "Solving Least Squares Problems", 1974, Chapter 23).
+Eigen::VectorXd SolveNotNegative(const Eigen::MatrixXd& gram, const Eigen::VectorXd& target,
+                                 const std::vector<bool>& is_free) {
+  const int n = static_cast<int>(target.size());
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(n);
+  std::vector<bool> active = is_free;
+  const auto solve = [&] {
+    std::vector<int> own;
+    for (int i = 0; i < n; ++i) {
+      if (active[i]) own.push_back(i);
+    }
+    Eigen::VectorXd solution = Eigen::VectorXd::Zero(n);
+    if (!own.empty()) solution(own) = gram(own, own).ldlt().solve(target(own)).eval();
+    return solution;
+  };
+  // The smallest step from x to `next` at which an active one reaches 0 ends it.
+  const auto take_back = [&](const Eigen::VectorXd& next) {
+    double share = 1;
+    for (int i = 0; i < n; ++i) {
+      if (active[i] && !is_free[i] && next(i) <= 0)
+        share = std::min(share, x(i) / (x(i) - next(i)));
+    }
+    x += share * (next - x);
+    for (int i = 0; i < n; ++i) {
+      if (active[i] && !is_free[i] && x(i) <= 1e-14) {
+        active[i] = false;
+        x(i) = 0;
+      }
+    }
+    return share < 1;
+  };
+  // Rounding errors of the gradient, of the sums in it.
+  constexpr double kRounding = 1e-12;
+  std::vector<bool> is_blocked(n, false);  // rounding errors would take it back at once
+  for (int round = 0; round < 3 * n; ++round) {
+    Eigen::VectorXd next = solve();
+    for (int inner = 0; inner < n && take_back(next); ++inner) next = solve();
+    const Eigen::VectorXd descent = target - gram * x;
+    const Eigen::VectorXd sums = target.cwiseAbs() + gram.cwiseAbs() * x.cwiseAbs();
+    int best = -1;
+    for (int i = 0; i < n; ++i) {
+      if (active[i] || is_blocked[i] || descent(i) <= kRounding * sums(i)) continue;
+      if (best < 0 || descent(i) > descent(best)) best = i;
+    }
+    if (best < 0) break;
+    active[best] = true;
+    if (solve()(best) <= 0) {
+      active[best] = false;
+      is_blocked[best] = true;
+    }
+  }
+  return x;
+}
+
+/// Products of the columns of both joints.
+struct Grams {
+  std::array<Eigen::MatrixXd, 2> of;
+};
+
+/// Finds the constants with the least unexplained share. The scale of the constants is arbitrary:
+/// the sum of the inertias, each by the size of its column, is fixed.
+WeakFit Solve(const Grams& grams, const std::vector<bool>& is_free, int windows) {
+  const int n = static_cast<int>(is_free.size());
+  Eigen::VectorXd size =
+      ((grams.of[0].diagonal() + grams.of[1].diagonal()) / (2 * windows)).cwiseSqrt();
+  for (int i = 0; i < n; ++i) {
+    if (!(size(i) > 0)) size(i) = 1;
+  }
+  const Eigen::MatrixXd scaling = size.cwiseInverse().asDiagonal();
+  std::array<Eigen::MatrixXd, 2> scaled;
+  for (const int row : {0, 1}) scaled[row] = scaling * grams.of[row] * scaling / windows;
+  Eigen::VectorXd target = Eigen::VectorXd::Zero(n);
+  for (const int i : {weak::kJ1, weak::kJ2, weak::kB}) target(i) = 1;
+  const auto square = [&](int row, const Eigen::VectorXd& x, int first, int last) {
+    const auto part = x.segment(first, last - first);
+    return std::max(0.0,
+                    part.dot(scaled[row].block(first, first, last - first, last - first) * part));
+  };
+  WeakFit fit;
+  Joints weight{1, 1};
+  constexpr int kRounds = 3;
+  for (int round = 0; round < kRounds; ++round) {
+    Eigen::MatrixXd gram = weight[0] * scaled[0] + weight[1] * scaled[1];
+    gram.diagonal().array() += 1e-12 * gram.trace() / n;
+    const Eigen::VectorXd x = SolveNotNegative(gram, target, is_free);
+    double least = 0;
+    Joints left{};
+    for (const int row : {0, 1}) {
+      left[row] = square(row, x, 0, n);
+      const double motion =
+          square(row, x, weak::kJ1, weak::kG1) + square(row, x, weak::kG1, weak::kD1);
+      fit.unexplained[row] = motion > 0 ? left[row] / motion : 1;
+      left[row] = std::max(left[row], 1e-9 * motion);
+      least = row == 0 ? left[row] : std::min(least, left[row]);
+    }
+    for (const int row : {0, 1}) weight[row] = left[row] > 0 ? least / left[row] : 1;
+    fit.constants = scaling * x;
+  }
+  return fit;
+}
+
+}  // namespace
+
+TorqueIntegral::TorqueIntegral(const MachineLog& log, const TorqueReading& reading)
+    : time_(log.time), integral_(log.time.size()) {
+  const double rows = std::max(1, log.rows() - 1);
+  const auto place = [&](int k) { return k / rows; };
+  const bool is_measured = HasTorque(log.measured, 0) || HasTorque(log.measured, 1);
+  for (int k = 1; k < log.rows(); ++k) {
+    const double h = log.time[k] - log.time[k - 1];
+    Joints mean{};
+    if (is_measured) {
+      const Joints a = Read(reading, log.measured[k - 1], place(k - 1));
+      const Joints b = Read(reading, log.measured[k], place(k));
+      mean = {(a[0] + b[0]) / 2, (a[1] + b[1]) / 2};
+    } else if (k >= 2) {  // the command of a row is sent while the angles of the next one are read
+      Joints sent = log.commanded.empty() ? Joints{} : log.commanded[k - 2];
+      sent = Read(reading, sent, place(k - 2));
+      const Joints push = log.push.empty() ? Joints{} : log.push[k - 2];
+      mean = {sent[0] + push[0], sent[1] + push[1]};
+    }
+    for (const int j : {0, 1}) integral_[k][j] = integral_[k - 1][j] + h * mean[j];
+  }
+}
+
+Joints TorqueIntegral::At(double time) const {
+  if (time <= time_.front()) return {};
+  if (time >= time_.back()) return integral_.back();
+  const auto k = std::ranges::upper_bound(time_, time) - time_.begin();
+  const double share = (time - time_[k - 1]) / (time_[k] - time_[k - 1]);
+  const Joints &a = integral_[k - 1], &b = integral_[k];
+  return {a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])};
+}
+
+WeakForm::WeakForm(std::span<const MachineLog> pieces, double time)
+    : pieces_(pieces), time_(time), length_(kWindowLength * time) {
+  // Fast turns need closer knots than slow ones.
+  std::vector<double> speeds;
+  for (const MachineLog& log : pieces) {
+    const SmoothMotion motion(log, kBlock * time);
+    if (motion.empty()) continue;
+    for (double t = motion.begin(); t < motion.end(); t += time) {
+      speeds.push_back(std::hypot(motion.At(0, t).velocity, motion.At(1, t).velocity));
+    }
+  }
+  if (speeds.empty()) return;
+  std::ranges::sort(speeds);
+  constexpr double kFast = 0.9;  // quantile
+  const double fast = Quantile(speeds, kFast);
+  const double block = std::min(kBlock * time, kTurnOfBlock / std::max(fast, 1e-9));
+  for (const MachineLog& log : pieces) motions_.emplace_back(log, block);
+  double spacing = 0;
+  for (const SmoothMotion& motion : motions_) spacing = std::max(spacing, motion.spacing());
+  step_ = std::min(spacing, kBlock * time) / kPointsOfBlock;
+  const int points = std::max(8, static_cast<int>(std::lround(length_ / step_)));
+  step_ = length_ / points;
+  weight_.resize(points + 1);
+  slope_.resize(points + 1);
+  for (int i = 0; i <= points; ++i) {  // φ = sin²(π x)
+    const double x = static_cast<double>(i) / points;
+    weight_(i) = std::pow(std::sin(std::numbers::pi * x), 2) * step_;
+    slope_(i) = std::numbers::pi / length_ * std::sin(2 * std::numbers::pi * x) * step_;
+  }
+  // Slower motion tells of friction only.
+  constexpr double kQuiet = 0.25;  // rad in a natural time, or share of the fast motion
+  FindWindows(std::min(kQuiet / time, kQuiet * fast));
+}
+
+std::vector<WeakForm::Sample> WeakForm::SamplesOf(int piece, double begin, double late) const {
+  const SmoothMotion& motion = motions_[piece];
+  std::vector<Sample> samples;
+  for (int i = 0; i < weight_.size(); ++i) {
+    const double t = begin + i * step_;
+    const auto first = motion.At(0, t), second = motion.At(1, t + late);
+    samples.push_back({{first.angle, second.angle}, {first.velocity, second.velocity}});
+  }
+  return samples;
+}
+
+void WeakForm::FindWindows(double quiet) {
+  double seconds = 0;
+  for (const SmoothMotion& motion : motions_) {
+    if (!motion.empty()) seconds += motion.end() - motion.begin();
+  }
+  const double hop = std::max(length_ / 2, seconds / kMostWindows);
+  for (int piece = 0; piece < static_cast<int>(motions_.size()); ++piece) {
+    const SmoothMotion& motion = motions_[piece];
+    if (motion.empty()) continue;
+    // A tenth of a natural time is left at both ends for angles that are late.
+    const double margin = 0.11 * time_;
+    for (double begin = motion.begin() + margin; begin + length_ + margin < motion.end();
+         begin += hop) {
+      const double gap = std::max(kLongestGap * time_, 3 * motion.spacing());
+      if (motion.HasGap(begin, begin + length_, gap)) continue;
+      Window window{piece, begin, SamplesOf(piece, begin, 0)};
+      double squares = 0;
+      for (const Sample& s : window.samples) squares += s.w[0] * s.w[0] + s.w[1] * s.w[1];
+      const double speed = std::sqrt(squares / static_cast<double>(window.samples.size()));
+      if (speed >= quiet) windows_.push_back(std::move(window));
+    }
+  }
+}
+
+void WeakForm::SetMotion(const AngleReading& reading, const Window& window, int row,
+                         WeakEquations& equations) const {
+  using namespace weak;
+  const std::vector<Sample> late = reading.late != 0
+                                       ? SamplesOf(window.piece, window.begin, reading.late)
+                                       : std::vector<Sample>();
+  const std::vector<Sample>& samples = reading.late != 0 ? late : window.samples;
+  std::array<Eigen::Matrix<double, kColumns, 1>, 2> sum;
+  for (auto& of_joint : sum) of_joint.setZero();
+  for (int i = 0; i < weight_.size(); ++i) {
+    Joints q = reading.Of(samples[i].q);
+    const Joints w = reading.Of(samples[i].w);
+    for (const int j : {0, 1}) q[j] += reading.zero[j];
+    const auto angles = dynamics::AnglesOf<double>({q[0], q[1]});
+    const auto& [s1, c1, s2, c2] = angles;
+    const auto plain = MomentumRegressorOf(angles, {w[0], w[1]});
+    const double phi = weight_(i), slope = slope_(i);
+    // ∫ φ (d/dt p + force) = ∫ φ force - φ' p
+    for (const int joint : {0, 1}) {
+      for (int c = 0; c < kNumManipulatorConstants; ++c) {
+        sum[joint](c) += phi * plain.force[joint][c] - slope * plain.momentum[joint][c];
+      }
+      sum[joint](kF1 + joint) += phi * std::tanh(kFrictionTime * time_ * w[joint]);
+    }
+    // Derivatives of gravity and coupling by the zeros of the angles.
+    const double c12 = c1 * c2 - s1 * s2;
+    sum[0](kZero1) += phi * c1;
+    for (const int joint : {0, 1}) sum[joint](kZero12) += phi * c12;
+    sum[0](kZeroB) += slope * s2 * (2 * w[0] + w[1]);
+    sum[1](kZeroB) += slope * s2 * w[0] + phi * c2 * w[0] * (w[0] + w[1]);
+  }
+  for (const int joint : {0, 1}) equations.A[joint].row(row) = sum[joint].transpose();
+}
+
+WeakEquations WeakForm::Equations(const AngleReading& angles, const TorqueReading& torques,
+                                  double delay) const {
+  WeakEquations equations;
+  for (const int joint : {0, 1}) equations.A[joint].setZero(windows(), weak::kColumns);
+  double seconds = 0;
+  std::vector<double> before;  // of each piece, s
+  for (const MachineLog& log : pieces_) {
+    before.push_back(seconds);
+    seconds += log.time.back();
+  }
+  equations.length = length_ / seconds;
+  for (int row = 0; row < windows(); ++row) {
+    const Window& window = windows_[row];
+    SetMotion(angles, window, row, equations);
+    equations.when.push_back((before[window.piece] + window.begin + length_ / 2) / seconds);
+  }
+  SetTorques(torques, delay, equations);
+  return equations;
+}
+
+void WeakForm::SetTorques(const TorqueReading& torques, double delay,
+                          WeakEquations& equations) const {
+  std::vector<TorqueIntegral> integrals;
+  for (const MachineLog& log : pieces_) integrals.emplace_back(log, torques);
+  for (int row = 0; row < windows(); ++row) {
+    const Window& window = windows_[row];
+    const TorqueIntegral& integral = integrals[window.piece];
+    Joints sum{};
+    Joints last = integral.At(window.begin - step_ / 2 - delay);
+    for (int i = 0; i < weight_.size(); ++i) {
+      const Joints now = integral.At(window.begin + (i + 0.5) * step_ - delay);
+      for (const int j : {0, 1}) sum[j] += weight_(i) / step_ * (now[j] - last[j]);
+      last = now;
+    }
+    equations.A[0](row, weak::kTorque1) = -sum[0];
+    equations.A[1](row, weak::kTorque2) = -sum[1];
+  }
+}
+
+double WeakFit::misfit() const {
+  constexpr double kLeast = 2e-6;
+  return std::log(std::max(unexplained[0], kLeast)) + std::log(std::max(unexplained[1], kLeast));
+}
+
+WeakFit Fit(const WeakEquations& equations, const std::array<Eigen::MatrixXd, 2>& free) {
+  const int more = static_cast<int>(free[0].cols());
+  Grams grams;
+  for (const int joint : {0, 1}) {
+    Eigen::MatrixXd all(equations.windows(), weak::kColumns + more);
+    all.leftCols(weak::kColumns) = equations.A[joint];
+    if (more > 0) all.rightCols(more) = free[joint];
+    grams.of[joint] = all.transpose() * all;
+  }
+  std::vector<bool> is_free(weak::kColumns + more, true);
+  std::fill_n(is_free.begin(), kNotNegative, false);
+  return Solve(grams, is_free, equations.windows());
+}
+
+WeakFit FitAnyZeroAndSign(const WeakEquations& equations) {
+  Grams grams;
+  for (const int joint : {0, 1}) {
+    grams.of[joint] = equations.A[joint].transpose() * equations.A[joint];
+  }
+  std::vector<bool> is_free(weak::kColumns, true);
+  std::fill_n(is_free.begin(), kNotNegative, false);
+  for (const int i : {weak::kB, weak::kG1, weak::kG2, weak::kTorque1, weak::kTorque2}) {
+    is_free[i] = true;
+  }
+  return Solve(grams, is_free, equations.windows());
+}
+
+double NaturalTimeOf(const Eigen::VectorXd& x) {
+  using namespace weak;
+  const double gravity = std::hypot(x(kG1), x(kZero1)) + std::hypot(x(kG2), x(kZero12));
+  const double inertia = x(kJ1) + x(kJ2) + 2 * std::hypot(x(kB), x(kZeroB));
+  return gravity > 0 ? std::sqrt(inertia / gravity) : 0;
+}
+
+}  // namespace upswing::machine
