@@ -19,10 +19,11 @@ constexpr double kRounding = 1e-6;
 
 /// The numbers of a twin that are not settings of its plant (extras/machine/twin/twin.h).
 constexpr std::array kOfMachine{
-    "delay",           "lag",     "passive_limit",  "current_delay",
-    "current_inertia", "quantum", "angle_range",    "torque_quantum",
-    "zero1",           "zero2",   "velocity_share", "velocity_dead_zone",
-    "period",          "jitter",  "late_share",     "late"};
+    "delay",           "lag",           "passive_limit",  "current_delay",
+    "current_inertia", "quantum",       "angle_range",    "torque_quantum",
+    "zero1",           "zero2",         "velocity_share", "velocity_dead_zone",
+    "period",          "jitter",        "late_share",     "late",
+    "torque_offset1",  "torque_offset2"};
 /// Its harmonics of cogging (extras/machine/twin/cogging.h). Each has a sine and a cosine at each
 /// joint.
 constexpr std::array kHarmonics{"pole_pairs", "slots",   "poles", "2_slots",

@@ -30,7 +30,7 @@ constexpr double kLongestUnseen = 0.4;     // time for which a motion is predict
 
 double Square(double x) { return x * x; }
 
-PendulumState StateOf(const Eigen::Matrix<double, 8, 1>& x) { return {x[0], x[1], x[2], x[3]}; }
+PendulumState StateOf(const Eigen::Matrix<double, 10, 1>& x) { return {x[0], x[1], x[2], x[3]}; }
 
 }  // namespace
 
@@ -46,7 +46,9 @@ Estimator::Estimator(const Twin& twin, double period, StateSource source)
   const Actuator& motor = twin.actuator;
   const Drive drive(motor.delay, motor.lag);
   const Scale scale = ScaleOverUsual(twin.plant);
-  model_.emplace(Model{BodyOf(twin), drive, drive, scale, motor.delay + motor.lag, 0});
+  const bool has_offset = CovarianceOf(twin, "torque_offset1", "torque_offset1") > 0 ||
+                          CovarianceOf(twin, "torque_offset2", "torque_offset2") > 0;
+  model_.emplace(Model{BodyOf(twin), drive, drive, scale, has_offset, motor.delay + motor.lag, 0});
   model_->hanging = -model_->body.At({}).energy;
   // The drives' memory grows now, not in the loop.
   const int kept = static_cast<int>(kMostKept * std::max(1.0, scale.time));
@@ -59,10 +61,17 @@ Estimator::Estimator(const Twin& twin, double period, StateSource source)
   Matrix& P = track_.P;
   x[kFriction] = model_->body.f1;
   x[kFriction + 1] = model_->body.f2;
+  x[kOffset] = motor.torque_offset1;
+  x[kOffset + 1] = motor.torque_offset2;
   shown_friction_ = friction();
-  constexpr std::array kNames{"zero1", "zero2", "coulomb1", "coulomb2"};
-  for (int i = 0; i < 4; ++i) {
-    for (int j = 0; j < 4; ++j) P(kZero + i, kZero + j) = CovarianceOf(twin, kNames[i], kNames[j]);
+  constexpr std::array kNames{"zero1",    "zero2",          "coulomb1",
+                              "coulomb2", "torque_offset1", "torque_offset2"};
+  constexpr int kUncertain = kStates - kZero;
+  static_assert(kNames.size() == kUncertain);
+  for (int i = 0; i < kUncertain; ++i) {
+    for (int j = 0; j < kUncertain; ++j) {
+      P(kZero + i, kZero + j) = CovarianceOf(twin, kNames[i], kNames[j]);
+    }
   }
 }
 
@@ -82,6 +91,7 @@ Estimator::Vector Estimator::Follow(const Drive& drive, Vector x, double begin,
   if (h <= 0) return x;
   body.f1 = x[kFriction];
   body.f2 = x[kFriction + 1];
+  body.offset = {x[kOffset], x[kOffset + 1]};
   body.cogging.SetZero({x[kZero], x[kZero + 1]});
   MotionIntegrator integrator(body, drive);
   MotionPoint point = integrator.Start(begin, StateOf(x));
@@ -125,9 +135,10 @@ void Estimator::Predict(Track& track, double seconds, double noise) const {
   const Scale& scale = model_->scale;
   Vector step = Vector::Constant(kStep);
   step.segment<2>(kVelocity) *= scale.velocity();
-  step.segment<2>(kFriction) *= scale.torque;
+  step.tail<kStates - kFriction>() *= scale.torque;
   for (int i = 0; i < kStates; ++i) {
     if (i / 2 == kZero / 2 && !model_->body.cogging.any()) continue;
+    if (i >= kOffset && !model_->has_offset) continue;
     Vector other = track.x;
     other[i] += step[i];
     F.col(i) = (Follow(drive, other, track.time, seconds) - next) / step[i];
@@ -156,7 +167,7 @@ Eigen::Vector2d Estimator::Correct(Track& track, const Joints& angle, const Enco
   const Eigen::Vector2d normalized =
       factor.matrixL().solve(innovation).cwiseMin(limit).cwiseMax(-limit);
   x += K * (factor.matrixL() * normalized);
-  x.tail<2>() = x.tail<2>().cwiseMax(0);  // friction never drives
+  x.segment<2>(kFriction) = x.segment<2>(kFriction).cwiseMax(0);  // friction never drives
   P -= K * H * P;
   P = (0.5 * (P + P.transpose())).eval();
   return normalized;
@@ -298,8 +309,8 @@ void Estimator::Update(double time, const TimedReading* reading) {
 }
 
 Joints Estimator::CompensationTorque(double share) const {
-  return {DryFriction(share * friction()[0], ahead_.w1),
-          DryFriction(share * friction()[1], ahead_.w2)};
+  return {DryFriction(share * friction()[0], ahead_.w1) - share * offset()[0],
+          DryFriction(share * friction()[1], ahead_.w2) - share * offset()[1]};
 }
 
 double Estimator::energy() const {

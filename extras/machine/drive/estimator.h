@@ -23,13 +23,14 @@ enum class StateSource { kTwin, kDifferences };
 /// Without a twin, velocities are low-passed differences of the angles (VelocityEstimate).
 ///
 /// With a twin, an extended Kalman filter follows the twin's motion under the sent torques:
-///   x = (q1, q2, w1, w2, z1, z2, f1, f2),   measured angles = (q1 + z1, q2 + z2)
-/// z are the encoders' zeros and f the dry friction, which differ from session to session. They
-/// begin at the twin's values. Those with a covariance are estimated: gravity and friction show in
-/// the motion. The model lacks pushes and static friction. While they may act, a larger noise of
-/// the velocities makes the filter follow the angles and change z and f little. Innovations that
-/// keep their sign show a push (whiteness test of Bar-Shalom, Li, and Kirubarajan, Estimation with
-/// Applications to Tracking and Navigation, 2001, 5.4). Outliers among the innovations are clipped.
+///   x = (q1, q2, w1, w2, z1, z2, f1, f2, o1, o2),   measured angles = (q1 + z1, q2 + z2)
+/// z are the encoders' zeros, f the dry friction and o the offsets of the torques, which differ
+/// from session to session. They begin at the twin's values. Values with a covariance are
+/// estimated: gravity and friction show in the motion. The model lacks pushes and static friction.
+/// While they may act, a larger noise of the velocities makes the filter follow the angles and
+/// change z, f and o little. Innovations that keep their sign show a push (whiteness test of
+/// Bar-Shalom, Li, and Kirubarajan, Estimation with Applications to Tracking and Navigation,
+/// 2001, 5.4). Outliers among the innovations are clipped.
 ///
 /// The prediction bridges lost readings. The controller gets the state at the time when its torque
 /// will act: when it is sent, and the motors' delay and their lag later.
@@ -71,25 +72,29 @@ class Estimator {
   Joints zero() const;
   /// The estimated dry friction f in f atan(100 w), N·m; 0 without a twin.
   Joints friction() const { return {track_.x[kFriction], track_.x[kFriction + 1]}; }
+  /// The estimated offsets of the torques, N·m; 0 without a twin.
+  Joints offset() const { return {track_.x[kOffset], track_.x[kOffset + 1]}; }
   const Expectation& expectation() const { return expectation_; }
-  /// The torques (N·m) that compensate a share of each joint's estimated dry friction, when they
-  /// act.
+  /// The torques (N·m) that compensate a share of each joint's estimated dry friction and offset,
+  /// when they act.
   Joints CompensationTorque(double share) const;
   /// Mechanical energy now, 0 hanging at rest and 1 upright at rest; 0 without a twin.
   double energy() const;
 
  private:
-  static constexpr int kAngle = 0, kVelocity = 2, kZero = 4, kFriction = 6, kStates = 8;
+  static constexpr int kAngle = 0, kVelocity = 2, kZero = 4, kFriction = 6, kOffset = 8,
+                       kStates = 10;
   using Vector = Eigen::Matrix<double, kStates, 1>;
   using Matrix = Eigen::Matrix<double, kStates, kStates>;
 
   struct Model {
     Body body;
     Drive drive;
-    Drive silent;    // the drive's torques until the response began
-    Scale scale;     // natural units of the twin over those of UsualPlant
-    double horizon;  // from sending a torque to its effect, s
-    double hanging;  // energy below upright of the links that hang, J
+    Drive silent;     // the drive's torques until the response began
+    Scale scale;      // natural units of the twin over those of UsualPlant
+    bool has_offset;  // whether an offset of the torques is uncertain
+    double horizon;   // from sending a torque to its effect, s
+    double hanging;   // energy below upright of the links that hang, J
   };
   /// An estimate that follows the motion.
   struct Track {

@@ -173,6 +173,33 @@ TEST(Estimator, FindsTheZerosAndTheFrictionOfASession) {
   EXPECT_NEAR(learns.now().q1, 0.5 - zero[0], 1e-9);
 }
 
+TEST(Estimator, FindsTheTorqueOffsetsOfASession) {
+  Twin twin = TestTwin(), session = twin;
+  session.actuator.torque_offset1 = 0.08;
+  session.actuator.torque_offset2 = -0.05;
+  twin.uncertain = {"zero1", "torque_offset1", "torque_offset2"};
+  twin.covariance = {1e-4, 0, 0, 0, 0.01, 0, 0, 0, 0.01};
+  Estimator estimator(twin, 0.002);
+  SimulatedMachine machine(session, {});
+  Joints sent{};
+  for (int k = 0; k < 5000; ++k) {
+    const double time = k * 0.002;
+    machine.Advance(time);
+    machine.Command(sent);
+    const TimedReading reading{machine.Read(), time};
+    estimator.Update(time, sent, &reading);
+    sent = {0.4 * std::sin(5 * time), 0};
+  }
+  EXPECT_NEAR(estimator.offset()[0], 0.08, 0.01);
+  EXPECT_NEAR(estimator.offset()[1], -0.05, 0.01);
+  EXPECT_NEAR(estimator.zero()[0], twin.sensors.zero1, 0.005);
+  // A compensation cancels them.
+  const Joints none = Estimator(TestTwin(), 0.002).CompensationTorque(0.5);
+  EXPECT_EQ(none, Joints{});
+  Twin certain = session;
+  EXPECT_EQ(Estimator(certain, 0.002).CompensationTorque(0.5), (Joints{-0.04, 0.025}));
+}
+
 /// Dry friction holds links away from where they hang, while a torque that cannot move them is
 /// sent.
 TEST(Estimator, LearnsLittleFromLinksThatStandUnderTorque) {

@@ -85,6 +85,13 @@ FitParameters::FitParameters(const Twin& first, const Structure& structure,
 
 double FitParameters::FirstNumber(const std::string& name) const { return NumberIn(base_, name); }
 
+Detail FitParameters::detail() const {
+  if (base_.cogging.any()) return Detail::kCogging;
+  const bool has_offsets = std::ranges::any_of(
+      values_, [](const FitValue& value) { return IsTorqueOffset(value.name); });
+  return has_offsets ? Detail::kOffsets : Detail::kUsual;
+}
+
 std::vector<int> FitParameters::IndicesOfMachine() const {
   std::vector<int> own;
   for (int i = 0; i < size(); ++i) {
@@ -147,13 +154,14 @@ Session FitParameters::SessionAt(const VectorXd& theta, int session) const {
 
 MatrixXd FitParameters::Slope(const VectorXd& theta, int session) const {
   constexpr double h = 1e-7;
-  MatrixXd slope = MatrixXd::Zero(NumConstants(base_.cogging.any()), size());
+  MatrixXd slope = MatrixXd::Zero(NumConstants(detail()), size());
   for (const int i : IndicesOfMachine()) {
     VectorXd above = theta, below = theta;
     above(i) += h;
     below(i) -= h;
-    slope.col(i) =
-        (ConstantsOf(TwinAt(above, session)) - ConstantsOf(TwinAt(below, session))) / (2 * h);
+    slope.col(i) = (ConstantsOf(TwinAt(above, session), detail()) -
+                    ConstantsOf(TwinAt(below, session), detail())) /
+                   (2 * h);
   }
   // A session's deviation has the effect of the machine's value.
   for (const int i : IndicesOfSession(session)) slope.col(i) = slope.col(values_[i].machine);

@@ -8,6 +8,7 @@
 
 #include "base/options.h"
 #include "extras/machine/logs/log.h"
+#include "extras/machine/twin/motion.h"
 #include "extras/machine/twin/residuals.h"
 #include "extras/machine/twin/twin.h"
 #include "pendulum/scale.h"
@@ -59,6 +60,8 @@ class FitParameters {
   /// A setting of the twin at first, by name.
   double FirstNumber(const std::string& name) const;
 
+  /// The derivatives that the values need.
+  Detail detail() const;
   /// ScaleOverUsual of the first guess, by which priors count.
   const Scale& scale() const { return scale_; }
 

@@ -42,6 +42,7 @@ Deviations DeviationsOf(const std::string& name, const Scale& scale, double cycl
       {"zero1", {0.05, 0.05}},          {"zero2", {0.05, 0.05}},
       {"coulomb1", {0.03, 0.1}},        {"coulomb2", {0.03, 0.1}},
       {"damping1", {0.003, 0.02}},      {"damping2", {0.003, 0.02}},
+      {"torque_offset1", {0.1, 0.1}},   {"torque_offset2", {0.1, 0.1}},
       {"armature", {0.001, 0.005}},     {"current_inertia", {0.0005, 0.005}},
       {"delay", {0.001, 0.005}},        {"lag", {0.001, 0.005}},
       {"current_delay", {0.001, 0.005}}};
@@ -50,7 +51,7 @@ Deviations DeviationsOf(const std::string& name, const Scale& scale, double cycl
   if (found == kDeviations.end()) return {0, 0};
   double unit = 1;
   if (IsTimeOfMotor(name)) unit = std::max(1.0, cycle / kUsualCycle);
-  if (name.starts_with("coulomb")) unit = scale.torque;
+  if (name.starts_with("coulomb") || IsTorqueOffset(name)) unit = scale.torque;
   if (name.starts_with("damping")) unit = scale.torque * scale.time;
   if (name == "armature" || name == "current_inertia") {
     unit = scale.torque * scale.time * scale.time;
@@ -100,10 +101,11 @@ FitPrior::FitPrior(const FitParameters& parameters)
 FitPrior FitPrior::OfMachine(const FitParameters& parameters, double cycle) {
   FitPrior prior(parameters);
   // Motors take milliseconds. Without reported torques, much larger delays can imitate friction.
-  // Harmonics that a log hardly tells apart stay small.
+  // Harmonics that a log hardly tells apart stay small. So do offsets of torques, which near one
+  // pose look like zeros.
   for (const int i : parameters.IndicesOfMachine()) {
     const std::string& name = parameters[i].name;
-    if (IsTimeOfMotor(name) || IsCogging(name))
+    if (IsTimeOfMotor(name) || IsCogging(name) || IsTorqueOffset(name))
       prior.inverse_(i, i) = std::pow(DeviationsOf(name, parameters.scale(), cycle).guess, -2);
   }
   prior.first_between_sessions_ = FirstBetweenSessions(parameters, cycle);

@@ -189,7 +189,35 @@ TEST(Fit, FindsTheDelayOfASlowLoop) {
   }
 }
 
-/// The machine of today has other zeros, friction and lag. A log of 5 s shows them.
+/// Half of the machines have offsets. The fit finds them, and finds none for the others.
+TEST(Fit, FindsTheTorqueOffsetsOfTheMotors) {
+  constexpr int kMachines = 20;
+  ThreadPool pool(2);
+  Structure structure{"", kValues};
+  structure.values.insert(structure.values.end(), {"torque_offset1", "torque_offset2"});
+  int covered = 0;
+  std::vector<double> errors;
+  for (int i = 0; i < kMachines; ++i) {
+    Rng rng(21, "offset", static_cast<uint64_t>(i));
+    Twin machine = SomeMachine(rng);
+    const double size = i % 2 == 0 ? 0.2 : 0;
+    machine.actuator.torque_offset1 = size * rng.Uniform(-1, 1);
+    machine.actuator.torque_offset2 = size * rng.Uniform(-1, 1);
+    const auto logs = LogsOf(machine, 2, 4, 500 + 10 * static_cast<uint64_t>(i));
+    const FitConfig config{.windows = {1, 1}, .iterations = 20, .tolerance = 1e-4};
+    const Twin found = Fit(logs, FirstGuess(), structure, config, &pool).twin;
+    for (const char* name : {"torque_offset1", "torque_offset2"}) {
+      const double deviation = std::sqrt(CovarianceOf(found, name, name));
+      errors.push_back(std::abs(ValueOf(found, name) - ValueOf(machine, name)));
+      // Links that move little hardly tell an offset from a zero.
+      EXPECT_LT(errors.back(), 4 * deviation) << i << name;
+      covered += errors.back() < 2 * deviation ? 1 : 0;
+    }
+  }
+  EXPECT_LT(Median(errors), 0.01);
+  EXPECT_GE(covered, 0.8 * 2 * kMachines);
+}
+
 /// Torques of up to 0.06 N·m at harmonics that are close to each other.
 TEST(Fit, FindsTheCoggingOfTheMotors) {
   ThreadPool pool(2);
@@ -223,6 +251,7 @@ TEST(Fit, FindsTheCoggingOfTheMotors) {
   EXPECT_LT(error(with), error(without) / 4);
 }
 
+/// The machine of today has other zeros, friction and lag. A log of 5 s shows them.
 TEST(Fit, AdaptsATwinToANewSession) {
   ThreadPool pool(2);
   Rng rng(3, "machine");

@@ -90,9 +90,14 @@ class FitCounter {
 
 /// Twins of a structure from logs without those of a fold.
 struct LeftOut {
-  std::vector<Twin> twins;  // (logs) the twin that has not seen the log
-  double error;             // MeanOfSessions over JudgedSeconds, rad
+  std::vector<Twin> of_folds;  // (folds)
+  std::vector<Twin> twins;     // (logs) the twin that has not seen the log
+  double error;                // MeanOfSessions over JudgedSeconds, rad
 };
+
+constexpr const char* kZerosOfSessions = "and zeros of each session";
+const std::vector<std::string> kZeros{"zero1", "zero2"};
+const std::vector<std::string> kOffsets{"torque_offset1", "torque_offset2"};
 
 /// Fits structures to the logs without a fold, and predicts those of the fold.
 class CrossValidation {
@@ -101,7 +106,6 @@ class CrossValidation {
                   ThreadPool* pool, FitCounter& counter)
       : logs_(logs),
         fold_of_(Folds(logs, config.folds)),
-        guesses_(config.folds, first),
         config_(config.fit),
         seconds_(JudgedSeconds(first)),
         pool_(pool),
@@ -111,16 +115,16 @@ class CrossValidation {
     config_.tolerance = std::max(1e-4, config_.tolerance);
   }
 
-  /// Begins with the values of the structure before.
-  LeftOut LeaveOut(const Structure& structure) {
+  /// Begins with the values of the twins `guesses` (folds), which have another structure.
+  LeftOut LeaveOut(const Structure& structure, const std::vector<Twin>& guesses) {
     const int n = static_cast<int>(logs_.size());
-    for (int fold = 0; fold < static_cast<int>(guesses_.size()); ++fold) {
-      Twin& guess = guesses_[fold];
-      guess = Fit(Without(fold), guess, structure, config_, pool_, counter_.NextPart()).twin;
-    }
     LeftOut result;
+    for (int fold = 0; fold < static_cast<int>(guesses.size()); ++fold) {
+      result.of_folds.push_back(
+          Fit(Without(fold), guesses[fold], structure, config_, pool_, counter_.NextPart()).twin);
+    }
     for (int i = 0; i < n; ++i) {
-      result.twins.push_back(InSession(guesses_[fold_of_[i]], logs_[i]));
+      result.twins.push_back(InSession(result.of_folds[fold_of_[i]], logs_[i]));
     }
     std::vector<std::vector<double>> errors(n);
     ParallelFor(pool_, n, [&](int i) {
@@ -140,8 +144,7 @@ class CrossValidation {
   }
 
   std::span<const MachineLog> logs_;
-  std::vector<int> fold_of_;   // (logs)
-  std::vector<Twin> guesses_;  // (folds)
+  std::vector<int> fold_of_;  // (logs)
   FitConfig config_;
   double seconds_;  // length of the windows that choose a structure
   ThreadPool* pool_;
@@ -246,6 +249,49 @@ CycleTiming TimingOf(const std::vector<double>& cycles) {
   return timing;
 }
 
+/// How a twin explains hanging links, by its uncertain values.
+HangingBy CauseIn(const Twin& twin) {
+  const auto has = [&](const char* name) { return CovarianceOf(twin, name, name) > 0; };
+  if (!has("torque_offset1") && !has("torque_offset2")) return HangingBy::kZeros;
+  return has("zero1") || has("zero2") ? HangingBy::kBoth : HangingBy::kOffsets;
+}
+
+/// Adds a structure to the result, which chooses it if it is worthwhile. Returns whether it does.
+bool Judge(const Structure& structure, const LeftOut& left_out, Identification& result) {
+  const bool is_first = result.structures.empty();
+  const double best = is_first ? 0 : result.structures[result.chosen].error;
+  result.structures.push_back({structure, left_out.error});
+  if (!is_first && !(left_out.error < kWorthwhile * best)) return false;
+  result.chosen = static_cast<int>(result.structures.size()) - 1;
+  result.left_out = left_out.twins;
+  return true;
+}
+
+/// Tries the structures one after the other. Offsets of torques compete with the encoders' zeros if
+/// there are motors, and the structures after that have the winner.
+void ChooseStructure(std::span<const Structure> structures, bool has_motors,
+                     std::vector<Twin> guesses, CrossValidation& validation,
+                     Identification& result) {
+  HangingBy cause = HangingBy::kZeros;
+  for (const Structure& with_zeros : structures) {
+    const Structure structure = Hanging(with_zeros, cause);
+    const std::vector<Twin> before = guesses;
+    const LeftOut left_out = validation.LeaveOut(structure, before);
+    guesses = left_out.of_folds;
+    Judge(structure, left_out, result);
+    if (structure.name != kZerosOfSessions || !has_motors) continue;
+    for (const HangingBy other : {HangingBy::kOffsets, HangingBy::kBoth}) {
+      Structure rival = Hanging(with_zeros, other);
+      rival.name = other == HangingBy::kBoth ? "and torque offsets of each session"
+                                             : "torque offsets in place of zeros";
+      const LeftOut rivals = validation.LeaveOut(rival, before);
+      if (!Judge(rival, rivals, result)) continue;
+      cause = other;
+      guesses = rivals.of_folds;
+    }
+  }
+}
+
 }  // namespace
 
 std::vector<Structure> Structures(bool has_motors, bool cogging, bool one_body) {
@@ -264,8 +310,8 @@ std::vector<Structure> Structures(bool has_motors, bool cogging, bool one_body) 
     add("and inertia of the motors", {"armature"});
     add("and delay and lag of the motors", {"delay", "lag", "current_delay", "current_inertia"});
   }
-  now.of_session.insert(now.of_session.end(), {"zero1", "zero2"});
-  add("and zeros of each session", {"zero1", "zero2"});
+  now.of_session.insert(now.of_session.end(), kZeros.begin(), kZeros.end());
+  add(kZerosOfSessions, kZeros);
   if (cogging) add("and cogging of the motors", CoggingCoefficients());
   if (!has_motors || one_body) return structures;
   now.of_session.insert(now.of_session.end(),
@@ -274,31 +320,38 @@ std::vector<Structure> Structures(bool has_motors, bool cogging, bool one_body) 
   return structures;
 }
 
+Structure Hanging(Structure structure, HangingBy cause) {
+  for (auto* names : {&structure.values, &structure.of_session}) {
+    const auto zeros = std::ranges::search(*names, kZeros);
+    if (cause == HangingBy::kZeros || zeros.empty()) continue;
+    const auto after =
+        cause == HangingBy::kOffsets ? names->erase(zeros.begin(), zeros.end()) : zeros.end();
+    names->insert(after, kOffsets.begin(), kOffsets.end());
+  }
+  return structure;
+}
+
 Identification Identify(std::span<const MachineLog> logs, const Twin& first,
                         const IdentifyConfig& config, ThreadPool* pool, const Progress& progress) {
   for (const MachineLog& log : logs) ExpectCommands(log);
   const std::vector<Structure> structures =
       Structures(HasCommands(logs), first.cogging.any(), config.one_body);
   const int folds = config.folds >= 2 ? config.folds : 0;
-  FitCounter counter(1.0 + folds * static_cast<double>(structures.size()), progress);
+  const auto trials = static_cast<double>(structures.size()) + (HasCommands(logs) ? 2 : 0);
+  FitCounter counter(1.0 + folds * trials, progress);
   Identification result;
   result.seconds = JudgedSeconds(first);
   result.chosen = static_cast<int>(structures.size()) - 1;
   if (folds > 0) {
     CrossValidation validation(logs, first, config, pool, counter);
-    for (const Structure& structure : structures) {
-      const LeftOut left_out = validation.LeaveOut(structure);
-      const int index = static_cast<int>(result.structures.size());
-      result.structures.push_back({structure, left_out.error});
-      const double best = index > 0 ? result.structures[result.chosen].error : 0;
-      if (index > 0 && !(left_out.error < kWorthwhile * best)) continue;
-      result.chosen = index;
-      result.left_out = left_out.twins;
-    }
+    ChooseStructure(structures, HasCommands(logs), std::vector<Twin>(folds, first), validation,
+                    result);
   }
-  result.fit = Fit(logs, first, structures[result.chosen], config.fit, pool, counter.NextPart());
+  const Structure chosen = folds > 0 ? result.structures[result.chosen].structure
+                                     : Hanging(structures.back(), CauseIn(first));
+  result.fit = Fit(logs, first, chosen, config.fit, pool, counter.NextPart());
   MeasureLoop(logs, result.fit.twin);
-  result.judgement = JudgeFit(result, logs, first, structures[result.chosen], config.fit, pool);
+  result.judgement = JudgeFit(result, logs, first, chosen, config.fit, pool);
   result.fit.twin.distrust = DistrustOf(result.judgement, result.fit.twin, logs);
   return result;
 }

@@ -16,6 +16,12 @@ namespace upswing::machine {
 /// all sessions have the same body.
 std::vector<Structure> Structures(bool has_motors, bool cogging, bool one_body);
 
+/// How a structure explains links that hang beside the encoders' zeros.
+enum class HangingBy { kZeros, kOffsets, kBoth };
+/// A structure that has zeros of each session, with offsets of the motors' torques in place of them
+/// or besides them. Other structures stay.
+Structure Hanging(Structure structure, HangingBy cause);
+
 /// A structure's errors on runs that were left out.
 struct StructureError {
   Structure structure;
@@ -44,9 +50,10 @@ struct Identification {
   Judgement judgement;
 };
 
-/// Identifies a twin from logs and judges it. A twin that does not explain its logs, or has values
-/// outside physics, says so (Twin::distrust). Throws BadInput if they have no usable motion, or if
-/// there are too few for a cross-validation.
+/// Identifies a twin from logs and judges it. Zeros of the encoders compete with offsets of the
+/// torques, if the logs have torques and there is a cross-validation. A twin that does not explain
+/// its logs, or has values outside physics, says so (Twin::distrust). Throws BadInput if they have
+/// no usable motion, or if there are too few for a cross-validation.
 Identification Identify(std::span<const MachineLog> logs, const Twin& first,
                         const IdentifyConfig& config, ThreadPool* pool,
                         const Progress& progress = nullptr);

@@ -58,7 +58,9 @@ JointTangents AccelerationTangents(const Body& m, const PendulumState& s, const 
         Eigen::Map<const Eigen::Vector<double, kNumManipulatorConstants>>(Y[j].data());
     force(tangent::kDelay, j) -= torque.by_delay[j];
     force(tangent::kLag, j) -= torque.by_lag[j];
-    if (!m.cogging.any()) continue;
+    if (m.detail == Detail::kUsual) continue;
+    force(tangent::kOffset + j, j) -= 1;
+    if (m.detail == Detail::kOffsets) continue;
     const auto factors = m.cogging.Factors(j, q[j]);
     force.col(j).segment<Cogging::kCoefficients>(tangent::kCogging + j * Cogging::kCoefficients) -=
         Eigen::Map<const Eigen::Vector<double, Cogging::kCoefficients>>(factors.data());
@@ -128,15 +130,33 @@ void FillAcceleration(const PredictedStep& step, double moment, int k, Motion& m
 
 }  // namespace
 
+int Body::tangents() const {
+  switch (detail) {
+    case Detail::kUsual:
+      return tangent::kOffset;
+    case Detail::kOffsets:
+      return tangent::kCogging;
+    case Detail::kCogging:
+      return tangent::kRows;
+  }
+  return tangent::kRows;
+}
+
 Joints Body::Acceleration(const PendulumState& s, const Joints& torque) const {
-  if (!cogging.any()) return Manipulator::Acceleration(s, torque);
-  const Joints magnets = cogging.At({s.q1, s.q2});
-  return Manipulator::Acceleration(s, {torque[0] + magnets[0], torque[1] + magnets[1]});
+  Joints all = torque;
+  if (offset != Joints{}) all = {all[0] + offset[0], all[1] + offset[1]};
+  if (cogging.any()) {
+    const Joints magnets = cogging.At({s.q1, s.q2});
+    all = {all[0] + magnets[0], all[1] + magnets[1]};
+  }
+  return Manipulator::Acceleration(s, all);
 }
 
 Body BodyOf(const Twin& twin, bool reported) {
   Body body{ManipulatorOf(twin.plant),
-            CoggingTorque(twin.cogging, {twin.sensors.zero1, twin.sensors.zero2})};
+            CoggingTorque(twin.cogging, {twin.sensors.zero1, twin.sensors.zero2}),
+            {twin.actuator.torque_offset1, twin.actuator.torque_offset2}};
+  if (twin.cogging.any()) body.detail = Detail::kCogging;
   if (reported) {
     body.J1 -= twin.actuator.current_inertia;
     body.a -= twin.actuator.current_inertia;

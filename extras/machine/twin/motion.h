@@ -15,20 +15,26 @@
 namespace upswing::machine {
 
 /// Rows of the derivatives of a motion: by the start state (q1, q2, w1, w2), by the constants of
-/// Manipulator in their order, by the drive's times, by the coefficients of cogging and by
-/// the encoders' zeros. Cogging depends on the zeros, so motions without it lack the last two.
+/// Manipulator in their order, by the drive's times, by the offsets of the torques, by the
+/// coefficients of cogging and by the encoders' zeros. Cogging depends on the zeros; other motions
+/// do not.
 namespace tangent {
 enum Row {
   kStart = 0,
   kBody = kStart + 4,
   kDelay = kBody + kNumManipulatorConstants,
   kLag,
-  kCogging,
+  kOffset,
+  kCogging = kOffset + 2,
   kZero = kCogging + 2 * Cogging::kCoefficients,
   kRows = kZero + 2,
 };
 }
 inline constexpr int kMostTangents = tangent::kRows;
+
+/// The values of a model for which there are derivatives. Each detail has those of the details
+/// before it.
+enum class Detail { kUsual, kOffsets, kCogging };
 
 /// A point of a motion.
 struct MotionPoint {
@@ -53,13 +59,15 @@ struct PointTangents {
 inline constexpr double kMotionStep = 0.0005;
 inline constexpr double kShortestMotionStep = kMotionStep / 64;
 
-/// The links and motors of a twin as equations of motion, with cogging.
+/// The links and motors of a twin as equations of motion, with cogging and offsets.
 struct Body : Manipulator {
   CoggingTorque cogging;
+  Joints offset{};                    // torques besides the drives', N·m
   double longest_step = kMotionStep;  // of the integration (Runge-Kutta of order 4), s
+  Detail detail = Detail::kUsual;     // of the derivatives of its motions
 
   /// Number of derivatives of its motions.
-  int tangents() const { return cogging.any() ? kMostTangents : tangent::kCogging; }
+  int tangents() const;
   /// q̈ (rad/s²) under the torques (N·m) of the drives at both joints.
   Joints Acceleration(const PendulumState& s, const Joints& torque) const;
 };

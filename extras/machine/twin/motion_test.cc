@@ -159,19 +159,22 @@ TEST(Predict, RepeatsTheMotionOfTheSimulatedMachine) {
 }
 
 /// Differences of predictions are the reference.
-void ExpectDerivatives(const Twin& twin) {
+void ExpectDerivatives(const Twin& twin, Detail detail) {
   const MachineLog log = RunLoop(twin, {.seconds = 0.5, .start = {0.5, -0.3, 0, 0}},
                                  [](const CycleInput& in) -> Joints {
                                    return {1.5 * std::sin(6 * in.time), std::cos(4 * in.time)};
                                  });
   std::array<double, kMostTangents> values{0.5, -0.3, 1, 2};
-  const Body body = BodyOf(twin);
+  Body body = BodyOf(twin);
+  body.detail = detail;
   for (int k = 0; k < kNumManipulatorConstants; ++k) {
     values[tangent::kBody + k] = body.*kManipulatorConstants[k];
   }
   // No event is at an end of a step, where the derivative jumps.
   values[tangent::kDelay] = 0.0023;
   values[tangent::kLag] = twin.actuator.lag;
+  values[tangent::kOffset] = twin.actuator.torque_offset1;
+  values[tangent::kOffset + 1] = twin.actuator.torque_offset2;
   for (int i = 0; i < 2 * Cogging::kCoefficients; ++i) {
     values[tangent::kCogging + i] =
         twin.cogging.coefficients[i / Cogging::kCoefficients][i % Cogging::kCoefficients];
@@ -184,11 +187,14 @@ void ExpectDerivatives(const Twin& twin) {
     other.sensors.zero2 = v[tangent::kZero + 1];
     other.actuator.delay = v[tangent::kDelay];
     other.actuator.lag = v[tangent::kLag];
+    other.actuator.torque_offset1 = v[tangent::kOffset];
+    other.actuator.torque_offset2 = v[tangent::kOffset + 1];
     for (int i = 0; i < 2 * Cogging::kCoefficients; ++i) {
       other.cogging.coefficients[i / Cogging::kCoefficients][i % Cogging::kCoefficients] =
           v[tangent::kCogging + i];
     }
     MotionModel model{BodyOf(other), Drive::Commanded(log, other)};
+    model.body.detail = detail;
     for (int k = 0; k < kNumManipulatorConstants; ++k) {
       model.body.*kManipulatorConstants[k] = v[tangent::kBody + k];
     }
@@ -216,8 +222,16 @@ void ExpectDerivatives(const Twin& twin) {
   }
 }
 
-TEST(Predict, KnowsItsDerivatives) { ExpectDerivatives(MachineWithLag()); }
-TEST(Predict, KnowsTheDerivativesByCogging) { ExpectDerivatives(MachineThatCogs()); }
+TEST(Predict, KnowsItsDerivatives) { ExpectDerivatives(MachineWithLag(), Detail::kUsual); }
+TEST(Predict, KnowsTheDerivativesByOffsets) {
+  Twin twin = MachineWithLag();
+  twin.actuator.torque_offset1 = 0.2;
+  twin.actuator.torque_offset2 = -0.1;
+  ExpectDerivatives(twin, Detail::kOffsets);
+}
+TEST(Predict, KnowsTheDerivativesByCogging) {
+  ExpectDerivatives(MachineThatCogs(), Detail::kCogging);
+}
 
 /// Cogging is the slope of a potential, so it keeps the energy with it.
 TEST(Predict, ConservesEnergyWithCogging) {

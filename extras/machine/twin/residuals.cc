@@ -8,7 +8,7 @@ namespace {
 constexpr int kStartStates = tangent::kBody - tangent::kStart;
 // A column of derivatives begins with those of the motion.
 static_assert(kStartStates + constant::kBody == tangent::kBody);
-static_assert(kStartStates + constant::kLag + 1 == tangent::kCogging);
+static_assert(kStartStates + constant::kLag + 1 == tangent::kOffset);
 
 /// Residuals of a window of n rows, with their derivatives unless J is empty.
 struct Residuals {
@@ -28,9 +28,11 @@ struct Residuals {
   /// angles, so a larger zero is a smaller true angle at the start.
   void SetTangents(int i, const Eigen::VectorXd& by_motion) {
     J.col(i).setZero();
-    J.col(i).head<tangent::kCogging>() = by_motion.head<tangent::kCogging>();
+    J.col(i).head<tangent::kOffset>() = by_motion.head<tangent::kOffset>();
     J(kStartStates + constant::kZero1, i) = -by_motion(tangent::kStart);
     J(kStartStates + constant::kZero2, i) = -by_motion(tangent::kStart + 1);
+    if (by_motion.size() == tangent::kOffset) return;
+    J.col(i).segment<2>(kStartStates + constant::kOffset) = by_motion.segment<2>(tangent::kOffset);
     if (by_motion.size() == tangent::kCogging) return;
     constexpr int kBothJoints = 2 * Cogging::kCoefficients;
     J.col(i).tail<kBothJoints>() = by_motion.segment<kBothJoints>(tangent::kCogging);
@@ -99,27 +101,40 @@ void SetTorques(const ModelledLog& modelled, const LogWindow& window,
 
 }  // namespace
 
-Eigen::VectorXd ConstantsOf(const Twin& twin) {
+int NumConstants(Detail detail) {
+  switch (detail) {
+    case Detail::kUsual:
+      return constant::kOffset;
+    case Detail::kOffsets:
+      return constant::kCogging;
+    case Detail::kCogging:
+      return constant::kRows;
+  }
+  return constant::kRows;
+}
+
+Eigen::VectorXd ConstantsOf(const Twin& twin, Detail detail) {
   const Manipulator m = ManipulatorOf(twin.plant);
   const Actuator& motor = twin.actuator;
-  Eigen::VectorXd c(NumConstants(twin.cogging.any()));
+  Eigen::VectorXd c(kMostConstants);
   c.head<constant::kCogging>() << m.J1, m.J2, m.b, m.a, m.G1, m.G2, m.d1, m.d2, m.f1, m.f2,
       motor.delay, motor.lag, twin.sensors.zero1, twin.sensors.zero2, motor.current_delay,
-      motor.current_inertia;
-  if (!twin.cogging.any()) return c;
+      motor.current_inertia, motor.torque_offset1, motor.torque_offset2;
   for (int j = 0; j < 2; ++j) {
     const auto& own = twin.cogging.coefficients[j];
     c.segment<Cogging::kCoefficients>(constant::kCogging + j * Cogging::kCoefficients) =
         Eigen::Map<const Eigen::Vector<double, Cogging::kCoefficients>>(own.data());
   }
-  return c;
+  return c.head(NumConstants(detail));
 }
 
-ModelledLog::ModelledLog(const MachineLog& of, const Twin& twin)
+ModelledLog::ModelledLog(const MachineLog& of, const Twin& twin, Detail detail)
     : log(of),
       reported{HasTorque(of.measured, 0), HasTorque(of.measured, 1)},
       motor(twin.actuator),
-      model(CommandedModel(of, twin)) {}
+      model(CommandedModel(of, twin)) {
+  model.body.detail = detail;
+}
 
 WindowResiduals ResidualsOf(const ModelledLog& modelled, const LogWindow& window,
                             const Eigen::Vector4d& x, bool linearizes) {
@@ -128,7 +143,7 @@ WindowResiduals ResidualsOf(const ModelledLog& modelled, const LogWindow& window
   predicted.motion =
       Predict(modelled.model, {x(0), x(1), x(2), x(3)}, window.TimesIn(log),
               modelled.motor.current_delay, linearizes ? &predicted.tangents : nullptr);
-  Residuals residuals(window.rows(), NumConstants(modelled.model.body.cogging.any()), linearizes);
+  Residuals residuals(window.rows(), NumConstants(modelled.model.body.detail), linearizes);
   WindowResiduals result;
   SetAngles(log, window, predicted, linearizes, residuals);
   result.angle = residuals.Square();

@@ -12,8 +12,7 @@
 namespace upswing::machine {
 
 /// Rows of the constants that residuals depend on besides the start state: those of the motion,
-/// zeros, current_delay, current_inertia, and the coefficients of cogging. Twins without cogging
-/// lack the last ones.
+/// zeros, current_delay, current_inertia, offsets of torques, and the coefficients of cogging.
 namespace constant {
 enum Row {
   kBody = 0,
@@ -23,17 +22,18 @@ enum Row {
   kZero2,
   kCurrentDelay,
   kCurrentInertia,
-  kCogging,
+  kOffset,
+  kCogging = kOffset + 2,
   kRows = kCogging + 2 * Cogging::kCoefficients,
 };
 }
 inline constexpr int kMostConstants = constant::kRows;
-/// Number of constants of a twin whose motors cog, or not.
-inline int NumConstants(bool cogs) { return cogs ? kMostConstants : constant::kCogging; }
+/// Number of constants of a detail.
+int NumConstants(Detail detail);
 
-/// The constants of a twin (NumConstants): its equations of motion, times of the motors, zeros, and
-/// cogging.
-Eigen::VectorXd ConstantsOf(const Twin& twin);
+/// The constants of a twin (NumConstants): its equations of motion, times of the motors, zeros,
+/// offsets of torques, and cogging.
+Eigen::VectorXd ConstantsOf(const Twin& twin, Detail detail);
 
 /// The mean of a window's squared residuals over its rows, angles or torques, and its derivatives
 /// by start state and constants.
@@ -50,7 +50,8 @@ struct WindowResiduals {
 
 /// A log, which must outlive this, and a twin as its model.
 struct ModelledLog {
-  ModelledLog(const MachineLog& of, const Twin& twin);
+  /// `detail`: of the derivatives.
+  ModelledLog(const MachineLog& of, const Twin& twin, Detail detail);
 
   const MachineLog& log;
   std::array<bool, 2> reported;  // whether the joints report torques

@@ -63,7 +63,7 @@ std::vector<WindowResiduals> ShootingModel::ResidualsAt(const FitPoint& point,
   }
   std::vector<ModelledLog> modelled;  // (logs)
   for (size_t i = 0; i < logs_.size(); ++i) {
-    modelled.emplace_back(logs_[i], twins[parameters_.sessions().of_log[i]]);
+    modelled.emplace_back(logs_[i], twins[parameters_.sessions().of_log[i]], parameters_.detail());
   }
   std::vector<WindowResiduals> residuals(windows_.size());
   ParallelFor(pool_, windows(), [&](int w) {

@@ -108,6 +108,10 @@ void Actuator::Describe(Options& o) {
         "time from the reported torque to the reading of the angles");
   o.Add(&current_inertia, "current_inertia", {0, 1e6}, "kg·m²",
         "part of the reported torque that opposes the joint's acceleration");
+  o.Add(&torque_offset1, "torque_offset1", {-1e6, 1e6}, "N·m",
+        "torque that joint 1 gets besides the motor's");
+  o.Add(&torque_offset2, "torque_offset2", {-1e6, 1e6}, "N·m",
+        "torque that joint 2 gets besides the motor's");
 }
 
 void MachineSensors::Describe(Options& o) {
@@ -130,6 +134,8 @@ void LoopTiming::Describe(Options& o) {
   o.Add(&late_share, "late_share", kZeroToOne, "", "share of the cycles that are late");
   o.Add(&late, "late", {0, 1}, "s", "largest lateness of these");
 }
+
+bool IsTorqueOffset(std::string_view name) { return name.starts_with("torque_offset"); }
 
 std::string SessionOf(const std::string& log) {
   constexpr int kFolders = 2;
@@ -196,7 +202,10 @@ std::string TwinText(const Twin& twin) {
   std::string text = Concat("name = ", Quoted(twin.name), "\n");
   if (!twin.distrust.empty()) text += Concat(kDistrustKey, " = ", Quoted(twin.distrust), "\n");
   text += "\n";
+  const bool has_offset =
+      twin.actuator.has_offset() || std::ranges::any_of(twin.uncertain, IsTorqueOffset);
   text += OptionsOf(twin).Toml(/*comments=*/true, [&](const Option& option) {
+    if (IsTorqueOffset(option.name)) return has_offset;
     return option.section != "cogging" || twin.cogging.any();
   });
   const Disturbance disturbance = DisturbanceOf(twin);

@@ -18,7 +18,8 @@ namespace upswing::machine {
 
 /// The motors. A torque follows its command after a delay, with a first-order lag:
 ///   lag · dτ/dt = command(t - delay) - τ
-/// The torque that the drive reports is τ - current_inertia · q̈, current_delay old. The motor's
+/// The links get τ + torque_offset. A drive that measures its current with an offset does not know
+/// of it: the torque that it reports is τ - current_inertia · q̈, current_delay old. The motor's
 /// induced voltage disturbs the current in proportion to the acceleration.
 struct Actuator {
   // From reading the angles to the response of the torque sent with them, s. Negative: the torque
@@ -28,10 +29,15 @@ struct Actuator {
   double passive_limit = 0;    // torque limit of the joint that is not actuated, N·m
   double current_delay = 0;    // time from the reported torque to the angles' reading, s
   double current_inertia = 0;  // kg·m²
+  double torque_offset1 = 0, torque_offset2 = 0;  // added to a motor's torque, N·m
 
+  bool has_offset() const { return torque_offset1 != 0 || torque_offset2 != 0; }
   /// Declares each setting in `options`: name, range, unit, help.
   void Describe(Options& options);
 };
+
+/// Whether a value is one of the offsets of the motors' torques.
+bool IsTorqueOffset(std::string_view name);
 
 /// Encoders, and the velocities that the control loop computes from their angles.
 struct MachineSensors {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "base/error.h"
@@ -15,13 +16,17 @@ namespace {
 
 Twin RealPlant() { return ReadTwin("realaigym-c1", "test"); }
 
-/// Logs of a machine with friction on two days, with other zeros on each.
-std::vector<MachineLog> LogsOfTwoDays() {
+/// Logs of a machine with friction on two days, with other zeros or torque offsets on each.
+std::vector<MachineLog> LogsOfTwoDays(HangingBy cause = HangingBy::kZeros) {
   std::vector<MachineLog> logs;
   for (int i = 0; i < 4; ++i) {
     Twin machine = RealPlant();
     machine.actuator.lag = 0.004;
-    machine.sensors.zero1 = i < 2 ? 0.02 : -0.03;
+    if (cause == HangingBy::kZeros) {
+      machine.sensors.zero1 = i < 2 ? 0.02 : -0.03;
+    } else {
+      machine.actuator.torque_offset1 = i < 2 ? 0.2 : -0.1;
+    }
     logs.push_back(RunLoop(machine, {.seconds = 3, .seed = static_cast<uint64_t>(i)},
                            [&](const CycleInput& in) -> Joints {
                              return {std::sin(5 * in.time + i), 0.5 * std::sin(7 * in.time)};
@@ -73,7 +78,7 @@ TEST(Identify, ChoosesFrictionAndFindsTheSessions) {
   config.fit = {.windows = {1, 1}, .iterations = 8};
   const auto logs = LogsOfTwoDays();
   const Identification found = Identify(logs, first, config, nullptr);
-  ASSERT_EQ(found.structures.size(), 7u);
+  ASSERT_EQ(found.structures.size(), 9u);
   // The last structure, with a body of each session, is as good.
   EXPECT_GE(found.chosen, 5);
   EXPECT_NEAR(found.fit.twin.plant.coulomb1, 0.16, 0.005);
@@ -81,6 +86,27 @@ TEST(Identify, ChoosesFrictionAndFindsTheSessions) {
   EXPECT_NEAR(InSession(found.fit.twin, logs[0]).sensors.zero1, 0.02, 0.003);
   EXPECT_NEAR(InSession(found.fit.twin, logs[3]).sensors.zero1, -0.03, 0.003);
   EXPECT_EQ(found.left_out.size(), logs.size());
+  // Offsets of the torques are as good besides the zeros, but not in place of them.
+  const Structure& chosen = found.structures[found.chosen].structure;
+  EXPECT_EQ(std::ranges::count(chosen.values, "torque_offset1"), 0);
+  EXPECT_GT(found.structures[6].error, 2 * found.structures[5].error);
+}
+
+TEST(Identify, ChoosesOffsetsOfTheTorques) {
+  IdentifyConfig config;
+  config.folds = 2;
+  config.fit = {.windows = {1, 1}, .iterations = 8};
+  const auto logs = LogsOfTwoDays(HangingBy::kOffsets);
+  const Identification found = Identify(logs, RealPlant(), config, nullptr);
+  const Structure& chosen = found.structures[found.chosen].structure;
+  EXPECT_EQ(std::ranges::count(chosen.values, "torque_offset1"), 1);
+  EXPECT_EQ(std::ranges::count(chosen.of_session, "torque_offset1"), 1);
+  EXPECT_LT(found.structures[6].error, found.structures[5].error / 2);
+  EXPECT_NEAR(InSession(found.fit.twin, logs[0]).actuator.torque_offset1, 0.2, 0.01);
+  EXPECT_NEAR(InSession(found.fit.twin, logs[3]).actuator.torque_offset1, -0.1, 0.01);
+  EXPECT_GT(CovarianceOf(found.fit.twin, "torque_offset1", "torque_offset1"), 0);
+  // An adaptation of the twin has them, too.
+  EXPECT_EQ(ParseTwin(TwinText(found.fit.twin), "test").sessions.size(), 2u);
 }
 
 TEST(Identify, LeavesOutLogsOfSessionsWithASingleLog) {
