@@ -28,8 +28,9 @@ constexpr double kCompared = 0.03, kComparedSteps = 12;  // rad, steps
 constexpr double kLeastCompared = 0.4;  // share of it that is compared under the largest torque
 constexpr double kLeastShare = 0.4, kLargestShare = 1.6;  // of this motion that an encoder may show
 constexpr double kDelayDeviations = 2;                    // of the twin's delay and lag
-// Least torque of the pulse, of dry friction. Sessions differ in their friction.
-constexpr double kAboveFriction = 3;
+// Least torque of the pulse, of dry friction: of the twin's, and of the largest that is probable.
+constexpr double kAboveFriction = 3, kAboveProbable = 2;
+constexpr double kFrictionDeviations = 2;  // of the twin's friction
 
 // Motion that an encoder must have shown.
 constexpr double kDeviations = 4;      // of the twin's prediction
@@ -208,21 +209,32 @@ Complaint EarnedTorque::JudgeDirection(int j) {
       {static_cast<double>(j + 1), motion, amplitude_}};
 }
 
+/// The torque (N·m) of the pulse with which friction no longer decides whether joint j moves.
+double EarnedTorque::LeastTorque(int j) const {
+  const Expectation& e = seen_.expected;
+  const auto probable = [&](int joint) {
+    return e.friction[joint] + kFrictionDeviations * e.friction_deviation[joint];
+  };
+  return std::max({kAboveFriction * e.friction[motor_], kAboveProbable * probable(motor_),
+                   kAboveProbable * probable(j)});
+}
+
 /// Judges the share of the twin's motion that an encoder shows.
 Complaint EarnedTorque::JudgeShare(int j) {
   const Expectation& e = seen_.expected;
   Joint& joint = joints_[j];
   const double expected = e.driven[j] - e.coasting[j], shown = e.measured[j] - e.coasting[j];
-  const double enough = std::max(kCompared, kComparedSteps * joint.step);
+  // While the torque doubles, a delay that differs from the twin's is another torque. The machine
+  // has to move enough, too, if it is late.
+  const double doublings = kDelayDeviations * e.delay_deviation / Time(kDoubling, kDoublingCycles);
+  const double unsure = std::exp2(doublings);
+  const double enough = unsure * std::max(kCompared, kComparedSteps * joint.step);
   const bool last = at_limit_ > Time(kLimitSeconds, kLimitCycles);
-  const bool strong = amplitude_ > kAboveFriction * e.friction[motor_];
+  const bool strong = amplitude_ > LeastTorque(j);
   if (!last && (std::abs(expected) < enough || !strong)) return {};
   joint.answered = true;
   // The largest torque moves the joint too little for a judgement.
   if (std::abs(expected) < kLeastCompared * enough) return {};
-  // While the torque doubles, a delay that differs from the twin's is another torque.
-  const double doublings = kDelayDeviations * e.delay_deviation / Time(kDoubling, kDoublingCycles);
-  const double unsure = std::exp2(doublings);
   const double share = shown / expected;
   if (share >= kLeastShare / unsure && share <= kLargestShare * unsure) return {};
   return {

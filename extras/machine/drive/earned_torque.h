@@ -124,6 +124,7 @@ class EarnedTorque {
   void JudgeRest();
   Complaint JudgeJoint(int j);
   Complaint JudgeShare(int j);
+  double LeastTorque(int j) const;
   Complaint JudgeDirection(int j);
   /// Counts the time for which the last torque of the pulse acted beyond a usual cycle.
   void CountGap(double now);

@@ -56,6 +56,9 @@ Estimator::Estimator(const Twin& twin, double period, StateSource source)
   model_->silent = model_->drive;
   expectation_.delay_deviation =
       std::sqrt(CovarianceOf(twin, "delay", "delay") + CovarianceOf(twin, "lag", "lag"));
+  expectation_.friction_deviation = {
+      std::numbers::pi / 2 * std::sqrt(CovarianceOf(twin, "coulomb1", "coulomb1")),
+      std::numbers::pi / 2 * std::sqrt(CovarianceOf(twin, "coulomb2", "coulomb2"))};
 
   Vector& x = track_.x;
   Matrix& P = track_.P;

@@ -13,9 +13,10 @@ inline constexpr double kResponseSeconds = 0.5;
 /// The motion that the twin predicts. A measured angle and a prediction are compared as the
 /// encoder shows them.
 struct Expectation {
-  bool known = false;          // whether a twin follows the motion
-  Joints friction{};           // largest torque of dry friction, N·m
-  double delay_deviation = 0;  // standard deviation of the delay and lag of the motors, s
+  bool known = false;           // whether a twin follows the motion
+  Joints friction{};            // largest torque of dry friction, N·m
+  Joints friction_deviation{};  // standard deviation of the twin's friction, N·m
+  double delay_deviation = 0;   // standard deviation of the delay and lag of the motors, s
 
   // Motion of each joint since its encoder last showed one, predicted from the torques and the
   // other encoder, and its standard deviation, rad.
