@@ -16,7 +16,7 @@ namespace upswing::machine {
 /// all sessions have the same body.
 std::vector<Structure> Structures(bool has_motors, bool cogging, bool one_body);
 
-/// How a structure explains links that hang beside the encoders' zeros.
+/// How a structure explains links that hang off the angles at which the encoders show 0.
 enum class HangingBy { kZeros, kOffsets, kBoth };
 /// A structure that has zeros of each session, with offsets of the motors' torques in place of them
 /// or besides them. Other structures stay.

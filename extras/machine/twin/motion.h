@@ -14,9 +14,9 @@
 /// A twin's motion under the torques of a log.
 namespace upswing::machine {
 
-/// Rows of the derivatives of a motion: by the start state (q1, q2, w1, w2), by the constants of
-/// Manipulator in their order, by the drive's times, by the offsets of the torques, by the
-/// coefficients of cogging and by the encoders' zeros. Cogging depends on the zeros; other motions
+/// Rows of the derivatives of a motion: by the start state (q1, q2, w1, w2), the constants of
+/// Manipulator in their order, the drive's times, the offsets of the torques, the coefficients of
+/// cogging and the encoders' zeros. Cogging depends on the zeros; other motions
 /// do not.
 namespace tangent {
 enum Row {

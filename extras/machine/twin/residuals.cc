@@ -128,11 +128,14 @@ Eigen::VectorXd ConstantsOf(const Twin& twin, Detail detail) {
   return c.head(NumConstants(detail));
 }
 
-ModelledLog::ModelledLog(const MachineLog& of, const Twin& twin, Detail detail)
+ModelledLog::ModelledLog(const MachineLog& of, const Twin& twin)
     : log(of),
       reported{HasTorque(of.measured, 0), HasTorque(of.measured, 1)},
       motor(twin.actuator),
-      model(CommandedModel(of, twin)) {
+      model(CommandedModel(of, twin)) {}
+
+ModelledLog::ModelledLog(const MachineLog& of, const Twin& twin, Detail detail)
+    : ModelledLog(of, twin) {
   model.body.detail = detail;
 }
 

@@ -50,6 +50,7 @@ struct WindowResiduals {
 
 /// A log, which must outlive this, and a twin as its model.
 struct ModelledLog {
+  ModelledLog(const MachineLog& of, const Twin& twin);
   /// `detail`: of the derivatives.
   ModelledLog(const MachineLog& of, const Twin& twin, Detail detail);
 
