@@ -128,10 +128,13 @@ double SpeedFrom(const MachineLog& log, int joint, int first) {
 }
 
 std::vector<Jump> JumpsOf(Pieces pieces, int joint) {
-  constexpr double kLeast = 0.15, kAcceleration = 1000;  // rad, rad/s²
-  constexpr double kJitter = 1.5;                        // of a cycle's length
-  constexpr int kRows = 4;                               // that repeat; CheckRepeats reports them
-  const double cycle = UsualCycle(pieces);
+  constexpr double kLeast = 0.15;                         // rad
+  constexpr double kAcceleration = 1000, kNatural = 100;  // rad/s², rad in an own time squared
+  constexpr double kJitter = 1.5;                         // of a cycle's length
+  constexpr int kRows = 4;                                // that repeat; CheckRepeats reports them
+  const double cycle = UsualCycle(pieces), own_time = OwnTime(pieces);
+  const double acceleration =
+      std::max(kAcceleration, own_time > 0 ? kNatural / (own_time * own_time) : 0);
   std::vector<Jump> jumps;
   for (const MachineLog& log : pieces) {
     const auto repeats = [&](int first) {
@@ -150,7 +153,7 @@ std::vector<Jump> JumpsOf(Pieces pieces, int joint) {
       const double speed_after = SpeedFrom(log, joint, k + 1);
       const double speed = std::max(speed_before, speed_after);
       const double step = std::max(seconds, cycle);
-      if (std::abs(size) < kLeast + kJitter * speed * step + kAcceleration * step * step) continue;
+      if (std::abs(size) < kLeast + kJitter * speed * step + acceleration * step * step) continue;
       if (repeats(k) || (repeats(k - 1 - kRows) && speed > 0.5)) continue;
       jumps.push_back({&log, k, size});
     }
