@@ -399,7 +399,8 @@ class UntrustedFileTest(ProgramTest):
         self.write("log.csv", "time,pos_meas1,pos_meas2\n" +
                    "".join(f"{k / 500},{math.sin(k / 100)},0\n" for k in range(2000)))
         self.write("twin.toml", 'name = "a,\\u001b[2J\\nb"\n[plant]\nmass1 = 1\n')
-        self.succeed("machine", "validate", "twin.toml", "log.csv", "--csv", "motion.csv")
+        done = self.run_here("machine", "validate", "twin.toml", "log.csv", "--csv", "motion.csv")
+        self.assertEqual((done.returncode, done.stderr), (1, ""))  # no twin explains this motion
         names = (self.folder / "motion.csv").read_text(encoding="utf-8").splitlines()[0]
         self.assertEqual(names.split(",", 4)[4], '"a,\\x1b[2J\\nb 1","a,\\x1b[2J\\nb 2"')
 
