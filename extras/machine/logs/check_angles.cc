@@ -132,9 +132,11 @@ std::vector<Jump> JumpsOf(Pieces pieces, int joint) {
   constexpr double kAcceleration = 1000, kNatural = 100;  // rad/s², rad in an own time squared
   constexpr double kJitter = 1.5;                         // of a cycle's length
   constexpr int kRows = 4;                                // that repeat; CheckRepeats reports them
-  const double cycle = UsualCycle(pieces), own_time = OwnTime(pieces);
+  constexpr double kCycles = 10;                          // of an own time, which jumps make short
+  const double cycle = UsualCycle(pieces);
+  const double own_time = std::max(OwnTime(pieces), kCycles * cycle);
   const double acceleration =
-      std::max(kAcceleration, own_time > 0 ? kNatural / (own_time * own_time) : 0);
+      own_time > 0 ? std::max(kAcceleration, kNatural / (own_time * own_time)) : kAcceleration;
   std::vector<Jump> jumps;
   for (const MachineLog& log : pieces) {
     const auto repeats = [&](int first) {
