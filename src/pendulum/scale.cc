@@ -21,43 +21,42 @@ bool BothDiffer(double a, double b) {
   return std::min(a, b) > kOtherSize || std::max(a, b) * kOtherSize < 1;
 }
 
-/// The numbers without unit that decide a motion, as logarithms.
-struct Shape {
-  double limit;                 // of the motor's torque
-  std::array<double, 13> rest;  // inertias, gravity, lengths, friction
+/// The numbers without unit that decide a motion: the largest torque of the motor, inertias,
+/// gravity, lengths, friction.
+using Shape = std::array<double, 14>;
 
-  /// In units of time (s), torque (N·m) and length (m).
-  Shape(const Plant& plant, const Scale& unit, double length) {
-    // Armature and friction may be 0. Below this many units they hardly change a motion.
-    constexpr double kNegligible = 0.02;
-    const Manipulator body = ManipulatorOf(plant);
-    const double inertia = unit.torque * unit.time * unit.time, damping = unit.torque * unit.time;
-    limit = std::log(plant.torque_limit / unit.torque);
-    // J2 may be negative with rotors, but not the diagonal of the mass matrix.
-    const MassMatrix M = body.Mass(1);
-    rest = {M.M11 / inertia,
-            M.M22 / inertia,
-            body.b / inertia,
-            body.G1 / unit.torque,
-            body.G2 / unit.torque,
-            plant.length1 / length,
-            plant.length2 / length,
-            plant.gravity * unit.time * unit.time / length,
-            kNegligible + body.a / inertia,
-            kNegligible + body.d1 / damping,
-            kNegligible + body.d2 / damping,
-            kNegligible + body.f1 / unit.torque,
-            kNegligible + body.f2 / unit.torque};
-    for (double& x : rest) x = std::log(x);
-  }
-};
+/// The shape of a plant in units of time (s), torque (N·m) and length (m).
+Shape ShapeOf(const Plant& plant, const Scale& unit, double length) {
+  // Armature and friction may be 0. Below this many units they hardly change a motion.
+  constexpr double kNegligible = 0.02;
+  const Manipulator body = ManipulatorOf(plant);
+  const double inertia = unit.torque * unit.time * unit.time, damping = unit.torque * unit.time;
+  // J2 may be negative with rotors, but not the diagonal of the mass matrix.
+  const MassMatrix M = body.Mass(1);
+  return {plant.torque_limit / unit.torque,
+          M.M11 / inertia,
+          M.M22 / inertia,
+          body.b / inertia,
+          body.G1 / unit.torque,
+          body.G2 / unit.torque,
+          plant.length1 / length,
+          plant.length2 / length,
+          plant.gravity * unit.time * unit.time / length,
+          kNegligible + body.a / inertia,
+          kNegligible + body.d1 / damping,
+          kNegligible + body.d2 / damping,
+          kNegligible + body.f1 / unit.torque,
+          kNegligible + body.f2 / unit.torque};
+}
 
-/// The distances of two shapes.
+/// The distances of two shapes, as |log ratio|: of the motors' torques, and the sum of all.
 struct Distance {
-  double limit, all;
+  double limit, all = 0;
 
-  Distance(const Shape& a, const Shape& b) : limit(std::abs(a.limit - b.limit)), all(limit) {
-    for (size_t i = 0; i < a.rest.size(); ++i) all += std::abs(a.rest[i] - b.rest[i]);
+  Distance(const Shape& a, const Shape& b) {
+    const auto of = [&](size_t i) { return std::abs(std::log(a[i] / b[i])); };
+    limit = of(0);
+    for (size_t i = 0; i < a.size(); ++i) all += of(i);
   }
 };
 
@@ -71,9 +70,9 @@ bool IsImage(const Plant& from, const Plant& plant, const Scale& ratio) {
   const Scale unit = NaturalUnits(from), own = unit * ratio;
   const double length = from.gravity * unit.time * unit.time;
   const double own_length = plant.gravity * own.time * own.time;
-  const Shape original(from, unit, length);
-  const Distance to_plant(original, Shape(plant, unit, length));
-  const Distance to_image(original, Shape(plant, own, own_length));
+  const Shape original = ShapeOf(from, unit, length);
+  const Distance to_plant(original, ShapeOf(plant, unit, length));
+  const Distance to_image(original, ShapeOf(plant, own, own_length));
   return to_image.limit <= kClearlyNearer * to_plant.limit + kSame &&
          to_image.all <= kClearlyNearer * to_plant.all;
 }

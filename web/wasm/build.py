@@ -83,11 +83,17 @@ def own_sources():
 CONFIGS = {"AGENT_ENTRIES": ROOT / "configs", "GYMNASIUM_ENTRIES": ROOT / "configs/gymnasium"}
 
 
+def settings_of(path):
+    """A TOML file without its lines of comments, which are texts for a terminal."""
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    return "".join(line for line in lines if not line.startswith("#"))
+
+
 def named_agents():
     """What CMake makes of the settings in CONFIGS."""
     text = (ROOT / "src/agents/named_agents.cc.in").read_text(encoding="utf-8")
     for name, folder in CONFIGS.items():
-        entries = "".join(f'    {{"{path.stem}", R"toml({path.read_text(encoding="utf-8")})toml"}},\n'
+        entries = "".join(f'    {{"{path.stem}", R"toml({settings_of(path)})toml"}},\n'
                           for path in sorted(folder.glob("*.toml")))
         text = text.replace(f"@{name}@", entries)
     return text
