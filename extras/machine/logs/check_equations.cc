@@ -28,8 +28,7 @@ WeakFit FitSmallZeros(const WeakEquations& equations,
                       const std::array<Eigen::MatrixXd, 2>& free = {}) {
   using namespace weak;
   WeakFit fit = Fit(equations, free);
-  const Eigen::VectorXd& x = fit.constants;
-  const double zero1 = std::atan2(x(kZero1), x(kG1)), zero12 = std::atan2(x(kZero12), x(kG2));
+  const auto [zero1, zero12, zero2] = fit.zeros();
   if (std::max({std::abs(zero1), std::abs(zero12), std::abs(zero12 - zero1)}) <= kZero) return fit;
   WeakEquations without = equations;
   for (const int joint : {0, 1}) without.A[joint].middleCols(kZero1, 3).setZero();
@@ -88,8 +87,7 @@ class Hypotheses {
         driven_(driven),
         cycle_(cycle),
         per_change_(kChange * (1 + 8.0 / form.windows())) {
-    log_ = Best({}, {});
-    equations_ = EquationsOf(log_);
+    FindDelay();
     best_ = second_ = log_;
   }
 
@@ -113,7 +111,7 @@ class Hypotheses {
   bool HasNoEffect() const {
     constexpr double kExplained = 0.02, kMore = 0.3;  // share, of the misfit
     if (!IsDriven()) return false;
-    if (std::max(log_.fit.unexplained[0], log_.fit.unexplained[1]) > kExplained) return false;
+    if (log_.fit.left() > kExplained) return false;
     WeakEquations without = equations_;
     without.A[0].col(weak::kTorque1).setZero();
     without.A[1].col(weak::kTorque2).setZero();
@@ -151,10 +149,11 @@ class Hypotheses {
   void TryTimes() {
     for (const double late : {-0.1, -0.05, 0.05, 0.1}) TryAngles({.late = late * form_.time()});
     if (!IsDriven()) return;
+    const std::vector<double> normal = Normal();
     for (const double late : {-0.6, -0.45, -0.3, -0.2, 0.2, 0.3, 0.45, 0.6}) {
       Hypothesis next = log_;
       next.delay = late * form_.time();
-      if (next.delay > Normal().front() && next.delay < Normal().back()) continue;
+      if (next.delay > normal.front() && next.delay < normal.back()) continue;
       next.is_late = true;
       RefitTorques(next);
       Offer(next);
@@ -229,30 +228,28 @@ class Hypotheses {
     return delays;
   }
 
-  /// The reading with the delay that explains the motion best.
-  Hypothesis Best(const AngleReading& angles, const TorqueReading& torques) const {
-    Hypothesis best;
-    best.angles = angles;
-    best.torques = torques;
-    WeakEquations equations = EquationsOf(best);
-    best.fit = FitSmallZeros(equations);
-    if (!IsDriven()) return best;
-    const std::vector<double> normal = Normal();
+  /// Fits the log as it is, with the delay of its torques that explains the motion best.
+  void FindDelay() {
+    equations_ = EquationsOf(log_);
+    log_.fit = FitSmallZeros(equations_);
+    if (!IsDriven()) return;
+    WeakEquations equations = equations_;
     const auto try_delay = [&](double delay) {
-      SetTorques(torques, delay, equations);
+      SetTorques(log_.torques, delay, equations);
       const WeakFit fit = FitSmallZeros(equations);
-      if (fit.misfit() >= best.fit.misfit()) return;
-      best.delay = delay;
-      best.fit = fit;
+      if (fit.misfit() >= log_.fit.misfit()) return;
+      log_.delay = delay;
+      log_.fit = fit;
     };
+    const std::vector<double> normal = Normal();
     for (const double delay : normal) try_delay(delay);
     for (double step = (normal[1] - normal[0]) / 2; step > 0.002 * form_.time(); step /= 2) {
-      const double middle = best.delay;
+      const double middle = log_.delay;
       for (const double delay : {middle - step, middle + step}) {
         if (delay >= normal.front() && delay <= normal.back()) try_delay(delay);
       }
     }
-    return best;
+    SetTorques(log_.torques, log_.delay, equations_);
   }
 
   WeakEquations EquationsOf(const Hypothesis& h) const {
@@ -271,10 +268,7 @@ class Hypotheses {
   }
 
   /// Fits the constants again, with the hypothesis's delay.
-  void Refit(Hypothesis& h) const {
-    const WeakEquations equations = EquationsOf(h);
-    h.fit = FitSmallZeros(equations, ColumnsOf(h.change, equations));
-  }
+  void Refit(Hypothesis& h) const { h.fit = FitSmallZeros(EquationsOf(h)); }
 
   /// The same for a hypothesis that leaves the angles as they are.
   void RefitTorques(Hypothesis& h) const {
@@ -283,10 +277,10 @@ class Hypotheses {
     h.fit = FitSmallZeros(equations);
   }
 
+  /// The columns of a change that there is.
   std::array<Eigen::MatrixXd, 2> ColumnsOf(const Change& change,
                                            const WeakEquations& equations) const {
     std::array<Eigen::MatrixXd, 2> columns;
-    if (change.kind == Change::kNone) return columns;
     const int windows = equations.windows();
     if (change.kind == Change::kOffset) {
       for (const int joint : {0, 1}) {
@@ -361,15 +355,10 @@ class Hypotheses {
       h.angles = reading;
       h.torques.swapped = swapped;
       // No zeros and signs explain more than this.
-      const WeakEquations equations = EquationsOf(h);
-      const WeakFit any = FitAnyZeroAndSign(equations);
-      h.fit = any;
+      h.fit = FitAnyZeroAndSign(EquationsOf(h));
       if (h.cost(per_change_) >= best_.cost(per_change_)) continue;
+      const auto [zero1, zero12, zero2] = h.fit.zeros();
       TrySigns(h);
-      const Eigen::VectorXd& x = any.constants;
-      const double zero1 = std::atan2(x(weak::kZero1), x(weak::kG1));
-      const double zero12 = std::atan2(x(weak::kZero12), x(weak::kG2));
-      const double zero2 = std::atan2(x(weak::kZeroB), x(weak::kB));
       for (const Joints& zero :
            {Joints{zero1, zero12 - zero1}, {zero12 - zero2, zero2}, {zero1, zero2}}) {
         Hypothesis turned = h;
@@ -384,10 +373,8 @@ class Hypotheses {
   void ImproveZeros(Hypothesis& h) const {
     for (int round = 0; round < 3; ++round) {
       const WeakFit fit = FitAnySign(h);
-      const Eigen::VectorXd& x = fit.constants;
-      if (!(x(weak::kG1) > 0) || !(x(weak::kG2) > 0)) return;
-      const double zero1 = std::atan(x(weak::kZero1) / x(weak::kG1));
-      const double zero12 = std::atan(x(weak::kZero12) / x(weak::kG2));
+      if (!(fit.constants(weak::kG1) > 0) || !(fit.constants(weak::kG2) > 0)) return;
+      const auto [zero1, zero12, zero2] = fit.zeros();
       h.angles.zero[0] = std::remainder(h.angles.zero[0] + zero1, kFullTurn);
       h.angles.zero[1] = std::remainder(h.angles.zero[1] + zero12 - zero1, kFullTurn);
     }
@@ -589,9 +576,6 @@ std::string TextOf(const std::vector<Suspicion>& suspicions) {
   return text;
 }
 
-/// The share of the motion that a fit leaves unexplained, of the joint with more.
-double LeftBy(const WeakFit& fit) { return std::max(fit.unexplained[0], fit.unexplained[1]); }
-
 void Report(const Hypotheses& tried, double seconds, bool in_proportion, Findings& findings) {
   const Hypothesis &log = tried.log(), &best = tried.best(), &second = tried.second();
   std::string rivals;
@@ -608,8 +592,8 @@ void Report(const Hypotheses& tried, double seconds, bool in_proportion, Finding
         Severity::kFault,
         fmt::format("suspect {}: with it the equations of a pendulum leave {:.2g}% of the motion "
                     "unexplained, without it {:.2g}%{}",
-                    s.text, 100 * LeftBy(best.fit), 100 * LeftBy(log.fit), rivals),
-        {}, {{"unexplained", LeftBy(log.fit)}, {"unexplained_after", LeftBy(best.fit)}});
+                    s.text, 100 * best.fit.left(), 100 * log.fit.left(), rivals),
+        {}, {{"unexplained", log.fit.left()}, {"unexplained_after", best.fit.left()}});
   }
 }
 
@@ -624,23 +608,25 @@ void ReportDriven(Pieces pieces, Findings& findings) {
                   zero ? "wrong" : "missing"));
 }
 
-/// The natural time of the machine, s: that of the constants that fit best, whatever the zeros and
-/// signs. 0 if the log does not have it.
-double FindNaturalTime(Pieces pieces) {
+/// The equations in the natural time of the machine: that of the constants that fit best, whatever
+/// the zeros and signs. If that leaves too few windows, the own time of the motion has to do.
+/// Nothing if the motion has none, or too few windows.
+std::optional<WeakForm> FormOf(Pieces pieces) {
   const double own = OwnTime(pieces);
-  if (!(own > 0)) return 0;
+  if (!(own > 0)) return {};
   constexpr int kRounds = 3;
   constexpr double kNear = 3;  // largest factor between the own time and the natural time
-  double time = own;
+  WeakForm first(pieces, own);
+  if (first.windows() < kEnough) return {};
+  WeakForm form = first;
   for (int round = 0; round < kRounds; ++round) {
-    const WeakForm form(pieces, time);
-    if (form.windows() < kEnough) return own;
     const WeakEquations equations = form.Equations({}, {}, 0);
     const double found = NaturalTimeOf(FitAnyZeroAndSign(equations).constants);
-    if (!(found > 0)) return own;
-    time = std::clamp(found, own / kNear, kNear * own);
+    if (!(found > 0)) return first;
+    form = WeakForm(pieces, std::clamp(found, own / kNear, kNear * own));
+    if (form.windows() < kEnough) return first;
   }
-  return WeakForm(pieces, time).windows() < kEnough ? own : time;
+  return form;
 }
 
 }  // namespace
@@ -657,16 +643,14 @@ void CheckEquations(Pieces pieces, Findings& findings) {
   if (!(cycle > 0)) return;
   Driven driven = DrivenJoints(pieces);
   const bool free = IsFree(pieces);
-  const double time = FindNaturalTime(pieces);
-  if (!(time > 0)) return;
-  const WeakForm form(pieces, time);
-  if (form.windows() < kEnough) return;
+  const std::optional<WeakForm> found = FormOf(pieces);
+  if (!found) return;
+  const WeakForm& form = *found;
   if (free || pieces.front().commanded.empty()) {
     Hypotheses undriven(form, {false, false}, cycle);
     undriven.TryAll(pieces);
-    if (LeftBy(undriven.best().fit) <= kFreeLeft) {
-      driven = {false,
-                false};  // idle motors report torques that have nothing to do with the motion
+    if (undriven.best().fit.left() <= kFreeLeft) {
+      driven = {false, false};
     } else if (free) {
       return ReportDriven(pieces, findings);
     }
@@ -677,8 +661,8 @@ void CheckEquations(Pieces pieces, Findings& findings) {
   tried.TryAll(pieces);
   const Hypothesis& best = tried.best();
   const Reporter report{findings, Aspect::kMotion};
-  if (best.changes() == 0 || best.changes() > kMostChanges || LeftBy(best.fit) > kGood) {
-    const double left = LeftBy(tried.log().fit);
+  if (best.changes() == 0 || best.changes() > kMostChanges || best.fit.left() > kGood) {
+    const double left = tried.log().fit.left();
     report(left > kUnexplained ? Severity::kFault : Severity::kNote,
            fmt::format(
                "the equations of a pendulum leave {:.2g}% of the motion unexplained{}", 100 * left,

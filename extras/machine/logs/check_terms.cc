@@ -50,11 +50,11 @@ Window SmoothWindowAt(const MachineLog& log, int first, int last, int span, doub
   return window;
 }
 
-std::array<Terms, 2> TermsOf(const Window& window, const Reading& reading) {
+std::array<Terms, 2> TermsOf(const Window& window) {
   using namespace column;
   std::array<Terms, 2> both{Terms::Zero(), Terms::Zero()};
   for (const Sample& sample : window) {
-    const Joints q = reading.Of(sample.q), w = reading.Of(sample.w);
+    const Joints &q = sample.q, &w = sample.w;
     const auto angles = dynamics::AnglesOf<double>({q[0], q[1]});
     const auto& [s1, c1, s2, c2] = angles;
     const auto plain = MomentumRegressorOf(angles, {w[0], w[1]});

@@ -30,19 +30,6 @@ Window WindowAt(const MachineLog& log, int first, int last, int span, double cyc
 /// encoders.
 Window SmoothWindowAt(const MachineLog& log, int first, int last, int span, double cycle);
 
-/// A way to read the columns of the angles.
-struct Reading {
-  Joints sign{1, 1}, unit{1, 1};  // rad
-  double link1 = 0;  // angles of joint 1 that are in those of joint 2; 1: against the vertical
-  bool swapped = false;
-
-  Joints Of(const Joints& x) const {
-    Joints y{sign[0] * unit[0] * x[swapped ? 1 : 0], sign[1] * unit[1] * x[swapped ? 0 : 1]};
-    y[1] -= link1 * y[0];
-    return y;
-  }
-};
-
 /// Terms of an equation of motion, integrated over a window: changes of momenta, and torques.
 enum Term {
   kInertia,
@@ -68,6 +55,6 @@ using Terms = Eigen::Matrix<double, kTerms, 1>;
 /// Joint 2: d/dt [J2 (w1 + w2) + a w2 + b cos q2 w1] + b sin q2 w1 (w1 + w2) + G2 sin(q1 + q2) + …
 ///
 /// The turned terms are those with the angles a quarter turn ahead.
-std::array<Terms, 2> TermsOf(const Window& window, const Reading& reading = {});
+std::array<Terms, 2> TermsOf(const Window& window);
 
 }  // namespace upswing::machine

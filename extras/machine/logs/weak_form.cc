@@ -92,23 +92,31 @@ Eigen::VectorXd SolveNotNegative(const Eigen::MatrixXd& gram, const Eigen::Vecto
   return x;
 }
 
-/// Products of the columns of both joints.
-struct Grams {
-  std::array<Eigen::MatrixXd, 2> of;
-};
+/// Products of the columns of the equations of each joint.
+using Grams = std::array<Eigen::MatrixXd, 2>;
+
+Grams GramsOf(const std::array<Eigen::MatrixXd, 2>& columns) {
+  return {columns[0].transpose() * columns[0], columns[1].transpose() * columns[1]};
+}
+
+/// Whether each column's coefficient may have any sign: those of zeros, and `more` columns.
+std::vector<bool> FreeColumns(int more) {
+  std::vector<bool> is_free(weak::kColumns + more, true);
+  std::fill_n(is_free.begin(), kNotNegative, false);
+  return is_free;
+}
 
 /// Finds the constants with the least unexplained share. The scale of the constants is arbitrary:
 /// the sum of the inertias, each by the size of its column, is fixed.
 WeakFit Solve(const Grams& grams, const std::vector<bool>& is_free, int windows) {
   const int n = static_cast<int>(is_free.size());
-  Eigen::VectorXd size =
-      ((grams.of[0].diagonal() + grams.of[1].diagonal()) / (2 * windows)).cwiseSqrt();
+  Eigen::VectorXd size = ((grams[0].diagonal() + grams[1].diagonal()) / (2 * windows)).cwiseSqrt();
   for (int i = 0; i < n; ++i) {
     if (!(size(i) > 0)) size(i) = 1;
   }
   const Eigen::MatrixXd scaling = size.cwiseInverse().asDiagonal();
   std::array<Eigen::MatrixXd, 2> scaled;
-  for (const int row : {0, 1}) scaled[row] = scaling * grams.of[row] * scaling / windows;
+  for (const int row : {0, 1}) scaled[row] = scaling * grams[row] * scaling / windows;
   Eigen::VectorXd target = Eigen::VectorXd::Zero(n);
   for (const int i : {weak::kJ1, weak::kJ2, weak::kB}) target(i) = 1;
   const auto square = [&](int row, const Eigen::VectorXd& x, int first, int last) {
@@ -174,10 +182,9 @@ Joints TorqueIntegral::At(double time) const {
 
 WeakForm::WeakForm(std::span<const MachineLog> pieces, double time)
     : pieces_(pieces), time_(time), length_(kWindowLength * time) {
-  // Fast turns need closer knots than slow ones.
   std::vector<double> speeds;
   for (const MachineLog& log : pieces) {
-    const SmoothMotion motion(log, kBlock * time);
+    const SmoothMotion& motion = motions_.emplace_back(log, kBlock * time);
     if (motion.empty()) continue;
     for (double t = motion.begin(); t < motion.end(); t += time) {
       speeds.push_back(std::hypot(motion.At(0, t).velocity, motion.At(1, t).velocity));
@@ -187,8 +194,12 @@ WeakForm::WeakForm(std::span<const MachineLog> pieces, double time)
   std::ranges::sort(speeds);
   constexpr double kFast = 0.9;  // quantile
   const double fast = Quantile(speeds, kFast);
-  const double block = std::min(kBlock * time, kTurnOfBlock / std::max(fast, 1e-9));
-  for (const MachineLog& log : pieces) motions_.emplace_back(log, block);
+  // Fast turns need closer knots than slow ones.
+  const double block = kTurnOfBlock / std::max(fast, 1e-9);
+  if (block < kBlock * time) {
+    motions_.clear();
+    for (const MachineLog& log : pieces) motions_.emplace_back(log, block);
+  }
   double spacing = 0;
   for (const SmoothMotion& motion : motions_) spacing = std::max(spacing, motion.spacing());
   step_ = std::min(spacing, kBlock * time) / kPointsOfBlock;
@@ -314,36 +325,38 @@ void WeakForm::SetTorques(const TorqueReading& torques, double delay,
   }
 }
 
+double WeakFit::left() const { return std::max(unexplained[0], unexplained[1]); }
+
 double WeakFit::misfit() const {
   constexpr double kLeast = 2e-6;
   return std::log(std::max(unexplained[0], kLeast)) + std::log(std::max(unexplained[1], kLeast));
 }
 
 WeakFit Fit(const WeakEquations& equations, const std::array<Eigen::MatrixXd, 2>& free) {
-  const int more = static_cast<int>(free[0].cols());
-  Grams grams;
+  const auto more = static_cast<int>(free[0].cols());
+  if (more == 0) return Solve(GramsOf(equations.A), FreeColumns(0), equations.windows());
+  std::array<Eigen::MatrixXd, 2> all;
   for (const int joint : {0, 1}) {
-    Eigen::MatrixXd all(equations.windows(), weak::kColumns + more);
-    all.leftCols(weak::kColumns) = equations.A[joint];
-    if (more > 0) all.rightCols(more) = free[joint];
-    grams.of[joint] = all.transpose() * all;
+    all[joint].resize(equations.windows(), weak::kColumns + more);
+    all[joint] << equations.A[joint], free[joint];
   }
-  std::vector<bool> is_free(weak::kColumns + more, true);
-  std::fill_n(is_free.begin(), kNotNegative, false);
-  return Solve(grams, is_free, equations.windows());
+  return Solve(GramsOf(all), FreeColumns(more), equations.windows());
 }
 
 WeakFit FitAnyZeroAndSign(const WeakEquations& equations) {
-  Grams grams;
-  for (const int joint : {0, 1}) {
-    grams.of[joint] = equations.A[joint].transpose() * equations.A[joint];
-  }
-  std::vector<bool> is_free(weak::kColumns, true);
-  std::fill_n(is_free.begin(), kNotNegative, false);
+  std::vector<bool> is_free = FreeColumns(0);
   for (const int i : {weak::kB, weak::kG1, weak::kG2, weak::kTorque1, weak::kTorque2}) {
     is_free[i] = true;
   }
-  return Solve(grams, is_free, equations.windows());
+  return Solve(GramsOf(equations.A), is_free, equations.windows());
+}
+
+Zeros WeakFit::zeros() const {
+  using namespace weak;
+  const auto angle = [&](Column turned, Column plain) {
+    return std::atan2(constants(turned), constants(plain));
+  };
+  return {angle(kZero1, kG1), angle(kZero12, kG2), angle(kZeroB, kB)};
 }
 
 double NaturalTimeOf(const Eigen::VectorXd& x) {

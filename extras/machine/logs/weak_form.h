@@ -124,6 +124,12 @@ class WeakForm {
   Eigen::VectorXd weight_, slope_;  // (points) of the windows: φ dt, φ' dt
 };
 
+/// Zeros of the angles that a fit finds, rad: of link 1 and of link 2 against the vertical, by
+/// gravity, and of joint 2, by the coupling of the links.
+struct Zeros {
+  double link1, link2, joint2;
+};
+
 /// A fit of the constants to weak equations.
 struct WeakFit {
   Eigen::VectorXd constants;  // (columns), up to a common factor
@@ -131,6 +137,9 @@ struct WeakFit {
   // unexplained.
   Joints unexplained{1, 1};
 
+  /// The unexplained share of the joint with more.
+  double left() const;
+  Zeros zeros() const;
   /// Sum of the logarithms of both shares; below a limit all count the same.
   double misfit() const;
 };
