@@ -110,6 +110,17 @@ std::optional<std::string> TextOf(const toml::node& node) {
   return Concat("[", Join(items, ", "), "]");
 }
 
+std::string TakeText(toml::table& table, std::string_view key, const std::string& where) {
+  const toml::node* node = table.get(key);
+  if (node == nullptr) return {};
+  if (!node->is_string()) {
+    throw BadInput(Concat(PlaceOf(*node, where), ": ", key, ": expected a text, got another type"));
+  }
+  std::string text = node->as_string()->get();
+  table.erase(key);
+  return text;
+}
+
 std::vector<std::string> TakeUnknown(const Options& options, toml::table& table) {
   std::vector<std::string> unknown;
   toml::table known;

@@ -22,6 +22,10 @@ std::string PlaceOf(const toml::node& node, const std::string& where);
 /// A TOML value as text for Option::Set; nothing for a type that no setting has.
 std::optional<std::string> TextOf(const toml::node& node);
 
+/// Takes the text of a key out of a table; empty: the table lacks it. Throws BadInput for another
+/// type.
+std::string TakeText(toml::table& table, std::string_view key, const std::string& where);
+
 /// Removes everything from a table that is not an option in its section. Returns the names, such as
 /// task.model.
 std::vector<std::string> TakeUnknown(const Options& options, toml::table& table);

@@ -23,19 +23,6 @@ constexpr size_t kMostPlantBytes = 1 << 20;
 constexpr std::array<std::string_view, 5> kOtherTables{"actuator", "cogging", "sensors", "loop",
                                                        "sessions"};
 
-/// Takes the text of a key out of a table; empty: the table lacks it. Throws BadInput for another
-/// type.
-std::string TakeText(toml::table& table, std::string_view key, const std::string& where) {
-  const toml::node* node = table.get(key);
-  if (node == nullptr) return {};
-  if (!node->is_string()) {
-    throw BadInput(Concat(PlaceOf(*node, where), ": ", key, ": expected a text, got another type"));
-  }
-  std::string text = node->as_string()->get();
-  table.erase(key);
-  return text;
-}
-
 /// Removes kOtherTables. Throws BadInput unless each table left is one of a plant file.
 void TakeOwnTables(toml::table& table, const std::string& where) {
   std::vector<std::string> known{"plant", "disturbance", "covariance"};

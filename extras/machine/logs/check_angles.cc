@@ -39,11 +39,11 @@ bool IsSameReading(const MachineLog& log, int k) {
 }
 
 /// All repeats of at least five readings that are long enough to mislead a model of the motion.
-std::vector<Repeat> RepeatsOf(Pieces pieces, int joint) {
+std::vector<Repeat> RepeatsOf(Pieces pieces, int joint, double own_time) {
   constexpr int kReadings = 5;
   constexpr double kLong = 0.1;  // of the own time of the motion
   const double cycle = UsualCycle(pieces);
-  const double least = kLong * OwnTime(pieces);
+  const double least = kLong * own_time;
   std::vector<Repeat> repeats;
   for (const MachineLog& piece : pieces) {
     const auto difference = [&](int k) { return SpeedTo(piece, joint, k, cycle); };
@@ -77,7 +77,7 @@ bool IsSudden(const Repeat& repeat, double quantum) {
 }
 
 /// Finds repeats within motion: at the end of the range the encoder saturates, elsewhere it sticks.
-void CheckRepeats(Pieces pieces, int joint, const Reporter& report) {
+void CheckRepeats(Pieces pieces, int joint, double own_time, const Reporter& report) {
   const double quantum = RoughnessOf(pieces, joint);
   const auto [low, high] = std::ranges::minmax(ValuesOf(pieces, &MachineLog::angle, joint));
   constexpr double kPi = std::numbers::pi;
@@ -89,7 +89,7 @@ void CheckRepeats(Pieces pieces, int joint, const Reporter& report) {
   };
   Cause saturation{"saturates"};
   Cause sticking{"the encoder sticks"};
-  const std::vector<Repeat> repeats = RepeatsOf(pieces, joint);
+  const std::vector<Repeat> repeats = RepeatsOf(pieces, joint, own_time);
   for (const Repeat& repeat : repeats) {
     if (!IsSudden(repeat, quantum)) continue;
     const double q = repeat.piece->angle[repeat.first][joint];
@@ -127,14 +127,14 @@ double SpeedFrom(const MachineLog& log, int joint, int first) {
   return QuartilesOf(std::move(speeds)).median;
 }
 
-std::vector<Jump> JumpsOf(Pieces pieces, int joint) {
+std::vector<Jump> JumpsOf(Pieces pieces, int joint, double own_time) {
   constexpr double kLeast = 0.15;                         // rad
   constexpr double kAcceleration = 1000, kNatural = 100;  // rad/s², rad in an own time squared
   constexpr double kJitter = 1.5;                         // of a cycle's length
   constexpr int kRows = 4;                                // that repeat; CheckRepeats reports them
   constexpr double kCycles = 10;                          // of an own time, which jumps make short
   const double cycle = UsualCycle(pieces);
-  const double own_time = std::max(OwnTime(pieces), kCycles * cycle);
+  own_time = std::max(own_time, kCycles * cycle);
   const double acceleration =
       own_time > 0 ? std::max(kAcceleration, kNatural / (own_time * own_time)) : kAcceleration;
   std::vector<Jump> jumps;
@@ -164,11 +164,11 @@ std::vector<Jump> JumpsOf(Pieces pieces, int joint) {
 }
 
 /// Reports wrapped angles, wrong samples, and encoders that slip.
-void CheckJumps(Pieces pieces, int joint, const Reporter& report) {
+void CheckJumps(Pieces pieces, int joint, double own_time, const Reporter& report) {
   constexpr int kShort = 3;      // rows of a wrong sample
   constexpr double kNear = 0.5;  // rad
   constexpr double kTurn = 2 * std::numbers::pi;
-  const std::vector<Jump> jumps = JumpsOf(pieces, joint);
+  const std::vector<Jump> jumps = JumpsOf(pieces, joint, own_time);
   std::vector<Jump> wraps, wrong, slips;
   for (size_t i = 0; i < jumps.size(); ++i) {
     const bool returns = i + 1 < jumps.size() && jumps[i + 1].piece == jumps[i].piece &&
@@ -206,7 +206,7 @@ void CheckJumps(Pieces pieces, int joint, const Reporter& report) {
 }
 
 /// Reports speeds that no pendulum reaches: it would turn round several times within a swing.
-void CheckSpeeds(Pieces pieces, int joint, const Reporter& report) {
+void CheckSpeeds(Pieces pieces, int joint, double own_time, const Reporter& report) {
   std::vector<double> speeds;
   for (const MachineLog& piece : pieces) {
     for (int k = 1; k + 1 < piece.rows(); ++k) {
@@ -217,7 +217,7 @@ void CheckSpeeds(Pieces pieces, int joint, const Reporter& report) {
   std::ranges::sort(speeds);
   constexpr double kFast = 25;  // rad in the time of a swing's radian
   const double speed = Quantile(speeds, 0.99);
-  if (speed * OwnTime(pieces) <= kFast) return;
+  if (speed * own_time <= kFast) return;
   report(Severity::kFault,
          fmt::format("moves at {:.4g} rad/s: suspect degrees or counts (key unit)", speed), {},
          {{"speed", speed}});
@@ -261,6 +261,7 @@ std::optional<double> QuantumOf(Pieces pieces, int joint) {
 }
 
 void CheckAngles(Pieces pieces, Findings& findings) {
+  const double own_time = OwnTime(pieces);
   for (const int joint : {0, 1}) {
     const Reporter report{findings, Aspect::kAngle, joint + 1};
     const std::optional<double> quantum = QuantumOf(pieces, joint);
@@ -270,9 +271,9 @@ void CheckAngles(Pieces pieces, Findings& findings) {
                          2 * std::numbers::pi / *quantum),
              {}, {{"quantum", *quantum}});
     }
-    CheckRepeats(pieces, joint, report);
-    CheckJumps(pieces, joint, report);
-    CheckSpeeds(pieces, joint, report);
+    CheckRepeats(pieces, joint, own_time, report);
+    CheckJumps(pieces, joint, own_time, report);
+    CheckSpeeds(pieces, joint, own_time, report);
   }
 }
 

@@ -308,18 +308,6 @@ void FinishAngles(const LogColumns& columns, MachineLog& piece) {
   Unwrap(piece.angle, 1, columns.absolute ? std::max(wrap1, wrap2) : wrap2);
 }
 
-/// Rows `begin` to `end` of a log.
-MachineLog PieceOf(const MachineLog& whole, int begin, int end) {
-  MachineLog piece;
-  piece.first_row = begin + 1;
-  piece.time.assign(whole.time.begin() + begin, whole.time.begin() + end);
-  for (const JointQuantity& q : kJointQuantities) {
-    const std::vector<Joints>& values = whole.*q.values;
-    if (!values.empty()) (piece.*q.values).assign(values.begin() + begin, values.begin() + end);
-  }
-  return piece;
-}
-
 /// Sets a piece's clock to 0 at its first row. Rounds the times to the decimals that the file's
 /// clock resolves (1 µs for seconds since 1970), so that its origin and unit change no bit.
 void StartClock(MachineLog& piece) {
@@ -377,6 +365,18 @@ bool HasCommand(std::span<const MachineLog> logs, int joint) {
 
 bool HasCommands(std::span<const MachineLog> logs) {
   return HasCommand(logs, 0) || HasCommand(logs, 1);
+}
+
+MachineLog PieceOf(const MachineLog& whole, int begin, int end) {
+  MachineLog piece;
+  piece.name = whole.name;
+  piece.first_row = whole.first_row + begin;
+  piece.time.assign(whole.time.begin() + begin, whole.time.begin() + end);
+  for (const JointQuantity& q : kJointQuantities) {
+    const std::vector<Joints>& values = whole.*q.values;
+    if (!values.empty()) (piece.*q.values).assign(values.begin() + begin, values.begin() + end);
+  }
+  return piece;
 }
 
 LogColumns ParseLogColumns(std::string_view text, const std::string& where) {

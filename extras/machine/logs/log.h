@@ -34,6 +34,9 @@ struct MachineLog {
   int rows() const { return static_cast<int>(time.size()); }
 };
 
+/// The rows `begin` to before `end` (indices) of a log, with its name.
+MachineLog PieceOf(const MachineLog& whole, int begin, int end);
+
 /// Whether the torques of a log, which may lack them, are ever other than 0 at a joint (0 or 1).
 bool HasTorque(const std::vector<Joints>& torque, int joint);
 

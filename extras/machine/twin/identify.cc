@@ -88,6 +88,14 @@ class FitCounter {
   const Progress& progress_;
 };
 
+/// The settings of a fit whose result is only compared: it needs windows in a row, and fewer
+/// digits.
+FitConfig ForComparison(FitConfig config) {
+  config.windows.hop = config.windows.seconds;
+  config.tolerance = std::max(1e-4, config.tolerance);
+  return config;
+}
+
 /// Twins of a structure from logs without those of a fold.
 struct LeftOut {
   std::vector<Twin> of_folds;  // (folds)
@@ -106,14 +114,10 @@ class CrossValidation {
                   ThreadPool* pool, FitCounter& counter)
       : logs_(logs),
         fold_of_(Folds(logs, config.folds)),
-        config_(config.fit),
+        config_(ForComparison(config.fit)),
         seconds_(JudgedSeconds(first)),
         pool_(pool),
-        counter_(counter) {
-    // A comparison needs less than a result: windows in a row, and fewer digits.
-    config_.windows.hop = config_.windows.seconds;
-    config_.tolerance = std::max(1e-4, config_.tolerance);
-  }
+        counter_(counter) {}
 
   /// Begins with the values of the twins `guesses` (folds), which have another structure.
   LeftOut LeaveOut(const Structure& structure, const std::vector<Twin>& guesses) {
@@ -151,42 +155,22 @@ class CrossValidation {
   FitCounter& counter_;
 };
 
-/// Rows `first` to before `last` of a log.
-MachineLog PartOf(const MachineLog& log, int first, int last) {
-  const auto part = [&](const auto& values) {
-    if (values.empty()) return values;
-    return std::decay_t<decltype(values)>(values.begin() + first, values.begin() + last);
-  };
-  MachineLog own;
-  own.name = log.name;
-  own.first_row = log.first_row + first;
-  own.time = part(log.time);
-  own.angle = part(log.angle);
-  own.velocity = part(log.velocity);
-  own.commanded = part(log.commanded);
-  own.measured = part(log.measured);
-  own.push = part(log.push);
-  return own;
-}
-
 /// Judges a fit of this structure by the middle third of each log. A second fit does not see these
 /// parts. Nothing if one of the parts has too few windows: a fit without a prior needs one for each
 /// value.
 std::optional<Judgement> JudgeByMiddles(std::span<const MachineLog> logs, const Twin& first,
-                                        const Structure& structure, FitConfig config,
+                                        const Structure& structure, const FitConfig& config,
                                         ThreadPool* pool) {
   std::vector<MachineLog> middles, others;
   for (const MachineLog& log : logs) {
     const int begin = log.rows() / 3, end = 2 * log.rows() / 3;
     if (begin < 2) continue;
-    others.push_back(PartOf(log, 0, begin));
-    middles.push_back(PartOf(log, begin, end));
-    others.push_back(PartOf(log, end, log.rows()));
+    others.push_back(PieceOf(log, 0, begin));
+    middles.push_back(PieceOf(log, begin, end));
+    others.push_back(PieceOf(log, end, log.rows()));
   }
-  config.windows.hop = config.windows.seconds;
-  config.tolerance = std::max(1e-4, config.tolerance);
   try {
-    const FitResult fit = Fit(others, first, structure, config, pool);
+    const FitResult fit = Fit(others, first, structure, ForComparison(config), pool);
     const int fewest = config.adapts ? 4 : static_cast<int>(structure.values.size());
     if (fit.windows < fewest) return std::nullopt;
     const Judgement judgement = Judge(middles, PredictorOf("", fit.twin, middles).twins,

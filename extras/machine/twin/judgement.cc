@@ -214,7 +214,6 @@ Judgement Judge(std::span<const MachineLog> logs, std::span<const Twin> twins,
   Judgement judgement;
   judgement.logs = name;
   std::vector<std::vector<Explained>> of_logs(logs.size());
-  int longest_stride = 1;
   for (double length = kSeconds; judgement.windows == 0 && length > kSeconds / 8; length /= 2) {
     judgement.seconds = length * ScaleOverUsual(twins.front().plant).time;
     ParallelFor(pool, static_cast<int>(logs.size()), [&](int i) {
@@ -230,7 +229,7 @@ Judgement Judge(std::span<const MachineLog> logs, std::span<const Twin> twins,
   int rows = 0;
   for (const Explained& w : all)
     rows = std::max(rows, static_cast<int>(w.series.measured[0].size()));
-  longest_stride = std::max(1, static_cast<int>(kStepShare * rows));
+  const int longest_stride = std::max(1, static_cast<int>(kStepShare * rows));
   judgement.noise = NoiseIn(all, longest_stride);
   for (const Explained& w : all) judgement.errors.push_back(ErrorOf(w, judgement.noise));
   judgement.error = MedianOver(judgement, &WindowError::error);

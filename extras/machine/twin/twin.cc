@@ -163,27 +163,15 @@ void Twin::Describe(Options& options) {
 Twin ParseTwin(std::string_view text, const std::string& where) {
   toml::table table = ParseToml(text, where);
   Twin twin;
-  twin.name.clear();
   const bool has_plant = table.contains("plant");
-  if (const toml::node* name = table.get("name")) {
-    if (!name->is_string()) {
-      throw BadInput(Concat(PlaceOf(*name, where), ": name: expected a text, got another type"));
-    }
-    twin.name = name->as_string()->get();
-  }
-  if (const toml::node* distrust = table.get(kDistrustKey)) {
-    if (!distrust->is_string()) {
-      throw BadInput(Concat(PlaceOf(*distrust, where), ": ", kDistrustKey,
-                            ": expected a text, got another type"));
-    }
-    twin.distrust = distrust->as_string()->get();
-  }
+  twin.name = TakeText(table, "name", where);
+  twin.distrust = TakeText(table, kDistrustKey, where);
   Covariance covariance = TakeCovariance(table, where);
   twin.uncertain = std::move(covariance.names);
   twin.covariance = std::move(covariance.values);
   if (const toml::node* sessions = table.get("sessions")) ReadSessions(*sessions, where, twin);
   // The disturbance follows from the other values.
-  for (const char* key : {"name", kDistrustKey, "sessions", "disturbance"}) table.erase(key);
+  for (const char* key : {"sessions", "disturbance"}) table.erase(key);
   ApplyTable(OptionsOf(twin), table, where, /*flat=*/false);
   if (!has_plant) throw BadInput(Concat(where, ": expected a table [plant], got none"));
   CheckCogging(twin.cogging, where);
