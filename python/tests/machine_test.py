@@ -121,11 +121,21 @@ class Controllers(BadInputTest):
     def test_the_motor_may_be_at_joint_2(self):
         controller = quiet("mpc", **SMALL_MPC, actuated_joint=2)
         loop = FakeControlLoop(SMALL, experiment_time=3, seed=1)
-        drive(loop, controller)
+        driving = []
+
+        def noted(*reading):
+            torques = controller(*reading)
+            if controller.state == "running":
+                driving.append(torques[1])
+            return torques
+
+        drive(loop, noted)
         torques = np.array(loop.torques)
         self.assertFalse(np.any(torques[:, 0]))
-        self.assertGreater(np.abs(torques[:, 1]).max(), 0.05)
-        self.assertLessEqual(np.abs(torques[:, 1]).max(), 0.0801)
+        # A pulse may need the machine's whole torque to move the links. mpc has its own limit.
+        self.assertLessEqual(np.abs(torques[:, 1]).max(), 0.1501)
+        self.assertGreater(np.abs(driving).max(), 0.05)
+        self.assertLessEqual(np.abs(driving).max(), 0.0801)
         self.assertGreater(controller.driven, 0.01)
 
     def test_single_gaps_are_bridged_and_long_ones_are_faults(self):
