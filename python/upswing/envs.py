@@ -51,8 +51,9 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
             start_noise, memory, any_pose; the plant
             (mass1, …, torque_limit, actuated_joint, rotor_inertia, gear_ratio, coulomb1, coulomb2,
             center1, center2, inertia1, inertia2, armature); plant, a plant file (TOML with a
-            table [plant]) or a shipped plant such as "realaigym", which these change; sensor_noise, delay, encoder_counts, velocity_window, velocity_filter,
-            sensor_latency; randomize, …; the reward weights
+            table [plant]) or a shipped plant such as "realaigym", which these change;
+            sensor_noise, delay, encoder_counts, velocity_window, velocity_filter, sensor_latency,
+            late_share, late; randomize, …; the reward weights
 
     >>> env = gym.make("upswing/DoublePendulum-v0", physics="closed-form", mass2=1.2, delay=0.02)
     >>> obs, info = env.reset(seed=1, options={"state": [3.14, 0, 0, 0]})

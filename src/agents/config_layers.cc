@@ -127,7 +127,7 @@ constexpr TimedSetting kTimedSettings[] = {
     {"random_start_velocity", -1},   {"delay", 1},
     {"randomize_delay", 1},          {"sensor_latency", 1},
     {"randomize_sensor_latency", 1}, {"velocity_window", 1},
-    {"velocity_filter", 1},
+    {"velocity_filter", 1},          {"late", 1},
 };
 
 /// Multiplies the settings with units that only the named agent gives by `ratio`: the natural units

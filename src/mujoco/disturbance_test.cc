@@ -86,6 +86,57 @@ TEST(DelayedMotors, TorquesArriveAfterTheDelayAndNoneFromAnEarlierEpisode) {
   }
 }
 
+TEST(LateSteps, TheMotorsKeepTheTorqueBeforeForTheLateness) {
+  constexpr int kSteps = 100000;
+  PendulumEnvConfig config;
+  config.num_envs = 2;
+  config.control_period = 0.0075;
+  config.disturbances = {{}, {.late_share = 0.05, .late = 0.0375}};
+  LateSteps stage(config);
+  Episodes episodes;
+  episodes.disturbances = config.disturbances;
+  StepResult result{EnvSpec()};
+  // The torque chosen in step k is k, so that the applied torque tells how old it is.
+  std::vector<int> of_age(20);
+  for (int k = 0; k < kSteps; ++k) {
+    const std::vector<double> chosen(2, k);
+    ControlStep step{episodes, chosen, chosen, {nullptr, 2, 0}, result};
+    stage.Act(step);
+    ASSERT_EQ(step.applied[0], k);
+    ++of_age.at(static_cast<size_t>(k - step.applied[1]));
+  }
+  // A torque is fresh with p = 0.95. A late step and its 0 to 4 followers are 3 steps on average.
+  // The tolerance is more than five standard errors.
+  const double steps_per_draw = 0.95 + 0.05 * 3;
+  EXPECT_NEAR(of_age[0] / double{kSteps}, 0.95 / steps_per_draw, 0.01);
+  EXPECT_NEAR(of_age[1] / double{kSteps}, 0.95 * 0.05 / steps_per_draw, 0.005);
+  EXPECT_GT(of_age[5], 0.1 * of_age[1]);
+}
+
+TEST(LateSteps, AreRepeatableAndSavedWithARun) {
+  PendulumEnvConfig config;
+  config.engine = &kClosedForm;
+  config.disturbances = {{.late_share = 0.3, .late = 0.1}};
+  PendulumEnv env(config), other(config);
+  StepResult result = env.MakeResult();
+  const auto torques = [&](PendulumEnv& each) {
+    std::vector<double> applied;
+    for (int k = 0; k < 30; ++k) {
+      each.Step(std::array{0.1 * k}, result);
+      applied.push_back(result.torque[0]);
+    }
+    return applied;
+  };
+  const std::vector<double> first = torques(env);
+  EXPECT_EQ(first, torques(other));
+  PendulumEnv loaded(config);
+  SaveAndLoad([&](const Archive& archive) { env.State(archive); },
+              [&](const Archive& archive) { loaded.State(archive); });
+  const std::vector<double> second = torques(env);
+  EXPECT_NE(first, second);
+  EXPECT_EQ(torques(loaded), second);
+}
+
 TEST(NoisySensors, NoiseIsNormalAndIndependentOnAllFour) {
   constexpr int kCount = 20000;
   NoisySensors sensors(1, kControlPeriod, {}, 1, "test");

@@ -16,6 +16,10 @@ void Disturbance::Describe(Options& o, double delay_step) {
         "time from choosing a torque to its effect, in whole control periods")
       .step = delay_step;
   sensors.Describe(o);
+  o.Add(&late_share, "late_share", {0, 1}, "",
+        "share of the control steps that are late: they keep the torque before");
+  o.Add(&late, "late", {0, kLargestDelay}, "s",
+        "longest time for which a late control step keeps the torque before");
 }
 
 int Disturbance::delay_steps(double control_period) const {
@@ -28,7 +32,9 @@ Disturbance Larger(const Disturbance& a, const Disturbance& b) {
           std::max(a.delay, b.delay),
           {std::max(x.latency, y.latency), std::max(x.encoder_counts, y.encoder_counts),
            std::max(x.velocity_window, y.velocity_window),
-           std::max(x.velocity_filter, y.velocity_filter)}};
+           std::max(x.velocity_filter, y.velocity_filter)},
+          std::max(a.late_share, b.late_share),
+          std::max(a.late, b.late)};
 }
 
 NoisySensors::NoisySensors(int num_envs, double control_period, const SensorModel& slowest,

@@ -15,21 +15,29 @@ namespace upswing {
 
 inline constexpr double kLargestDelay = 1;  // s
 
-/// Sensor noise, motor delay and sensor model of one environment; zeros: no disturbance.
+/// Sensor noise, motor delay, late control steps and sensor model of one environment; zeros: no
+/// disturbance.
 ///
 /// The delay belongs to the motor: a torque acts `delay` after the controller chooses it. Until the
 /// first chosen torque acts, the torque is zero. The sensors' latency is the age of the measured
 /// state.
+///
+/// A late control step keeps the torque before it, as do the following ones for up to `late`: the
+/// loop's computer does not answer in time. Such steps are the sticky actions of Machado et al.
+/// (2018), with a length in s.
 struct Disturbance {
   double sensor_noise = 0;  // standard deviation on each measured angle and velocity, rad, rad/s
   double delay = 0;         // from choosing a torque to its effect, s, in whole control periods
   SensorModel sensors = {};
+  double late_share = 0;  // share of the control steps that are late
+  double late = 0;        // longest lateness, s
 
   /// Declares each setting in `options`: name, range, unit, help.
   /// Delays are multiples of `delay_step` (s); 0: any.
   void Describe(Options& options, double delay_step = 0);
 
-  bool any() const { return sensor_noise > 0 || delay > 0 || !sensors.exact(); }
+  bool any() const { return sensor_noise > 0 || delay > 0 || is_late() || !sensors.exact(); }
+  bool is_late() const { return late_share > 0 && late > 0; }
   /// The delay in control periods (s).
   int delay_steps(double control_period) const;
 };

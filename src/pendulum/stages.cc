@@ -13,6 +13,7 @@ namespace {
 
 /// The random streams other than the start states' stream, for a stream of environments.
 std::string PlantStream(const std::string& stream) { return Concat(stream, ": plant"); }
+std::string LateStream(const std::string& stream) { return Concat(stream, ": late steps"); }
 std::string NoiseStream(const std::string& stream) { return Concat(stream, ": sensor noise"); }
 
 /// For each setting, the largest value that an episode may have.
@@ -98,6 +99,52 @@ void DelayedMotors::Act(ControlStep& step) {
 
 void DelayedMotors::State(const Archive& archive, Episodes& /*episodes*/) {
   archive.In("disturbance").Array("queues", std::span(queues_));
+}
+
+// ---- Late control steps.
+
+LateSteps::LateSteps(const PendulumEnvConfig& config)
+    : period_(config.control_period),
+      stream_(LateStream(config.stream)),
+      applied_(static_cast<size_t>(config.num_envs)),
+      waits_(static_cast<size_t>(config.num_envs)) {
+  for (int i = 0; i < config.num_envs; ++i) {
+    rngs_.emplace_back(config.seed, stream_, config.first_index + static_cast<uint64_t>(i));
+  }
+}
+
+void LateSteps::Seed(int env, uint64_t seed) {
+  rngs_[static_cast<size_t>(env)] = Rng(seed, stream_);
+}
+
+void LateSteps::Begin(int env, Episodes& /*episodes*/, std::span<float> /*obs*/) {
+  applied_[static_cast<size_t>(env)] = 0;
+  waits_[static_cast<size_t>(env)] = 0;
+}
+
+void LateSteps::Act(ControlStep& step) {
+  for (int env = 0; env < step.num_envs(); ++env) {
+    const auto i = static_cast<size_t>(env);
+    const Disturbance& disturbance = step.episodes.disturbances[i];
+    if (step.episodes.is_held(env)) continue;
+    if (waits_[i] > 0) {
+      --waits_[i];
+    } else if (disturbance.is_late() && rngs_[i].Uniform() < disturbance.late_share) {
+      // This step, and those that begin within the lateness.
+      waits_[i] = static_cast<int64_t>(rngs_[i].Uniform(0, disturbance.late) / period_);
+    } else {
+      applied_[i] = step.applied[i];
+    }
+  }
+  step.applied = applied_;
+}
+
+void LateSteps::State(const Archive& archive, Episodes& /*episodes*/) {
+  const Archive late = archive.In("late_steps");
+  late.Array("applied", std::span(applied_));
+  late.Array("waits", std::span(waits_),
+             {0, static_cast<int64_t>(kLargestDelay / kShortestPeriod)});
+  for (size_t i = 0; i < rngs_.size(); ++i) rngs_[i].State(late.In(Concat("rng.", i)));
 }
 
 // ---- Goals.
@@ -273,6 +320,8 @@ std::vector<std::unique_ptr<Stage>> MakeStages(const PendulumEnvConfig& config) 
     stages.push_back(std::make_unique<DelayedMotors>(config.num_envs, config.control_period,
                                                      largest.delay_steps(config.control_period)));
   }
+  // After DelayedMotors: a late loop sends nothing, and the last torque stays.
+  if (largest.is_late()) stages.push_back(std::make_unique<LateSteps>(config));
   // Before ExpressionReward, which reads the terms and the goal that PoseGoal judges.
   if (config.any_pose) stages.push_back(std::make_unique<PoseGoal>(config));
   if (has_expression) stages.push_back(std::make_unique<ExpressionReward>(config));

@@ -61,6 +61,24 @@ class DelayedMotors : public Stage {
   std::vector<double> applied_;  // (N) N·m
 };
 
+/// Late control steps: the motors keep the torque before.
+class LateSteps : public Stage {
+ public:
+  explicit LateSteps(const PendulumEnvConfig& config);
+
+  void Seed(int env, uint64_t seed) override;
+  void Begin(int env, Episodes& episodes, std::span<float> obs) override;
+  void Act(ControlStep& step) override;
+  void State(const Archive& archive, Episodes& episodes) override;
+
+ private:
+  double period_;  // of control, s
+  std::string stream_;
+  std::vector<Rng> rngs_;        // (N)
+  std::vector<double> applied_;  // (N) N·m
+  std::vector<int64_t> waits_;   // (N) further control steps that keep the torque
+};
+
 /// Episodes that ask for a pose of kPoses, the goal: draws it, judges by it and shows it in the
 /// observations.
 class PoseGoal : public Stage {
