@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "extras/machine/logs/check.h"
+#include "extras/machine/twin/length_by_motion.h"
 #include "extras/machine/twin/physics_rules.h"
 
 namespace upswing::machine {
@@ -347,6 +348,8 @@ std::string DistrustOf(const Judgement& judgement, const Twin& twin,
   std::vector<std::string> reasons;
   if (!judgement.explains()) reasons.push_back(SentenceOf(judgement));
   for (const std::string& line : OutsidePhysics(twin, reports)) reasons.push_back(line);
+  const std::string contradiction = LengthContradiction(logs, twin);
+  if (!contradiction.empty()) reasons.push_back(contradiction);
   return Join(reasons, "; ");
 }
 

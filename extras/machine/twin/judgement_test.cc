@@ -37,8 +37,6 @@ MachineLog SwingOf(const Twin& machine, const Image& image, double digits, doubl
   return log;
 }
 
-Image ImageOfLength(double length) { return {length, std::pow(length, 3), std::sqrt(length)}; }
-
 Twin MachineOf(const LabSetup& setup) {
   Twin twin = ImageOf(TestTwin(), ImageOfLength(setup.length));
   twin.sensors = MachineSensors();

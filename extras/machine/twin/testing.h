@@ -58,6 +58,11 @@ struct Image {
   }
 };
 
+/// The units of a size in which time counts by the square root of lengths, and mass by volume.
+inline Image ImageOfLength(double length) {
+  return {length, std::pow(length, 3), std::sqrt(length)};
+}
+
 /// The image of a twin without sessions: the same machine, with its drives, its loop and its
 /// covariance, in another size.
 inline Twin ImageOf(const Twin& twin, const Image& image) {
