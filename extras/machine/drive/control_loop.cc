@@ -31,6 +31,7 @@ ControlLoop::CycleStart ControlLoop::WaitForDeadline() {
   summary_.latest = std::max(summary_.latest, late);
   const auto missed = static_cast<int64_t>(std::max(0.0, late / period_));
   summary_.missed += missed;
+  if (MayDrive(supervisor_.state())) summary_.moving += missed;
   cycle_ += missed;
   return {.deadline = deadline, .now = now, .late = late};
 }

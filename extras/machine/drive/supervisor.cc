@@ -269,11 +269,13 @@ Complaint Supervisor::CheckResponse() {
   return earned_.JudgeRun();
 }
 
+/// The velocity may not exceed its limit until the first torque of the brake acts.
 Complaint Supervisor::CheckLimits(const CycleFacts& facts) const {
   const Limits& limits = config_.limits;
   const auto& [q1, q2, w1, w2] = facts.state;
   const double angle = std::max(std::abs(q1), std::abs(q2));
-  const double velocity = std::max(std::abs(w1), std::abs(w2));
+  const double velocity =
+      std::max({std::abs(w1), std::abs(w2), std::abs(facts.ahead.w1), std::abs(facts.ahead.w2)});
   if (!Within(angle, limits.angle)) {
     return {"angle: %.4g rad is beyond the limit %.4g rad", {angle, limits.angle}};
   }
@@ -309,8 +311,8 @@ void Supervisor::GoOnBraking(const CycleFacts& facts) {
 bool Supervisor::AtRest(const PendulumState& s) const { return HangSlowly(s, Velocity(kSlow)); }
 
 bool Supervisor::AtStart(const PendulumState& s) const {
-  return Within(Wrapped(s.q1 - config_.start.q1), kStartAngle) &&
-         Within(Wrapped(s.q2 - config_.start.q2), kStartAngle) &&
+  return Within(Wrapped(s.q1 - config_.start.q1), config_.start_angle) &&
+         Within(Wrapped(s.q2 - config_.start.q2), config_.start_angle) &&
          Within(s.w1 - config_.start.w1, Velocity(kStartVelocity)) &&
          Within(s.w2 - config_.start.w2, Velocity(kStartVelocity));
 }

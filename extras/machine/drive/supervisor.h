@@ -67,14 +67,18 @@ struct CycleFacts {
   bool stop = false;         // whether the user or the end of the run asks for a stop
 };
 
+/// Usual distance from the start state at which the controller takes over, rad.
+inline constexpr double kStartAngle = 0.3;
+
 /// The settings of a supervisor.
 struct SupervisorConfig {
   Limits limits;
   // Natural units of the machine over those of UsualPlant, in which thresholds of velocity,
   // acceleration and time count.
   Scale scale = {};
-  // State in which the controller takes over, to within kStartAngle and kStartVelocity.
+  // State in which the controller takes over, to within start_angle (rad) and kStartVelocity.
   PendulumState start = {};
+  double start_angle = kStartAngle;
   Joints motor_limit{};    // largest torque of each joint, N·m
   int actuated_joint = 1;  // of the controller's motor, 1 or 2
   TwinTrust trust = TwinTrust::kAlways;
@@ -107,8 +111,8 @@ class Supervisor {
   /// Number of cycles in which a torque was clipped.
   int64_t clipped() const { return clipped_; }
 
-  // Distance from the start state at which the controller takes over; rad, and rad/s by scale.
-  static constexpr double kStartAngle = 0.3, kStartVelocity = 0.5;
+  // Velocity relative to the start state at which the controller takes over, rad/s by scale.
+  static constexpr double kStartVelocity = 0.5;
   static constexpr int kArmReadings = 5;  // readings in a row before the motors are armed
 
  private:
