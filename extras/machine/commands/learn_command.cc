@@ -25,6 +25,7 @@ struct LearnArguments {
   LearnConfig config;
   std::vector<FlagValue> limits;  // the given ones
   int64_t seed = 1, threads = 0;
+  bool draw = false;
 };
 
 std::unique_ptr<MachineLink> g_learned;  // global for signal handlers, which may come until the end
@@ -68,13 +69,17 @@ LearnConfig LearnConfigOf(const LearnArguments& a) {
 }
 
 /// Opens the link to a machine, or to a twin that hangs at rest in simulated time.
-std::unique_ptr<MachineLink> OpenLink(const std::string& link, uint64_t seed) {
-  const LinkAddress address = ParseLink(link, /*listens=*/false);
-  if (address.transport == LinkAddress::Transport::kTwin) {
-    return std::make_unique<TwinLink>(ReadTwin(address.place, "--link", kLinkForms),
-                                      PendulumState(), seed);
+std::unique_ptr<MachineLink> OpenLink(const LearnArguments& a) {
+  const LinkAddress address = ParseLink(a.link, /*listens=*/false);
+  const bool is_twin = address.transport == LinkAddress::Transport::kTwin;
+  const Twin twin = is_twin ? ReadTwin(address.place, "--link", kLinkForms) : Twin();
+  if (a.draw && twin.covariance.empty()) {
+    throw BadInput("--draw: expected a twin with [covariance] as --link, got none");
   }
-  return std::make_unique<ChannelLink>(Channel::Connect(address));
+  if (!is_twin) return std::make_unique<ChannelLink>(Channel::Connect(address));
+  const auto seed = static_cast<uint64_t>(a.seed);
+  Rng rng(seed, "learn: machine");
+  return std::make_unique<TwinLink>(a.draw ? DrawTwin(twin, rng) : twin, PendulumState(), seed);
 }
 
 /// Learns on g_learned until a signal stops it. Prints each step, and appends it to `report`. If
@@ -125,7 +130,7 @@ int SayResult(const LearnArguments& a, const Limits& limits, const LearnResult& 
 
 int RunLearn(const LearnArguments& a) {
   const LearnConfig config = LearnConfigOf(a);
-  g_learned = OpenLink(a.link, config.seed);
+  g_learned = OpenLink(a);
   CheckFree(a.out);
   NewFolder folder(a.out);
   GuardMotors([] { g_learned->SwitchOffAtOnce(); });
@@ -151,6 +156,8 @@ void AddLearn(CommandLine& line) {
   line.Settings(OptionsOf(a.config.limits), a.limits);
   AddSeed(line, a.seed, "the excitations and of simulated tries");
   AddThreads(line, a.threads);
+  line.Flag("--draw", a.draw,
+            "with a twin as --link: play a machine drawn from the twin's covariance");
   line.Notes(
       "The links must hang at rest. Torques grow until they move. The program identifies a twin\n"
       "from this motion, designs a controller on it and tries it. After a failed try it\n"

@@ -28,6 +28,8 @@ class Learn(ProgramTest):
                  "--max-energy: expected 1.1 or more for a swing-up, got 0.9"),
                 ([*LEARN, "--link", TWIN, "--robot", "cartpole"],
                  "--robot: expected pendubot or acrobot", "cartpole"),
+                ([*LEARN, "--link", "realaigym-c1", "--draw"],
+                 "--draw: expected a twin with [covariance] as --link, got none"),
                 ([*LEARN, "--link", "none.toml"], "none.toml")]:
             with self.subTest(arguments=arguments):
                 self.refuse(arguments, *words)

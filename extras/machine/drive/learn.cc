@@ -5,22 +5,23 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
-#include <numbers>
 #include <utility>
 #include <vector>
 
-#include "agents/controllers.h"
 #include "base/error.h"
 #include "base/format.h"
 #include "base/text.h"
 #include "extras/machine/drive/excitation.h"
+#include "extras/machine/drive/learn_candidates.h"
+#include "extras/machine/drive/learn_causes.h"
+#include "extras/machine/drive/learn_trials.h"
 #include "extras/machine/drive/learning_run.h"
 #include "extras/machine/drive/policy_controller.h"
 #include "extras/machine/logs/check.h"
 #include "extras/machine/twin/first_twin.h"
 #include "extras/machine/twin/identify.h"
+#include "extras/machine/twin/physics_rules.h"
 #include "os/file.h"
-#include "pendulum/runge_kutta.h"
 
 namespace upswing::machine {
 namespace {
@@ -36,83 +37,21 @@ struct ExcitationPlan {
 };
 constexpr ExcitationPlan kSmallMotion{4, 0.8, 0.2, 0.3}, kLargeMotion{6, 2, 0.6, 0.5};
 constexpr double kLimitShare = 0.6;  // share of the user's limits that an excitation aims at
+constexpr int kMostExcitations = 3;  // until a twin that explains nothing has to do
 
 constexpr double kLargestError = 0.1;    // of a fit, rad
 constexpr double kLargestZero = 0.2;     // of the encoders, rad
-constexpr double kLongestSwinging = 60;  // until the links rest, s
-constexpr int kDraws = 5;                // machines of the posterior that judge a controller
+constexpr double kLongestSwinging = 600;  // until links without friction rest, s
+constexpr double kMostSpread = 4;        // of simulated machines, in deviations of the twin
 
-/// A controller to choose.
-struct Candidate {
-  std::string controller;   // its name (agents/controllers.h)
-  ControllerConfig config;  // with the design plant
-  double compensation = 0;  // share of dry friction that motors compensate under it
-};
-
-/// The controller that is to be tried.
+/// A controller to try.
 struct Choice {
   MachinePolicy policy;  // null: none
   PolicyArguments arguments;
+  int candidate = 0;        // index
   double compensation = 0;  // share of dry friction that motors compensate under it
+  int held = 0;             // simulated machines that it balances
 };
-
-/// The candidates for a plant, the best first. mpc needs milliseconds for a decision. The last two
-/// plan with dry friction instead of compensating it: under noise, compensation shakes a light
-/// link.
-std::vector<Candidate> CandidatesFor(const Plant& plant) {
-  constexpr double kUsualCompensation = 0.95;
-  // The numbers are for the size of RealAIGym's boards.
-  const Scale scale = TaskScaleOf(plant);
-  const ControllerConfig usual = ControllerConfig::For(WithoutDryFriction(plant));
-
-  ControllerConfig stiff = usual;
-  stiff.lqr.q1 = stiff.lqr.q2 = 100;
-  stiff.lqr.torque = 0.3 / (scale.torque * scale.torque);
-
-  ControllerConfig slow = usual;
-  slow.tvlqr = {.seconds = 6 * scale.time, .reserve = 0.1};
-
-  ControllerConfig quick = stiff;
-  quick.mpc.seconds = 0.3 * scale.time;
-  quick.mpc.angle_range = 9;
-
-  ControllerConfig with_friction = usual;
-  with_friction.mpc.seconds = scale.time;
-  with_friction.plant.coulomb1 = plant.coulomb1;
-  with_friction.plant.coulomb2 = plant.coulomb2;
-
-  // In the regulator's linear model, damping stands for the friction of the joint without a motor.
-  ControllerConfig with_damping = with_friction;
-  constexpr double kDamping = 2;  // for dry friction, s/rad
-  if (plant.actuated_joint == 1) {
-    with_damping.plant.damping2 += kDamping * scale.time * plant.coulomb2;
-  } else {
-    with_damping.plant.damping1 += kDamping * scale.time * plant.coulomb1;
-  }
-  return {{"tvlqr", usual, kUsualCompensation},
-          {"tvlqr", stiff, kUsualCompensation},
-          {"tvlqr", slow, kUsualCompensation},
-          {"mpc", quick, kUsualCompensation},
-          {"mpc", with_friction, 0},
-          {"mpc", with_damping, 0}};
-}
-
-/// The arguments that turn the defaults into the candidate, as a user gives them. GetMachinePolicy
-/// designs on the twin's plant without dry friction, so changes of the plant are relative to that.
-PolicyArguments ArgumentsOf(const Candidate& candidate, const Plant& plant) {
-  const Plant usual_plant = WithoutDryFriction(plant);
-  const ControllerConfig usual = ControllerConfig::For(usual_plant);
-  PolicyArguments arguments;
-  arguments.name = candidate.controller;
-  for (const auto& [setting, before] : Differences(OptionsOf(candidate.config), OptionsOf(usual))) {
-    arguments.flags.push_back({setting.name, setting.plain_text()});
-  }
-  for (const auto& [setting, before] :
-       Differences(OptionsOf(candidate.config.plant), OptionsOf(usual_plant))) {
-    arguments.made_for.push_back(Concat(setting.name, "=", setting.plain_text()));
-  }
-  return arguments;
-}
 
 /// Adds the processor time (s) of its lifetime to a total, also if an exception ends it.
 class ProcessorTimer {
@@ -145,23 +84,13 @@ class LearningSession {
 
   LearnResult Work() {
     try {
-      const Twin known = twin_;
-      Excite(kSmallMotion, /*has_twin=*/false);
-      ExpectMotion();
-      Fit(kSmallMotion.window);
-      // A link that hardly moved shows no twin that is good enough to estimate the state.
-      const bool has_twin =
-          LargerMagnitude(twin_.sensors.zero1, twin_.sensors.zero2) < kLargestZero;
-      if (!has_twin) twin_ = known;
-      Excite(kLargeMotion, has_twin);
-      while (true) {
-        Fit(kLargeMotion.window);
-        if (result_.tries == 0) WarnOfFalls();
-        if (Try()) return result_;
-      }
+      Identify();
+      while (!Try()) Fit(kLargeMotion.window);
+      return result_;
     } catch (const Ended& ended) {
       result_.reason = ended.reason;
     }
+    if (!stop_()) AddCauses();
     return result_;
   }
 
@@ -171,10 +100,57 @@ class LearningSession {
     std::string reason;
   };
 
+  /// Moves the links until a twin explains the motion.
+  void Identify() {
+    const Twin known = twin_;
+    const double time_of_more = TimeOf(kLargeMotion) + TimeOfTry();
+    Excite(kSmallMotion, /*has_twin=*/false);
+    ExpectMotion();
+    Fit(kSmallMotion.window);
+    // A link that hardly moved shows no twin that is good enough to estimate the state.
+    bool has_twin =
+        explains_ && LargerMagnitude(twin_.sensors.zero1, twin_.sensors.zero2) < kLargestZero;
+    for (int i = 1; i < kMostExcitations; ++i) {
+      if (!has_twin) twin_ = known;
+      Excite(kLargeMotion, has_twin);
+      Fit(kLargeMotion.window);
+      has_twin = explains_;
+      if (IsTrusted() || TimeLeft() < time_of_more) break;
+    }
+    if (!explains_ && !OutsidePhysics(twin_, /*reports=*/true).empty()) {
+      throw Ended{"no twin explains the motion: " + twin_.distrust};
+    }
+    is_identified_ = true;
+    for (const std::string& fall : FallsBeyond(twin_, c_.limits)) say_("  warning: " + fall);
+  }
+
+  bool IsTrusted() const { return twin_.distrust.empty(); }
+
+  double TimeLeft() const { return c_.motion - result_.motion; }
+  /// Longest time of an excitation, s.
+  double TimeOf(const ExcitationPlan& e) const {
+    return e.seconds * scale().time + c_.limits.brake_seconds;
+  }
+  /// Time that a try needs for a quick swing-up, balance and the brake, s.
+  double TimeOfTry() const {
+    constexpr double kQuickSwingUp = 2;  // s
+    return kQuickSwingUp * scale().time + c_.hold + c_.limits.brake_seconds;
+  }
+
   void ExpectBudget() const {
     if (stop_()) throw Ended{"stopped"};
-    if (result_.motion >= c_.motion) throw Ended{"the time of motion is used up"};
+    constexpr double kLeast = 1;  // of a run, s
+    if (TimeLeft() < kLeast * std::min(1.0, scale().time)) {
+      throw Ended{"the time of motion is used up"};
+    }
     if (result_.computing >= c_.computing) throw Ended{"the time of computing is used up"};
+  }
+
+  void ExpectTimeOfTry() const {
+    if (TimeLeft() >= TimeOfTry()) return;
+    throw Ended{fmt::format(
+        "the time of motion is used up: another try takes {:.1f} s or more, and {:.1f} s are left",
+        TimeOfTry(), std::max(0.0, TimeLeft()))};
   }
 
   /// The natural units of the machine over those of UsualPlant, as far as they are known.
@@ -216,11 +192,15 @@ class LearningSession {
         has_twin ? Estimator(twin_, 1 / c_.hz) : Estimator(twin_.sensors, 1 / c_.hz);
     const Excitation torques(c_.limits.torque, c_.actuated_joint,
                              has_twin ? LevelWithEnergy(lean, energy) : LevelOfMotion(lean),
-                             c_.seed, scale());
+                             c_.seed + logs_.size(), scale());
     const double cycles = std::max(1.0, std::round(kControlPeriod * scale().time * c_.hz));
-    Run({.limits = c_.limits, .seconds = seconds}, estimator,
-        MachineController(torques, cycles / c_.hz));
+    Run({.limits = c_.limits, .seconds = seconds, .scale = scale(), .start_angle = StartAngle()},
+        estimator, MachineController(torques, cycles / c_.hz));
   }
+
+  /// The first run needs links that hang: they show the zeros of the encoders. Later, dry friction
+  /// may hold the links wherever they come to rest.
+  double StartAngle() const { return logs_.empty() ? kStartAngle : kAnyAngle; }
 
   /// The level of an excitation, 1 at its aim: lean (rad) and velocity of the links.
   Excitation::Level LevelOfMotion(double lean) const {
@@ -243,9 +223,8 @@ class LearningSession {
 
   RunOutcome Run(RunRules rules, const Estimator& estimator, MachineController controller) {
     ExpectBudget();
-    rules.seconds = std::min(rules.seconds, c_.motion - result_.motion);
+    rules.motion = TimeLeft();
     rules.log = (out_ / fmt::format("log-{:02}.csv", logs_.size() + 1)).string();
-    rules.scale = scale();
     const double swinging = kLongestSwinging * std::max(1.0, rules.scale.time);
     if (!logs_.empty()) rules.limits.patience = std::max(rules.limits.patience, swinging);
     RunOutcome run =
@@ -259,7 +238,10 @@ class LearningSession {
     logs_.push_back(ReadLog(rules.log).front());
     SayRun(rules.log, run);
     // A machine that does not answer gets no more torque.
-    if (run.faulty) throw Ended{run.reason};
+    if (run.faulty) {
+      is_faulty_ = true;
+      throw Ended{run.reason};
+    }
     const Joints& last = logs_.back().angle.back();
     if (LargerMagnitude(last[0], last[1]) > c_.limits.angle) {
       throw Ended{"the links hang beyond --max-angle: turn them back, or raise it"};
@@ -284,42 +266,54 @@ class LearningSession {
                     run.reason.empty() ? "" : "; " + run.reason));
   }
 
-  /// Identifies the twin from all logs. The log of a try counts twice.
+  /// Identifies the twin from all logs, and judges it. The log of a try counts twice.
   void Fit(double window) {
     ExpectBudget();
     say_(fmt::format("identify: {}", Counted(std::ssize(logs_), "log")));
     Compute([&] {
       const Twin guess = FirstTwin(logs_, twin_);
       if (logs_.size() == 1 || ErrorOf(guess) < ErrorOf(twin_)) twin_ = guess;
-      const FitResult fit = FitLogs(window);
+      const FitResult fit = FitLogs(window * scale().time);
       Adopt(fit.twin);
       const Judgement judgement =
           Judge(logs_, PredictorOf("", twin_, logs_).twins, "the logs of the fit", pool_);
+      explains_ = judgement.explains();
       twin_.distrust = DistrustOf(judgement, twin_, logs_);
       WriteFileAtomically(out_ / "twin.toml", TwinText(twin_));
       SayTwin(fit.error);
       say_("  " + SentenceOf(judgement));
+      if (!IsTrusted()) say_("  no twin: " + twin_.distrust);
     });
   }
 
-  /// Fits all values to windows of this length (s by the scale). Throws Failure if no twin follows
-  /// the motion.
+  /// Fits all values to windows of this length (s). If that leads nowhere or to a value outside
+  /// physics, tries other first guesses. Throws Failure if no twin follows the motion.
   FitResult FitLogs(double window) const {
-    window *= scale().time;
+    constexpr double kGoodError = 0.01;  // rad
+    FitResult fit = FitFrom(twin_, window);
+    const bool is_odd = !OutsidePhysics(fit.twin, /*reports=*/true).empty();
+    std::vector<Twin> guesses;
+    if (is_odd) guesses.push_back(AsRods(fit.twin));
+    if (fit.error > kGoodError) guesses.push_back(c_.Known());
+    for (Twin& guess : guesses) {
+      guess.sensors = twin_.sensors;
+      FitResult other = FitFrom(guess, window);
+      if (other.error < fit.error) fit = std::move(other);
+    }
+    if (fit.error < kLargestError) return fit;
+    throw Failure(fmt::format(
+        "no twin follows the motion (error {:.2f} rad): are the signs of angles and torques right?",
+        fit.error));
+  }
+
+  FitResult FitFrom(const Twin& guess, double window) const {
     const FitConfig config{.windows = {window, window}, .iterations = 30, .tolerance = 1e-4};
     std::vector<std::string> values =
         Structures(/*has_motors=*/true, twin_.cogging.any(), /*one_body=*/false).back().values;
     values.emplace_back("length1");
     std::vector<MachineLog> logs = logs_;
     if (result_.tries > 0) logs.push_back(logs_.back());
-    FitResult fit = machine::Fit(logs, twin_, {"", values}, config, pool_);
-    if (!(fit.error < kLargestError)) {
-      throw Failure(
-          fmt::format("no twin follows the motion (error {:.2f} rad): are the signs of "
-                      "angles and torques right?",
-                      fit.error));
-    }
-    return fit;
+    return machine::Fit(logs, guess, {"", values}, config, pool_);
   }
 
   /// Takes an identified twin as the machine's, with the zeros and friction of today.
@@ -359,95 +353,99 @@ class LearningSession {
     }
   }
 
-  /// Says which limits a fall from upright exceeds. A motor cannot hold links that fall.
-  void WarnOfFalls() {
-    constexpr double kLean = 0.1;             // rad
-    const double seconds = 3 * scale().time;  // of each fall
-    const Body body = BodyOf(twin_);
-    const auto falling = [&](const PendulumState& s, double /*share*/) {
-      return body.Acceleration(s, {});
-    };
-    double angle = 0, velocity = 0;
-    for (const double lean : {-kLean, kLean}) {
-      PendulumState s{std::numbers::pi + lean, 0, 0, 0};
-      for (int i = 0; i < seconds / body.longest_step; ++i) {
-        s = RungeKuttaStep(s, falling(s, 0), body.longest_step, falling);
-        angle = std::max(angle, LargerMagnitude(s.q1, s.q2));
-        velocity = std::max(velocity, LargerMagnitude(s.w1, s.w2));
-      }
-    }
-    const auto warn = [&](const char* flag, double limit, double reached, const char* unit) {
-      if (reached <= limit) return;
-      say_(fmt::format("  warning: a fall from upright reaches {:.1f} {}, beyond {} {:g}", reached,
-                       unit, flag, limit));
-    };
-    warn("--max-angle", c_.limits.angle, angle, "rad");
-    warn("--max-velocity", c_.limits.velocity, velocity, "rad/s");
-  }
-
   /// Designs a controller and tries it. Returns whether the machine balanced.
   bool Try() {
+    ExpectTimeOfTry();
     const Choice choice = Choose();
     ExpectBudget();
     ++result_.tries;
     result_.controller = choice.arguments;
     result_.compensation = choice.compensation;
-    say_(fmt::format("try {}: {}", result_.tries, choice.policy->name));
-    const RunOutcome run = Run(TryRules(choice.compensation), Estimator(twin_, 1 / c_.hz),
-                               ControllerOf(choice.policy));
+    say_(fmt::format("try {}: {}, compensation {:.2g}", result_.tries, choice.policy->name,
+                     choice.compensation));
+    const RunOutcome run = Run(TryRules(c_, twin_, choice.compensation),
+                               Estimator(twin_, 1 / c_.hz), ControllerOf(choice.policy));
     result_.balanced = run.summary.upright;
     say_(fmt::format("  balanced {:.1f} s; used {:.1f} s of motion, {:.1f} s of computing",
                      result_.balanced, result_.motion, result_.computing));
-    return result_.balanced >= c_.hold;
+    if (result_.balanced >= c_.hold) return true;
+    failures_.push_back({.candidate = choice.candidate,
+                         .controller = choice.policy->name,
+                         .held = choice.held,
+                         .balanced = run.balanced,
+                         .reason = run.reason,
+                         .twin = twin_});
+    return false;
   }
 
-  RunRules TryRules(double compensation) const {
-    return {.limits = c_.limits,
-            .seconds = 2 * kLongestFall * scale().time + c_.hold,
-            .is_try = true,
-            .compensation = compensation,
-            .scale = scale()};
+  /// Whether a candidate has failed on the machine, and the twin is as it was.
+  bool HasFailed(int candidate) const {
+    return std::ranges::any_of(failures_, [&](const FailedTry& failure) {
+      return failure.candidate == candidate && !HasChanged(failure.twin, twin_);
+    });
   }
 
-  /// The first controller that balances all machines drawn from the posterior, or most of them.
+  /// Machines like the twin. Each failed try shows that the machine differs from it more than its
+  /// covariance says.
+  Draws SimulatedMachines() const {
+    const double spread = std::exp2(static_cast<double>(failures_.size()));
+    return {.twin = twin_, .spread = std::min(spread, kMostSpread), .rest = LastState()};
+  }
+
+  /// The state of the links at the end of the last log, if they rest.
+  PendulumState LastState() const {
+    const MachineLog& log = logs_.back();
+    constexpr double kRests = 0.3;  // rad/s by the scale
+    const Joints& w = log.velocity.back();
+    if (LargerMagnitude(w[0], w[1]) > kRests * scale().velocity()) return {};
+    const Joints& q = log.angle.back();
+    return {q[0] - twin_.sensors.zero1, q[1] - twin_.sensors.zero2, 0, 0};
+  }
+
+  /// The first candidate that balances all simulated machines, or most of them.
   Choice Choose() {
     ExpectBudget();
     Choice best;
+    best.held = -1;
     Compute([&] {
-      int most = -1;
-      for (const Candidate& candidate : CandidatesFor(twin_.plant)) {
-        try {
-          const PolicyArguments arguments = ArgumentsOf(candidate, twin_.plant);
-          const MachinePolicy policy = GetMachinePolicy(arguments, "", twin_, std::llround(c_.hz));
-          const int held = HeldBy(policy, candidate.compensation);
-          say_(fmt::format("design: {}: {} of {} machines of the twin", candidate.controller, held,
-                           kDraws));
-          if (held <= most) continue;
-          most = held;
-          best = {policy, arguments, candidate.compensation};
-        } catch (const Error& error) {
-          say_(fmt::format("design: {}", error.what()));
-        }
-        if (most == kDraws) break;
+      const std::vector<Candidate> candidates = CandidatesFor(twin_.plant);
+      const Draws draws = SimulatedMachines();
+      for (int i = 0; i < static_cast<int>(candidates.size()) && best.held < kDraws; ++i) {
+        if (!HasFailed(i)) Consider(candidates[i], i, draws, best);
       }
     });
-    if (best.policy == nullptr) throw Ended{"no controller exists for the twin"};
+    if (best.policy == nullptr) {
+      throw Ended{failures_.empty() ? "no controller exists for the twin"
+                                    : "every controller has failed on the machine"};
+    }
     return best;
   }
 
-  /// Number of machines, of kDraws of the posterior, that a controller balances.
-  int HeldBy(const MachinePolicy& policy, double compensation) const {
-    int held = 0;
-    for (int i = 0; i < kDraws; ++i) {
-      Rng rng(c_.seed, "machine: draws", static_cast<uint64_t>(i));
-      TwinLink link(DrawTwin(twin_, rng), {}, c_.seed);
-      const RunOutcome run =
-          RunCycles(c_, TryRules(compensation), twin_.sensors, Estimator(twin_, 1 / c_.hz),
-                    ControllerOf(policy), link, stop_);
+  /// Replaces the best choice by a candidate that balances more simulated machines.
+  void Consider(const Candidate& candidate, int index, const Draws& draws, Choice& best) {
+    try {
+      const PolicyArguments arguments = ArgumentsOf(candidate, twin_.plant);
+      const MachinePolicy policy = GetMachinePolicy(arguments, "", twin_, std::llround(c_.hz));
+      const int held = HeldBy(c_, draws, policy, candidate.compensation, stop_);
       if (stop_()) throw Ended{"stopped"};
-      if (run.summary.upright >= c_.hold) ++held;
+      say_(fmt::format("design: {}: {} of {} machines of the twin", candidate.controller, held,
+                       kDraws));
+      if (held > best.held) best = {policy, arguments, index, candidate.compensation, held};
+    } catch (const Error& error) {
+      say_(fmt::format("design: {}", error.what()));
     }
-    return held;
+  }
+
+  /// Adds to the reason why the machine does not balance, as far as the logs tell.
+  void AddCauses() {
+    if (logs_.empty()) return;
+    const std::vector<std::string> causes = CausesOf({.config = c_,
+                                                      .twin = twin_,
+                                                      .logs = logs_,
+                                                      .tries = failures_,
+                                                      .is_identified = is_identified_,
+                                                      .is_faulty = is_faulty_});
+    if (!causes.empty()) result_.reason += ": " + Join(causes, "; ");
   }
 
   const LearnConfig& c_;
@@ -457,69 +455,15 @@ class LearningSession {
   std::function<void(const std::string&)> say_;
   std::function<bool()> stop_;
   Twin twin_;
+  bool is_identified_ = false;  // whether the excitations are over
+  bool explains_ = false;       // whether the twin explains the logs
   std::vector<MachineLog> logs_;
+  std::vector<FailedTry> failures_;
+  bool is_faulty_ = false;  // whether the supervisor found a fault
   LearnResult result_;
 };
 
 }  // namespace
-
-void LearnConfig::Describe(Options& o) {
-  o.Section("learning");
-  o.Add(&encoder_counts, "encoder_counts", {16, 1e9}, "1/turn", "steps of the encoders; required")
-      .usual = "none";
-  o.Add(&hold, "hold", {1, 3600}, "s", "time of balance that ends the learning");
-  o.Add(&motion, "motion", {10, 3600}, "s", "longest time with torques, all runs together");
-  o.Add(&computing, "computing", {1, 1e6}, "s", "longest processor time of models and controllers");
-  o.Add(&hz, "hz", {100, 1000}, "1/s", "cycles per second").step = 50;
-  o.Add(&length, "length", {0.02, 200}, "m",
-        "length of both links together; with --max-torque it tells the size of the machine")
-      .usual = "about that of RealAIGym's robot, 0.5";
-}
-
-Twin LearnConfig::Known() const {
-  Twin twin;
-  Plant& plant = twin.plant;
-  if (length > 0 && limits.torque > 0) {
-    plant = UsualPlant();
-    const double longer = length / (plant.length1 + plant.length2);
-    const double heavier = limits.torque / plant.torque_limit / longer;
-    for (double Plant::*m : {&Plant::mass1, &Plant::mass2}) plant.*m *= heavier;
-    for (double Plant::*l : {&Plant::length1, &Plant::length2, &Plant::center1, &Plant::center2}) {
-      plant.*l *= longer;
-    }
-    for (double Plant::*I : {&Plant::inertia1, &Plant::inertia2, &Plant::armature}) {
-      plant.*I *= heavier * longer * longer;
-    }
-  }
-  plant.torque_limit = limits.torque;
-  plant.actuated_joint = actuated_joint;
-  twin.actuator.passive_limit = limits.passive_torque;
-  twin.sensors.quantum = 2 * std::numbers::pi / encoder_counts;
-  twin.sensors.velocity_share = 0.2;
-  twin.sensors.velocity_dead_zone = 0.1 * ScaleOverUsual(plant).velocity();
-  twin.loop.period = 1 / hz;
-  return twin;
-}
-
-Limits LearnConfig::DefaultLimits(double torque) const {
-  LearnConfig known = *this;
-  known.limits.torque = torque;
-  Twin twin = known.Known();
-  twin.actuator.passive_limit = Limits().passive_torque * ScaleOverUsual(twin.plant).torque;
-  Limits defaults = Limits::For(twin);
-  defaults.angle = LearnConfig().limits.angle;
-  return defaults;
-}
-
-void LearnConfig::Check() const {
-  if (encoder_counts == 0) throw BadInput("machine learn: expected --encoder-counts, got none");
-  const auto expect = [](const char* flag, double least, double got) {
-    if (got >= least) return;
-    throw BadInput(Concat(flag, ": expected ", least, " or more for a swing-up, got ", got));
-  };
-  expect("--max-angle", 3.5, limits.angle);
-  expect("--max-energy", 1.1, limits.energy);
-}
 
 LearnResult Learn(const LearnConfig& config, MachineLink& link, const std::filesystem::path& out,
                   ThreadPool* pool, const std::function<void(const std::string&)>& say,

@@ -156,4 +156,12 @@ Twin FirstTwin(std::span<const MachineLog> logs, const Twin& known) {
   return twin;
 }
 
+Twin AsRods(Twin twin) {
+  const Manipulator m = ManipulatorOf(twin.plant);
+  Eigen::Matrix<double, kUnknowns, 1> x = Eigen::Matrix<double, kUnknowns, 1>::Zero();
+  x.head<10>() << m.J1, m.J2, m.b, m.a, m.G1, m.G2, m.d1, m.d2, m.f1, m.f2;
+  twin.plant = RodsOf(x, twin.plant);
+  return twin;
+}
+
 }  // namespace upswing::machine

@@ -16,4 +16,8 @@ namespace upswing::machine {
 /// short.
 Twin FirstTwin(std::span<const MachineLog> logs, const Twin& known);
 
+/// The twin with the same equations of motion, but with links that are uniform rods. A fit that
+/// keeps the masses may reach the limits of inertias and centres; with other masses it does not.
+Twin AsRods(Twin twin);
+
 }  // namespace upswing::machine
