@@ -55,7 +55,7 @@ class EvalTest(ProgramTest):
         self.assertEqual(list(result["reward_terms"]), REWARD_TERMS)
         self.assertEqual(result["disturbance"], {
             "sensor_noise": 0, "delay": 0, "sensor_latency": 0, "encoder_counts": 0,
-            "velocity_window": 0, "velocity_filter": 0, "late_share": 0, "late": 0})
+            "velocity_window": 0, "velocity_filter": 0, "zero1": 0, "zero2": 0, "late_share": 0, "late": 0})
         self.assertEqual(set(result["randomize"].values()), {0})
 
     def test_several_policies_get_the_same_episodes(self):

@@ -32,7 +32,9 @@ Disturbance Larger(const Disturbance& a, const Disturbance& b) {
           std::max(a.delay, b.delay),
           {std::max(x.latency, y.latency), std::max(x.encoder_counts, y.encoder_counts),
            std::max(x.velocity_window, y.velocity_window),
-           std::max(x.velocity_filter, y.velocity_filter)},
+           std::max(x.velocity_filter, y.velocity_filter),
+           std::max(std::abs(x.zero1), std::abs(y.zero1)),
+           std::max(std::abs(x.zero2), std::abs(y.zero2))},
           std::max(a.late_share, b.late_share),
           std::max(a.late, b.late)};
 }

@@ -42,7 +42,7 @@ struct Disturbance {
   int delay_steps(double control_period) const;
 };
 
-/// For each setting, the larger of its two values.
+/// For each setting, the larger of its two values, or of their amounts.
 Disturbance Larger(const Disturbance& a, const Disturbance& b);
 
 /// The sensors of N environments: sensor models and noise.

@@ -12,7 +12,15 @@ namespace {
 constexpr double kRounding = 1e-6;  // of a correlation
 // Smallest centre of mass and inertia of a link that is no capsule: those of 0 are a capsule's.
 constexpr double kSmallestCenter = 1e-5, kSmallestInertia = 1e-9;  // m, kg·m²
-constexpr std::string_view kLatency = "sensor_latency";
+
+/// A value of the sensors that a posterior may have.
+struct SensorValue {
+  std::string_view name;
+  double SensorModel::*value;
+};
+constexpr SensorValue kSensorValues[] = {{"sensor_latency", &SensorModel::latency},
+                                         {"zero1", &SensorModel::zero1},
+                                         {"zero2", &SensorModel::zero2}};
 
 // Parameters of the plant that identification cannot find.
 constexpr std::string_view kCertain[] = {"torque_limit", "actuated_joint", "rotor_inertia",
@@ -49,7 +57,7 @@ std::optional<std::vector<double>> FactorRow(const std::vector<double>& covarian
 }
 
 bool Posterior::Knows(std::string_view name) {
-  return name == kLatency ||
+  return std::ranges::count(kSensorValues, name, &SensorValue::name) > 0 ||
          (std::ranges::count(kPlantParameters, name, &PlantParameter::name) > 0 &&
           std::ranges::count(kCertain, name) == 0);
 }
@@ -92,9 +100,12 @@ Posterior Posterior::Parse(std::string_view text, const std::string& where) {
     std::optional<std::vector<double>> L = FactorRow(covariance, posterior.rows_);
     if (!L) throw BadInput(Concat(where, ": expected a positive matrix, got another one"));
     posterior.rows_.push_back(std::move(*L));
-    Value value{nullptr, UncertainRange(*options.Get(name))};
+    Value value{.range = UncertainRange(*options.Get(name))};
     for (const PlantParameter& parameter : kPlantParameters) {
       if (parameter.name == name) value.of_plant = parameter.value;
+    }
+    for (const SensorValue& sensor : kSensorValues) {
+      if (sensor.name == name) value.of_sensors = sensor.value;
     }
     posterior.values_.push_back(value);
   }
@@ -105,8 +116,8 @@ void Posterior::Deviate(Plant& plant, Disturbance& disturbance, Rng& rng) const 
   std::vector<double> z;
   for (size_t i = 0; i < values_.size(); ++i) z.push_back(rng.Normal());
   for (size_t i = 0; i < values_.size(); ++i) {
-    const auto [of_plant, range] = values_[i];
-    double& value = of_plant != nullptr ? plant.*of_plant : disturbance.sensors.latency;
+    const auto [of_plant, of_sensors, range] = values_[i];
+    double& value = of_plant != nullptr ? plant.*of_plant : disturbance.sensors.*of_sensors;
     for (size_t j = 0; j <= i; ++j) value += rows_[i][j] * z[j];
     value = std::clamp(value, range.low, range.high);
   }
@@ -115,7 +126,7 @@ void Posterior::Deviate(Plant& plant, Disturbance& disturbance, Rng& rng) const 
 Disturbance Posterior::Largest(const Disturbance& nominal) const {
   Disturbance largest = nominal;
   for (const Value& value : values_) {
-    if (value.of_plant == nullptr) largest.sensors.latency = value.range.high;
+    if (value.of_sensors != nullptr) largest.sensors.*value.of_sensors = value.range.high;
   }
   return largest;
 }

@@ -23,7 +23,7 @@ std::optional<std::vector<double>> FactorRow(const std::vector<double>& covarian
                                              const std::vector<std::vector<double>>& rows);
 
 /// A joint normal distribution of a machine's values about the nominal ones, such as the posterior
-/// of an identification. The values are settings of the plant, and the sensors' latency.
+/// of an identification. The values are settings of the plant, and the sensors' latency and zeros.
 class Posterior {
  public:
   /// Whether a posterior can have a value of this name.
@@ -47,7 +47,8 @@ class Posterior {
 
  private:
   struct Value {
-    double Plant::*of_plant;  // null: the sensors' latency
+    double Plant::*of_plant = nullptr;  // one of these
+    double SensorModel::*of_sensors = nullptr;
     Range range;
   };
   std::vector<Value> values_;              // (n)

@@ -69,6 +69,19 @@ TEST(Posterior, ValuesThatDependOnOthersFollowThem) {
   }
 }
 
+TEST(Posterior, ZerosOfTheEncodersDeviateTogether) {
+  const Posterior posterior = Posterior::Parse("zero1 4e-4; zero2 -2e-4 1e-4", "test");
+  Rng rng(1, "test");
+  for (int n = 0; n < 100; ++n) {
+    Plant plant;
+    Disturbance disturbance;
+    posterior.Deviate(plant, disturbance, rng);
+    EXPECT_NE(disturbance.sensors.zero1, 0);
+    EXPECT_NEAR(disturbance.sensors.zero2, -disturbance.sensors.zero1 / 2, 1e-12);
+    EXPECT_FALSE(posterior.Largest({}).sensors.exact());
+  }
+}
+
 TEST(Posterior, CutsValuesAtTheirRanges) {
   const Posterior posterior = Posterior::Parse(
       "mass1 1e12; damping1 0 1e4; inertia1 0 0 1e4; sensor_latency 0 0 0 1e4", "");

@@ -20,7 +20,7 @@ void Randomization::Describe(Options& o) {
   o.Add(&sensor_latency, "randomize_sensor_latency", {0, kLongestLatency}, "s",
         "largest random increase of sensor_latency, drawn for each episode");
   o.Add(&from_posterior, "randomize_posterior",
-        "draw the plant and the latency for each episode from the covariance of a twin (--plant)");
+        "draw the plant and the sensors for each episode from the covariance of a twin (--plant)");
   o.Add(&posterior, "posterior",
         "covariance for randomize_posterior, rows NAME NUMBERS of its lower triangle with ; "
         "between them; --plant sets it");

@@ -19,6 +19,10 @@ void SensorModel::Describe(Options& o) {
         "time over which velocities are differences of measured angles; 0: true velocities");
   o.Add(&velocity_filter, "velocity_filter", {0, kSlowestFilter}, "s",
         "time constant of a first-order low-pass filter on measured velocities; 0: no filter");
+  o.Add(&zero1, "zero1", {-kLargestZero, kLargestZero}, "rad",
+        "measured angle of joint 1 that hangs");
+  o.Add(&zero2, "zero2", {-kLargestZero, kLargestZero}, "rad",
+        "measured angle of a straight joint 2");
 }
 
 double SensorModel::encoder_step() const {
@@ -59,12 +63,12 @@ PendulumState Sensors::Reading(std::span<const double> past, const SensorModel& 
                                double age) const {
   const double step = model.encoder_step(), T = model.velocity_window;
   PendulumState s = StateAgo(past, age);
-  s.q1 = Quantized(s.q1, step);
-  s.q2 = Quantized(s.q2, step);
+  s.q1 = Quantized(s.q1 + model.zero1, step);
+  s.q2 = Quantized(s.q2 + model.zero2, step);
   if (T > 0) {
     const PendulumState before = StateAgo(past, age + T);
-    s.w1 = (s.q1 - Quantized(before.q1, step)) / T;
-    s.w2 = (s.q2 - Quantized(before.q2, step)) / T;
+    s.w1 = (s.q1 - Quantized(before.q1 + model.zero1, step)) / T;
+    s.w2 = (s.q2 - Quantized(before.q2 + model.zero2, step)) / T;
   }
   return s;
 }

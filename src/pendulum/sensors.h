@@ -10,28 +10,31 @@
 /// Sensor models: encoders of both joints, velocities computed from them, and latency.
 ///
 /// Symbols: N counts per revolution, q̂ measured angle (rad), ŵ measured velocity (rad/s), T window
-/// (s), τ time constant (s), L latency (s).
+/// (s), τ time constant (s), L latency (s), z zero (rad).
 namespace upswing {
 
 inline constexpr double kLongestLatency = 0.1;  // s
 inline constexpr double kLongestWindow = 0.1;   // s
 inline constexpr double kSlowestFilter = 1;     // s
+inline constexpr double kLargestZero = 1;       // rad
 /// Time between two updates of the velocity filter (s), as in a motor drive at 1 kHz; a control
 /// period has a whole number of updates.
 inline constexpr double kFilterPeriod = 0.001;
 
 /// The sensors of one environment; zeros: exact angles and velocities without latency.
 struct SensorModel {
-  double latency = 0;          // L, age of the measured angles and velocities, s
-  double encoder_counts = 0;   // N, of each joint; 0: exact angles
-  double velocity_window = 0;  // T of ŵ(t) = (q̂(t) - q̂(t - T)) / T; 0: the true velocity, s
-  double velocity_filter = 0;  // τ of the low-pass τ dy/dt = ŵ - y; 0: none, s
+  double latency = 0;           // L, age of the measured angles and velocities, s
+  double encoder_counts = 0;    // N, of each joint; 0: exact angles
+  double velocity_window = 0;   // T of ŵ(t) = (q̂(t) - q̂(t - T)) / T; 0: the true velocity, s
+  double velocity_filter = 0;   // τ of the low-pass τ dy/dt = ŵ - y; 0: none, s
+  double zero1 = 0, zero2 = 0;  // z of q̂ = q + z of each joint, rad
 
   /// Declares each setting in `options`: name, range, unit, help.
   void Describe(Options& options);
 
   bool exact() const {
-    return latency == 0 && encoder_counts == 0 && velocity_window == 0 && velocity_filter == 0;
+    return latency == 0 && encoder_counts == 0 && velocity_window == 0 && velocity_filter == 0 &&
+           zero1 == 0 && zero2 == 0;
   }
   /// Step of a measured angle, 2π/N, rad; 0: exact angles.
   double encoder_step() const;

@@ -62,6 +62,17 @@ TEST(Sensors, WithoutAWindowTheEncoderLeavesTheVelocities) {
   EXPECT_EQ(measured.w2, -1);
 }
 
+TEST(Sensors, ZerosShiftTheAnglesBeforeTheyAreRounded) {
+  constexpr double kCount = kTurn / 100;  // 0.0628 rad
+  const SensorModel model{
+      .encoder_counts = 100, .velocity_window = 0.01, .zero1 = 0.05, .zero2 = -0.3};
+  const PendulumState measured = AtStart(model, {1, 0.2, 3, 0});
+  EXPECT_DOUBLE_EQ(measured.q1, 17 * kCount);      // 1.05 rad
+  EXPECT_DOUBLE_EQ(measured.q2, -2 * kCount);      // -0.1 rad
+  EXPECT_NEAR(measured.w1, kCount / 0.01, 1e-10);  // 10 ms ago, at 1.02 rad, it is count 16
+  EXPECT_EQ(measured.w2, 0);
+}
+
 TEST(Sensors, AnEpisodeBeginsInMotion) {
   const PendulumState start{1, -2, 3, -4};
   const PendulumState measured = AtStart({0.05, 0, 0.1, 0.03}, start);
