@@ -113,7 +113,7 @@ TEST(Posterior, RefusesTextsThatAreNoCovariance) {
     }
     return "";
   };
-  for (const char* name : {"", ";", "mas1 1", "zero1 1", "mass1 1; mass1 0 1", "mass1 1;"}) {
+  for (const char* name : {"", ";", "mas1 1", "current_delay 1", "mass1 1; mass1 0 1", "mass1 1;"}) {
     EXPECT_NE(message(name).find("posterior: expected rows"), std::string::npos) << name;
   }
   for (const char* numbers : {"mass1", "mass1 1 2", "mass1 1; mass2 1", "mass1 inf", "mass1 x"}) {

@@ -56,7 +56,7 @@ TEST(PlantFile, HasThePlantAndTheDisturbanceOfAMachine) {
   EXPECT_EQ(file.conditions[1].text, "4096");
   // Variances of delay and lag, and twice their covariance: 9e-8 + 4e-8 + 2 · 1e-9.
   EXPECT_EQ(file.conditions[2].name, "posterior");
-  EXPECT_EQ(file.conditions[2].text, "damping1 4e-04; sensor_latency 1.02e-06 1.32e-07");
+  EXPECT_EQ(file.conditions[2].text, "damping1 4e-04; zero1 0 9e-04; sensor_latency 1.02e-06 0 1.32e-07");
 }
 
 TEST(PlantFile, ItsFlagsMakeThePlant) {
