@@ -28,6 +28,7 @@ import os
 import platform
 import re
 import resource
+import shutil
 import statistics
 import subprocess
 import sys
@@ -247,15 +248,16 @@ class Lab:
         self.few = few
         self.commands = []
 
-    def run(self, *arguments, record=True):
-        """The output of a command of the program. The record shows `runs` as the folder."""
+    def run(self, *arguments, record=True, codes=(0,)):
+        """The output of a command of the program, whose exit code is one of `codes`. The record
+        shows `runs` as the folder."""
         arguments = [str(argument) for argument in arguments]
         if record:
             self.commands.append("./upswing " + " ".join(arguments).replace(str(self.folder), "runs"))
         done = subprocess.run([ROOT / "upswing", "--no-setup", *arguments], cwd=ROOT, check=False,
                               stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                               stderr=subprocess.PIPE, encoding="utf-8")
-        if done.returncode != 0:
+        if done.returncode not in codes:
             raise Problem(f"./upswing {' '.join(arguments)}: {done.stderr.strip()}")
         return done.stdout
 
@@ -483,6 +485,9 @@ def format_number(value, digits):
 
 
 REAL = Path(os.environ.get("UPSWING_REAL", ROOT.parent / "shared/real")) / "C.1"
+# A clone of github.com/dfki-ric-underactuated-lab/double_pendulum, with runs 06 to 10 of the sessions.
+HELD_OUT = Path(os.environ.get("UPSWING_HELD_OUT", ROOT.parent / "double_pendulum"))
+JUDGED = (0, 1)  # exit codes of commands that judge a twin
 LAWS = {"tvlqr": "TVLQR", "mcpilco": "MC-PILCO"}
 REAL_SESSIONS = {f"{robot}, {LAWS[law]}{', pushed' if folder == 'pushed' else ''}":
                  f"{folder}/{robot}-{law}"
@@ -508,36 +513,75 @@ def with_session_values(plant, twin, out):
     out.write_text(text, encoding="utf-8")
 
 
+def twins_of(lab, session, record):
+    """Twins for a session: of the other sessions, and two that are adapted to its run 01."""
+    others = [run for other in REAL_SESSIONS.values() if other != session
+              for run in runs_of(other, range(1, 6))]
+    others += sorted((REAL / "sysid").glob("*.csv.gz"))
+    twins = {kind: lab.folder / f"{kind}-{session.replace('/', '-')}.toml"
+             for kind in ("others", "today", "c1-today")}
+    lab.run("machine", "identify", *others, "--plant", "realaigym-c1", "--folds", 0, "--out",
+            twins["others"], record=record, codes=JUDGED)
+    for prior, kind in ((twins["others"], "today"), ("realaigym-c1", "c1-today")):
+        lab.run("machine", "adapt", prior, *runs_of(session, [1]), "--out", twins[kind],
+                record=record, codes=JUDGED)
+    return twins
+
+
+def errors_of(lab, twin, runs, others, record):
+    """Windows of runs, and the median errors [rad] over 1 s of a twin and of other models."""
+    against = [word for other in others for word in ("--against", other)]
+    report = lab.json("machine", "validate", twin, *runs, *against, record=record, codes=JUDGED)
+    row = next(row for row in report["errors"]
+               if (row["seconds"], row["torques"]) == (1, "commanded"))
+    return [str(row["windows"]),
+            *(f"{error['value']:.3f}" for error in row["median_error_rad"].values())]
+
+
 @recipe("machine-sessions")
 def machine_sessions(lab):
     """Errors of models on runs 02 to 05 of a real session. No model saw these runs."""
     rows = []
     for name, session in list(REAL_SESSIONS.items())[-1 if lab.few else 0:]:
-        others = [run for other in REAL_SESSIONS.values() if other != session
-                  for run in runs_of(other, range(1, 6))]
-        others += sorted((REAL / "sysid").glob("*.csv.gz"))
-        twins = {kind: lab.folder / f"{kind}-{session.replace('/', '-')}.toml"
-                 for kind in ("others", "today", "c1-today", "c1-session")}
         record = not rows  # the commands of the first session are enough
-        if not twins["others"].exists():
-            lab.run("machine", "identify", *others, "--plant", "realaigym-c1", "--folds", 0, "--out",
-                    twins["others"], record=record)
-        for prior, kind in ((twins["others"], "today"), ("realaigym-c1", "c1-today")):
-            lab.run("machine", "adapt", prior, *runs_of(session, [1]), "--out", twins[kind],
-                    record=record)
-        with_session_values(ROOT / "configs/plants/realaigym-c1.toml", twins["today"],
-                            twins["c1-session"])
-        against = [word for kind in ("today", "c1-today", "c1-session")
-                   for word in ("--against", twins[kind])]
-        report = lab.json("machine", "validate", twins["others"], *runs_of(session, range(2, 6)),
-                          *against, "--against", "realaigym-c1", record=record)
-        row = next(row for row in report["errors"]
-                   if (row["seconds"], row["torques"]) == (1, "commanded"))
-        rows.append([name, str(row["windows"]),
-                     *(f"{error['value']:.3f}" for error in row["median_error_rad"].values())])
+        twins = twins_of(lab, session, record)
+        c1_session = lab.folder / f"c1-session-{session.replace('/', '-')}.toml"
+        with_session_values(ROOT / "configs/plants/realaigym-c1.toml", twins["today"], c1_session)
+        rows.append([name, *errors_of(lab, twins["others"], runs_of(session, range(2, 6)),
+                                      [twins["today"], twins["c1-today"], c1_session, "realaigym-c1"],
+                                      record)])
     return ["session", "windows", "twin of the other sessions [rad]", "adapted to run 01",
             "C.1 model 1.0, adapted to run 01", "C.1 model 1.0 with session values",
             "C.1 model 1.0"], rows
+
+
+def held_out_runs(lab, session):
+    """Runs 06 to 10 of a session, which the shipped twin and the choice of priors have not seen."""
+    folder, (robot, law) = session.split("/")[0], session.split("/")[1].split("-")
+    board = "real_hardware_perturbed_v2" if folder == "pushed" else "real_hardware_v2"
+    published = HELD_OUT / "leaderboard" / robot / board / "src_data" / {
+        "tvlqr": "ilqr_tvlqr_lqr"}.get(law, law)
+    runs = []
+    for number in range(6, 11):
+        (log,) = (published / f"experiment{number:02}").glob("*.csv")
+        runs.append(lab.folder / f"{folder}/{robot}-{law}-{number:02}.csv")
+        runs[-1].parent.mkdir(exist_ok=True)
+        shutil.copy(log, runs[-1])
+    return runs
+
+
+@recipe("machine-held-out")
+def machine_held_out(lab):
+    """Errors of models on runs 06 to 10 of a real session."""
+    rows = []
+    for name, session in list(REAL_SESSIONS.items())[-1 if lab.few else 0:]:
+        record = not rows
+        twins = twins_of(lab, session, record)
+        rows.append([name, *errors_of(lab, twins["others"], held_out_runs(lab, session),
+                                      [twins["today"], twins["c1-today"], "realaigym-twin",
+                                       "realaigym-c1"], record)])
+    return ["session", "windows", "twin of the other sessions [rad]", "adapted to run 01",
+            "C.1 model 1.0, adapted to run 01", "shipped twin", "C.1 model 1.0"], rows
 
 
 def this_machine():
