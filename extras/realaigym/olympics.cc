@@ -50,7 +50,7 @@ class Pilot {
   Joints Torque(double time, const Joints& angle) {
     const TimedReading reading{{angle, {}}, time};
     estimator_.Update(time, sent_, &reading);
-    // The cycle next to the end of a control period counts. After a late one, actions are left out.
+    // The cycle nearest to the end of a control period counts. After a late one, actions are left out.
     const auto step = static_cast<int64_t>((time + kPeriod / 2) / controller_.period());
     if (step > step_) wanted_ = controller_(step, estimator_.ahead());
     step_ = std::max(step, step_);

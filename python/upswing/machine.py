@@ -24,7 +24,7 @@ class Controller:
     Call it with each reading. It returns the torques to send, and does what `upswing run` does: a
     Kalman filter with the twin estimates the state, a supervisor watches the machine, and the
     motor earns its torque by a pulse that the encoders have to answer. The calls may come at any
-    times: the policy acts at the reading next to the end of its control period, and its torque is
+    times: the policy acts at the reading nearest to the end of its control period, and its torque is
     held between.
 
     >>> controller = upswing.machine.Controller("mpc", twin="twin.toml")

@@ -17,7 +17,7 @@ void Disturbance::Describe(Options& o, double delay_step) {
       .step = delay_step;
   sensors.Describe(o);
   o.Add(&late_share, "late_share", {0, 1}, "",
-        "share of the control steps that are late: they keep the torque before");
+        "probability that a control step is late: it and the next ones keep the torque before");
   o.Add(&late, "late", {0, kLargestDelay}, "s",
         "longest time for which a late control step keeps the torque before");
 }

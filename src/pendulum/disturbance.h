@@ -29,7 +29,7 @@ struct Disturbance {
   double sensor_noise = 0;  // standard deviation on each measured angle and velocity, rad, rad/s
   double delay = 0;         // from choosing a torque to its effect, s, in whole control periods
   SensorModel sensors = {};
-  double late_share = 0;  // share of the control steps that are late
+  double late_share = 0;  // probability that a control step begins a lateness
   double late = 0;        // longest lateness, s
 
   /// Declares each setting in `options`: name, range, unit, help.

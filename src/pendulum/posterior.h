@@ -47,7 +47,7 @@ class Posterior {
 
  private:
   struct Value {
-    double Plant::*of_plant = nullptr;  // one of these
+    double Plant::*of_plant = nullptr;  // one of the two is set
     double SensorModel::*of_sensors = nullptr;
     Range range;
   };

@@ -9,13 +9,6 @@
 namespace upswing {
 namespace {
 
-/// Natural time (s) and torque (N·m).
-Scale NaturalUnits(const Plant& plant) {
-  const Manipulator body = ManipulatorOf(plant);
-  const double J = body.Mass(1).M11, G = body.G1 + body.G2;
-  return {std::sqrt(J / G), G};
-}
-
 /// Whether two ratios are on the same side of 1, both by more than kOtherSize.
 bool BothDiffer(double a, double b) {
   return std::min(a, b) > kOtherSize || std::max(a, b) * kOtherSize < 1;
@@ -78,6 +71,12 @@ bool IsImage(const Plant& from, const Plant& plant, const Scale& ratio) {
 }
 
 }  // namespace
+
+Scale NaturalUnits(const Plant& plant) {
+  const Manipulator body = ManipulatorOf(plant);
+  const double J = body.Mass(1).M11, G = body.G1 + body.G2;
+  return {std::sqrt(J / G), G};
+}
 
 Scale ScaleOf(const Plant& plant) {
   static const Scale kBuiltIn = NaturalUnits(Plant());

@@ -26,7 +26,10 @@ inline Scale operator*(const Scale& a, const Scale& b) {
   return {a.time * b.time, a.torque * b.torque};
 }
 
-/// The natural units of a plant; exactly 1 for the built-in plant.
+/// The natural time (s) and torque (N·m) of a plant.
+Scale NaturalUnits(const Plant& plant);
+
+/// The natural units of a plant over those of the built-in plant; exactly 1 for this plant.
 Scale ScaleOf(const Plant& plant);
 
 /// The units of `plant` as multiples of those of `from`, by which a policy for `from` acts on

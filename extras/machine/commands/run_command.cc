@@ -149,7 +149,7 @@ void PrintDriver(const RunArguments& a, const LoadedPolicy& policy) {
   const double cycles = CyclesIn(policy.control_period(), std::llround(a.hz));
   constexpr double kRounding = 1e-6;
   if (std::abs(cycles - std::round(cycles)) > kRounding * cycles) {
-    fmt::print("  decides every {:.4g} s, which is {:.4g} cycles: at the cycle next to its end\n",
+    fmt::print("  decides every {:.4g} s, which is {:.4g} cycles: at the cycle nearest to its end\n",
                policy.control_period(), cycles);
   }
 }

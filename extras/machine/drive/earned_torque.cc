@@ -171,7 +171,11 @@ Complaint EarnedTorque::JudgePulse() {
 
 /// Judges a joint that has not answered yet.
 Complaint EarnedTorque::JudgeJoint(int j) {
-  if (PredictsPulse()) return JudgeShare(j);
+  return PredictsPulse() ? JudgeShare(j) : JudgeMotion(j);
+}
+
+/// Judges whether an encoder shows any motion of its joint.
+Complaint EarnedTorque::JudgeMotion(int j) {
   Joint& joint = joints_[j];
   if (std::abs(joint.angle - joint.start) > Visible(joint)) {
     joint.answered = true;
@@ -224,17 +228,17 @@ Complaint EarnedTorque::JudgeShare(int j) {
   const Expectation& e = seen_.expected;
   Joint& joint = joints_[j];
   const double expected = e.driven[j] - e.coasting[j], shown = e.measured[j] - e.coasting[j];
-  // While the torque doubles, a delay that differs from the twin's is another torque. The machine
-  // has to move enough, too, if it is late.
+  // While the torque doubles, a delay that differs from the twin's is another torque. A late
+  // machine, too, has to move far enough to be compared.
   const double doublings = kDelayDeviations * e.delay_deviation / Time(kDoubling, kDoublingCycles);
   const double unsure = std::exp2(doublings);
   const double enough = unsure * std::max(kCompared, kComparedSteps * joint.step);
   const bool last = at_limit_ > Time(kLimitSeconds, kLimitCycles);
   const bool strong = amplitude_ > LeastTorque(j);
   if (!last && (std::abs(expected) < enough || !strong)) return {};
+  // The largest torque moves the joint too little to judge how far, but it has to move.
+  if (std::abs(expected) < kLeastCompared * enough) return JudgeMotion(j);
   joint.answered = true;
-  // The largest torque moves the joint too little for a judgement.
-  if (std::abs(expected) < kLeastCompared * enough) return {};
   const double share = shown / expected;
   if (share >= kLeastShare / unsure && share <= kLargestShare * unsure) return {};
   return {

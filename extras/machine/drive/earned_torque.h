@@ -123,6 +123,7 @@ class EarnedTorque {
   /// At the end of a window of readings, judges whether the links have rested in it.
   void JudgeRest();
   Complaint JudgeJoint(int j);
+  Complaint JudgeMotion(int j);
   Complaint JudgeShare(int j);
   double LeastTorque(int j) const;
   Complaint JudgeDirection(int j);

@@ -54,8 +54,10 @@ Estimator::Estimator(const Twin& twin, double period, StateSource source)
   const int kept = static_cast<int>(kMostKept * std::max(1.0, scale.time));
   for (int i = kept; i > 0; --i) model_->drive.Add(-1 - i * 1e-3, {});
   model_->silent = model_->drive;
-  expectation_.delay_deviation =
-      std::sqrt(CovarianceOf(twin, "delay", "delay") + CovarianceOf(twin, "lag", "lag"));
+  // A fit knows the sum of delay and lag better than each.
+  expectation_.delay_deviation = std::sqrt(
+      std::max(0.0, CovarianceOf(twin, "delay", "delay") + CovarianceOf(twin, "lag", "lag") +
+                        2 * CovarianceOf(twin, "delay", "lag")));
   expectation_.friction_deviation = {
       std::numbers::pi / 2 * std::sqrt(CovarianceOf(twin, "coulomb1", "coulomb1")),
       std::numbers::pi / 2 * std::sqrt(CovarianceOf(twin, "coulomb2", "coulomb2"))};

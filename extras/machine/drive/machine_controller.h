@@ -34,7 +34,7 @@ class MachineController {
 double CyclesIn(double control_period, int64_t hz);
 
 /// The controller at the rate of a loop: its steps are cycles, `hz` per second. It acts in the
-/// cycle next to the end of each control period of the given one, and holds its torque between.
+/// cycle nearest to the end of each control period of the given one, and holds its torque between.
 /// Throws as CyclesIn does.
 MachineController PerCycle(MachineController controller, int64_t hz);
 

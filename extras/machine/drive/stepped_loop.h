@@ -34,7 +34,7 @@ struct SteppedLoopConfig {
 };
 
 /// The estimator, the supervisor and the controller of ControlLoop, which the caller steps with a
-/// reading at any times. The controller acts at the reading next to the end of its control period,
+/// reading at any times. The controller acts at the reading nearest to the end of its control period,
 /// and its torque is held between.
 class SteppedLoop {
  public:

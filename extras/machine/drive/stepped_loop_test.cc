@@ -175,7 +175,7 @@ TEST(SteppedLoop, TheFirstPulseTakesBackTheImpulseOfAGap) {
 }
 
 TEST(SteppedLoop, GapsDoNotChangeTheUsualTimeBetweenReadings) {
-  // The policy acts at the reading next to the end of its period, which the usual time decides.
+  // The policy acts at the reading nearest to the end of its period, which the usual time decides.
   for (const bool begins_with_gaps : {false, true}) {
     SteppedBench bench(/*compensation=*/0);
     for (int i = 0; begins_with_gaps && i < 3; ++i) bench.Step(0.07);

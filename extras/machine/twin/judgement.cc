@@ -30,7 +30,6 @@ struct WindowSeries {
 struct Explained {
   WindowSeries series;
   double gravity = 0;  // GravitySquares
-  double torque = 0;   // WindowError::torque
 };
 
 /// The start state with the least squared errors of the angles, by Levenberg and Marquardt's
@@ -60,18 +59,6 @@ Eigen::Vector4d BestStart(const ModelledLog& modelled, const LogWindow& window) 
   return x;
 }
 
-/// Sum of squares of the reported torques about their mean, at the joints that report some.
-double TorqueSquares(const ModelledLog& modelled, const LogWindow& window) {
-  double squares = 0;
-  for (int j = 0; j < 2; ++j) {
-    if (!modelled.reported[j]) continue;
-    for (int k = window.first; k < window.last; ++k) {
-      squares += modelled.log.measured[k][j] * modelled.log.measured[k][j];
-    }
-  }
-  return squares;
-}
-
 /// Sum over the rows of the squared sines of both links' angles against the vertical: gravity acts
 /// on links in proportion to them.
 double GravitySquares(const WindowSeries& series, const Twin& twin) {
@@ -84,6 +71,13 @@ double GravitySquares(const WindowSeries& series, const Twin& twin) {
   return sum;
 }
 
+/// An error of a prediction, rad. One that overflows is worse than any motion; medians cannot sort
+/// NaN.
+double Finite(double error) {
+  constexpr double kLost = 1e6;  // rad
+  return std::abs(error) < kLost ? error : kLost;
+}
+
 Explained Explain(const ModelledLog& modelled, const Twin& twin, const LogWindow& window) {
   const MachineLog& log = modelled.log;
   const Eigen::Vector4d x = BestStart(modelled, window);
@@ -93,14 +87,10 @@ Explained Explain(const ModelledLog& modelled, const Twin& twin, const LogWindow
     for (int j = 0; j < 2; ++j) {
       const double angle = log.angle[window.first + k][j];
       result.series.measured[j].push_back(angle);
-      result.series.residual[j].push_back(motion.angle[k][j] - angle);
+      result.series.residual[j].push_back(Finite(motion.angle[k][j] - angle));
     }
   }
   result.gravity = GravitySquares(result.series, twin);
-  if (log.measured.empty()) return result;
-  const double squares = TorqueSquares(modelled, window);
-  const WindowResiduals residuals = ResidualsOf(modelled, window, x, /*linearizes=*/false);
-  if (squares > 0) result.torque = std::sqrt(residuals.torque.mean * window.rows() / squares);
   return result;
 }
 
@@ -145,7 +135,6 @@ WindowError ErrorOf(const Explained& explained, const Joints& noise) {
   window.error = std::sqrt(error / static_cast<double>(n));
   window.motion = std::sqrt((line + explained.gravity) / static_cast<double>(n));
   window.step = bends > 0 ? std::sqrt(std::max(0.0, unexplained) / bends) : 0;
-  window.torque = explained.torque;
   return window;
 }
 
@@ -163,7 +152,8 @@ std::vector<LogWindow> WindowsIn(const MachineLog& log, const Twin& twin, double
                     twin.plant.length2);
 }
 
-/// The noise of both angles: the smoothness of the motion and that of the errors both tell it.
+/// The noise of each angle, rad: the smaller of two estimates, from the measured angles and from
+/// the residuals.
 Joints NoiseIn(std::span<const Explained> windows, int longest_stride) {
   Joints noise{};
   for (int j = 0; j < 2; ++j) {
@@ -235,7 +225,6 @@ Judgement Judge(std::span<const MachineLog> logs, std::span<const Twin> twins,
   judgement.error = MedianOver(judgement, &WindowError::error);
   judgement.times_noise = judgement.error / std::hypot(judgement.noise[0], judgement.noise[1]);
   judgement.step_share = MedianOver(judgement, &WindowError::step);
-  judgement.torque_share = MedianOver(judgement, &WindowError::torque);
   std::vector<double> shares;
   for (const WindowError& error : judgement.errors) shares.push_back(error.share());
   const Quartiles quartiles = QuartilesOf(shares);

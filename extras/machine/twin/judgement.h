@@ -14,7 +14,7 @@ namespace upswing::machine {
 enum class Explanation {
   kToNoise,     // errors are those of the encoders
   kToMultiple,  // errors are a multiple of them, but small against the motion
-  kNone,        // errors are no longer small against the motion
+  kNone,        // errors are not small against the motion, and more than 5 times the noise
   kUnknown,     // the logs have no motion in which a model can predict
 };
 
@@ -23,13 +23,13 @@ const char* NameOf(Explanation explanation);
 /// The errors of a prediction in a window with the best start state.
 struct WindowError {
   double error = 0;  // rms over the rows of both angles' errors, rad
-  // How much there is to explain, rad: the same error of the best constant velocities, and what
-  // gravity would add in a natural time. A motor that moves links slowly leaves only the latter.
+  // How much there is to explain, rad: the same error of the best constant velocities, and the
+  // sines of the links' angles, which are the velocity that gravity adds in a natural time, in
+  // natural units. A motor that moves links slowly leaves only the latter.
   double motion = 0;
   // Share of the changes of velocity, over a twentieth of the window, that the model does not
   // explain.
   double step = 0;
-  double torque = 0;  // share of the reported torques that the model does not explain; 0: no report
 
   /// Share of the motion that the model does not explain.
   double share() const { return error / motion; }
@@ -46,7 +46,6 @@ struct Judgement {
   // Unexplained shares of the motion: median and upper quartile over the windows.
   double share = 0, upper_share = 0;
   double step_share = 0;            // unexplained share of the changes of velocity
-  double torque_share = 0;          // unexplained share of the reported torques
   std::vector<WindowError> errors;  // (windows)
 
   bool explains() const { return explanation != Explanation::kNone; }

@@ -8,9 +8,9 @@
 #include "extras/machine/twin/twin.h"
 
 /// The length of link 1 that a motion shows. In the equations of motion the coupling of the links
-/// over the gravity of link 2 is length1 / g, whatever the masses, centres and torques. A twin
-/// takes its lengths as given, so a length or a clock that is wrong makes all its other values
-/// wrong.
+/// over the gravity of link 2 is length1 / g, whatever the masses, centres and torques. A fit to
+/// logs with torques takes its lengths as given, so a length or a clock that is wrong makes all its
+/// other values wrong. (Without torques length1 is fitted, and nothing contradicts it.)
 namespace upswing::machine {
 
 struct LengthByMotion {
