@@ -38,6 +38,7 @@ constexpr double kLostCycles = 1.5, kLongestLoss = 0.025;       // shortest in c
 constexpr double kBrakeShare = 1.5;                      // of the limits of velocity and energy
 constexpr double kEnergyShare = 1.3, kEnergyRise = 0.1;  // of and above the least energy
 constexpr double kEnergyTime = 0.1;                      // in which the energy is averaged, s
+constexpr double kBrakeBegins = 1.3;  // time until it slows the links, of delay and lag
 constexpr double kBrakeCycles = 2.5;  // age of a reading with which the motors may brake
 
 bool Within(double x, double limit) { return std::abs(x) <= limit; }  // false for NaN
@@ -269,13 +270,16 @@ Complaint Supervisor::CheckResponse() {
   return earned_.JudgeRun();
 }
 
-/// The velocity may not exceed its limit until the first torque of the brake acts.
+/// The velocity may not exceed its limit until the torque of the brake has replaced the last one,
+/// which takes somewhat longer than the motors' delay and lag.
 Complaint Supervisor::CheckLimits(const CycleFacts& facts) const {
   const Limits& limits = config_.limits;
   const auto& [q1, q2, w1, w2] = facts.state;
   const double angle = std::max(std::abs(q1), std::abs(q2));
-  const double velocity =
-      std::max({std::abs(w1), std::abs(w2), std::abs(facts.ahead.w1), std::abs(facts.ahead.w2)});
+  const auto fastest = [](double now, double ahead) {
+    return std::max(std::abs(now), std::abs(now + kBrakeBegins * (ahead - now)));
+  };
+  const double velocity = std::max(fastest(w1, facts.ahead.w1), fastest(w2, facts.ahead.w2));
   if (!Within(angle, limits.angle)) {
     return {"angle: %.4g rad is beyond the limit %.4g rad", {angle, limits.angle}};
   }
