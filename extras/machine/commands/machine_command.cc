@@ -204,28 +204,29 @@ void SayDistrust(const std::string& file, const std::string& distrust) {
 
 constexpr std::array kHorizons{0.2, 0.5, 1.0};
 
-/// Reads the logs. Says a line about each one with faults, and then sets `is_faulty`.
-std::vector<MachineLog> ReadAndWarn(const MachineArguments& a, bool& is_faulty) {
+/// Reads the logs. Says a line about each one with faults, and then sets `is_doubtful`.
+std::vector<MachineLog> ReadAndWarn(const MachineArguments& a, bool& is_doubtful) {
   return ReadCheckedLogs(a.logs, a.columns, [&](const std::string& fault) {
     SayError(fault);
-    is_faulty = true;
+    is_doubtful = true;
   });
 }
 
-/// Runs work that sets `is_faulty` if it reads logs with faults. A later error follows from these
-/// faults, and has exit code 1, too.
-int RunOnLogs(void (*work)(const MachineArguments& a, bool& is_faulty), const MachineArguments& a) {
-  bool is_faulty = false;
+/// Runs work that sets `is_doubtful` if its logs have faults, or no twin explains them. A later
+/// error follows from these faults, and has exit code 1, too.
+int RunOnLogs(void (*work)(const MachineArguments& a, bool& is_doubtful),
+              const MachineArguments& a) {
+  bool is_doubtful = false;
   try {
-    work(a, is_faulty);
+    work(a, is_doubtful);
   } catch (const Error& error) {
-    if (!is_faulty) throw;
+    if (!is_doubtful) throw;
     throw Failure(error.what());
   }
-  return is_faulty ? 1 : 0;
+  return is_doubtful ? 1 : 0;
 }
 
-void Validate(const MachineArguments& a, bool& is_faulty) {
+void Validate(const MachineArguments& a, bool& is_doubtful) {
   const std::string& file = a.twin;
   if (file.ends_with(".csv") || file.ends_with(".csv.gz")) {
     throw BadInput(Concat("machine validate: expected the twin's file before the logs, got \"",
@@ -234,7 +235,7 @@ void Validate(const MachineArguments& a, bool& is_faulty) {
   const Twin twin = ReadTwin(file, "machine validate");
   WarnOfDistrust(file, twin.distrust);
   const std::vector<Twin> others = ReadOthers(a);
-  const std::vector<MachineLog> logs = ReadAndWarn(a, is_faulty);
+  const std::vector<MachineLog> logs = ReadAndWarn(a, is_doubtful);
   std::vector<Predictor> predictors{PredictorOf(twin.name, twin, logs)};
   AddOthers(others, a, logs, predictors);
   ThreadPool pool(ResolveThreads(a.threads));
@@ -251,7 +252,7 @@ void Validate(const MachineArguments& a, bool& is_faulty) {
   }
   if (!a.csv.empty()) WriteNamedFile(a.csv, MotionCsv(logs, predictors));
   const Judgement judgement = Judge(logs, predictors.front().twins, "these logs", &pool);
-  if (!judgement.explains()) is_faulty = true;
+  if (!judgement.explains()) is_doubtful = true;
   if (!a.as_json) fmt::print("{}\n", SentenceOf(judgement));
   ShowErrors(a, logs, predictors, rows, {{"judgement", JudgementJson(judgement)}}, pool);
 }
@@ -317,7 +318,7 @@ nlohmann::ordered_json IdentificationJson(const Identification& found, const std
 }
 
 /// Warns of a twin that predicts worse than the values that the fit began with.
-void WarnOfTwin(std::span<const ErrorRow> rows) {
+void WarnIfWorseThanStart(std::span<const ErrorRow> rows) {
   // The row of all runs and the longest predictions comes last.
   const ErrorRow* last = nullptr;
   for (const ErrorRow& row : rows) last = row.reported ? last : &row;
@@ -377,25 +378,26 @@ Predictor PredictorOfFit(const Identification& found, std::span<const MachineLog
 }
 
 /// Fits a twin to logs, writes it, and compares its predictions with those of the first guess.
-void FitTwin(const MachineArguments& a, bool& is_faulty) {
+void FitTwin(const MachineArguments& a, bool& is_doubtful) {
   CheckFitArguments(a);
   const Twin first = ReadFirst(a);
   WarnOfDistrust(Adapts(a) ? a.twin : a.plant, first.distrust);
   const std::vector<Twin> others = ReadOthers(a);
-  const std::vector<MachineLog> logs = ReadAndWarn(a, is_faulty);
+  const std::vector<MachineLog> logs = ReadAndWarn(a, is_doubtful);
   ThreadPool pool(ResolveThreads(a.threads));
   Identification found = FitShowingProgress(a, logs, first, pool);
   std::string& distrust = found.fit.twin.distrust;
-  if (is_faulty) distrust = Concat("its logs have faults", distrust.empty() ? "" : "; ", distrust);
+  if (is_doubtful)
+    distrust = Concat("its logs have faults", distrust.empty() ? "" : "; ", distrust);
   WriteNamedFile(a.out, TwinText(found.fit.twin));
 
   std::vector<Predictor> predictors{PredictorOfFit(found, logs),
                                     PredictorOf(first.name, first, logs)};
   AddOthers(others, a, logs, predictors);
   const auto rows = CompareErrors(logs, predictors, kHorizons, &pool);
-  WarnOfTwin(rows);
+  WarnIfWorseThanStart(rows);
   if (!distrust.empty()) SayDistrust(a.out, distrust);
-  is_faulty = !distrust.empty();
+  is_doubtful = !distrust.empty();
   if (!a.as_json) PrintIdentification(found, logs.size());
   ShowErrors(a, logs, predictors, rows, IdentificationJson(found, a.out), pool);
 }
