@@ -130,7 +130,7 @@ void LateSteps::Act(ControlStep& step) {
     if (waits_[i] > 0) {
       --waits_[i];
     } else if (disturbance.is_late() && rngs_[i].Uniform() < disturbance.late_share) {
-      // This step, and those that begin within the lateness.
+      // This step and the following ones within the lateness keep the torque.
       waits_[i] = static_cast<int64_t>(rngs_[i].Uniform(0, disturbance.late) / period_);
     } else {
       applied_[i] = step.applied[i];
