@@ -137,6 +137,7 @@ def main():
     parser.add_argument("--counts", type=int, help="counts of the encoders")
     parser.add_argument("--twin", help="twin from whose covariance the machines are drawn")
     options, extra = parser.parse_known_args()
+    extra = [word for word in extra if word != "--"]
     folder = options.out or Path(tempfile.mkdtemp())
     folder.mkdir(parents=True, exist_ok=True)
     count = 0
