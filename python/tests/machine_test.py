@@ -184,7 +184,7 @@ class Controllers(BadInputTest):
     def test_a_stop_brakes_until_the_links_hang(self):
         rig = Rig(quiet("mpc", **SMALL_MPC))
         rig.until("running")
-        rig.run(1)
+        rig.run(0.3)  # into the swing
         rig.controller.stop()
         rig.cycle()
         self.assertEqual(rig.controller.state, "braking")
