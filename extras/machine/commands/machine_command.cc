@@ -38,10 +38,10 @@ struct MachineArguments {
   bool as_json = false, one_body = false;
 };
 
-void PrintCheck(const LogCheck& check, const std::string& units) {
+void PrintCheck(const LogCheck& check) {
   fmt::print("{}: {} rows, {:.2f} s{}\n", Printable(check.name), check.rows, check.seconds,
              check.pieces > 1 ? fmt::format(" in {} pieces", check.pieces) : "");
-  fmt::print("  {:<8} {}\n", "units", Printable(units));
+  fmt::print("  {:<8} {}\n", "units", Printable(UnitsText(check.columns)));
   for (const Finding& finding : check.findings) {
     fmt::print("  {:<8} {:<11} {}{}\n", NameOf(finding.severity), AboutText(finding), finding.text,
                finding.rows ? ", " + RowsText(*finding.rows) : "");
@@ -54,12 +54,10 @@ int RunCheck(const MachineArguments& a) {
   }
   std::vector<LogCheck> checks;
   bool all_read = true;
-  std::string units;
   for (const std::string& file : a.logs) {
     try {
       const std::vector<MachineLog> pieces = ReadLog(file, a.columns);
       checks.push_back(CheckLog(file, pieces));
-      units = pieces.front().units;
       if (!a.figure.empty()) DrawCheck(checks.back(), pieces, a.figure);
     } catch (const Error& error) {
       if (a.logs.size() == 1) throw;
@@ -67,7 +65,7 @@ int RunCheck(const MachineArguments& a) {
       all_read = false;
       continue;
     }
-    if (!a.as_json) PrintCheck(checks.back(), units);
+    if (!a.as_json) PrintCheck(checks.back());
   }
   if (a.as_json) fmt::print("{}\n", CheckJson(checks));
   if (!a.figure.empty() && !a.as_json) fmt::print("written {}\n", Printable(a.figure));

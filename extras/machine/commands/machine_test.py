@@ -97,6 +97,8 @@ class Machine(ProgramTest):
                          text.replace("log.csv:", "log.csv.gz:"))
         both = json.loads(self.succeed("machine", "check", "log.csv", "log.csv.gz", "--json"))
         self.assertEqual([found["name"] for found in both["logs"]], ["log.csv", "log.csv.gz"])
+        self.assertEqual(both["logs"][0]["columns"]["angle1"],
+                         {"name": "pos_meas1", "unit": "rad", "factor": 1})
 
     def test_faults(self):
         degrees = 180 / math.pi

@@ -262,7 +262,7 @@ bool IsStuck(const Findings& findings, int joint) {
 }
 
 LogCheck CheckLog(const std::string& name, Pieces pieces) {
-  LogCheck check{name, 0, static_cast<int>(pieces.size()), 0, {}};
+  LogCheck check{name, 0, static_cast<int>(pieces.size()), 0, pieces.front().columns, {}};
   for (const MachineLog& piece : pieces) {
     check.rows += piece.rows();
     check.seconds += piece.time.back() - piece.time.front();
@@ -313,10 +313,17 @@ std::string RowsText(const LogRows& rows) {
 std::string CheckJson(std::span<const LogCheck> checks) {
   nlohmann::ordered_json logs = nlohmann::ordered_json::array();
   for (const LogCheck& check : checks) {
-    nlohmann::ordered_json log{
-        {"name", check.name},       {"rows", check.rows},
-        {"pieces", check.pieces},   {"seconds", check.seconds},
-        {"faulty", check.faulty()}, {"findings", nlohmann::ordered_json::array()}};
+    nlohmann::ordered_json log{{"name", check.name},
+                               {"rows", check.rows},
+                               {"pieces", check.pieces},
+                               {"seconds", check.seconds},
+                               {"faulty", check.faulty()},
+                               {"columns", nlohmann::ordered_json::object()},
+                               {"findings", nlohmann::ordered_json::array()}};
+    for (const ReadColumn& column : check.columns) {
+      log["columns"][column.key] = {
+          {"name", column.name}, {"unit", column.unit}, {"factor", column.factor}};
+    }
     for (const Finding& finding : check.findings) {
       nlohmann::ordered_json j{{"aspect", NameOf(finding.aspect)},
                                {"severity", NameOf(finding.severity)},

@@ -46,6 +46,7 @@ struct LogCheck {
   std::string name;
   int rows = 0, pieces = 0;
   double seconds = 0;  // length of the pieces together
+  std::vector<ReadColumn> columns;
   std::vector<Finding> findings;
 
   bool faulty() const;

@@ -190,7 +190,8 @@ class Hypotheses {
     TryChange({Change::kDrift});
   }
 
-  /// All ways to read angles with these ranges that are another convention.
+  /// All ways to read angles with these ranges that are another convention, without their mirror
+  /// images.
   static std::vector<AngleReading> Readings(const Joints& range) {
     constexpr double kLeast = 0.3, kMost = 100;  // rad
     std::vector<AngleReading> readings;
@@ -205,7 +206,7 @@ class Hypotheses {
           })) {
         continue;
       }
-      for (const Joints& sign : {Joints{1, 1}, {1, -1}, {-1, 1}, {-1, -1}}) {
+      for (const Joints& sign : {Joints{1, 1}, {1, -1}}) {
         for (const double link1 : {0, 1, -1}) {
           for (const bool swapped : {false, true}) {
             readings.push_back({.scale = {sign[0] * unit[0], sign[1] * unit[1]},
@@ -347,25 +348,35 @@ class Hypotheses {
     Offer(next);
   }
 
-  /// Tries a reading with its zeros and with others, and with all signs and joints of the torques.
+  /// Tries a reading and its mirror image, both with all joints of the torques.
   void TryReading(const AngleReading& reading) {
+    Hypothesis h = log_;
+    h.angles = reading;
+    WeakEquations equations = EquationsOf(h);
     for (const bool swapped : {false, true}) {
       if (swapped && !IsDriven()) continue;
-      Hypothesis h = log_;
-      h.angles = reading;
       h.torques.swapped = swapped;
-      // No zeros and signs explain more than this.
-      h.fit = FitAnyZeroAndSign(EquationsOf(h));
-      if (h.cost(per_change_) >= best_.cost(per_change_)) continue;
-      const auto [zero1, zero12, zero2] = h.fit.zeros();
-      TrySigns(h);
-      for (const Joints& zero :
-           {Joints{zero1, zero12 - zero1}, {zero12 - zero2, zero2}, {zero1, zero2}}) {
-        Hypothesis turned = h;
-        turned.angles.zero = zero;
-        ImproveZeros(turned);
-        TrySigns(turned);
+      if (swapped) SetTorques(h.torques, h.delay, equations);
+      // No zeros and signs explain more than this, of the mirror image as well.
+      h.fit = FitAnyZeroAndSign(equations);
+      for (const double mirror : {1, -1}) {
+        Hypothesis next = h;
+        for (double& scale : next.angles.scale) scale *= mirror;
+        if (next.cost(per_change_) < best_.cost(per_change_)) TryZerosAndSigns(next);
       }
+    }
+  }
+
+  /// Tries a reading with its zeros and with others, and with all signs of the torques.
+  void TryZerosAndSigns(const Hypothesis& h) {
+    TrySigns(h);
+    const auto [zero1, zero12, zero2] = FitAnyZeroAndSign(EquationsOf(h)).zeros();
+    for (const Joints& zero :
+         {Joints{zero1, zero12 - zero1}, {zero12 - zero2, zero2}, {zero1, zero2}}) {
+      Hypothesis turned = h;
+      turned.angles.zero = zero;
+      ImproveZeros(turned);
+      TrySigns(turned);
     }
   }
 

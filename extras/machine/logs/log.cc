@@ -318,24 +318,12 @@ void StartClock(MachineLog& piece) {
   for (double& time : piece.time) time = std::round((time - begin) * ticks) / ticks;
 }
 
-/// The unit of each column: `t [ms]; q1, q2 [rad]; u [Nm] × 0.05`.
-std::string UnitsText(const LogColumns& columns) {
-  std::vector<std::string> texts, group;
-  std::string unit;  // of the group
-  const auto finish = [&] {
-    if (!group.empty()) texts.push_back(Concat(Join(group, ", "), unit));
-    group.clear();
-  };
-  ForEachColumn(columns, [&](const auto&, const LogColumn& column, const char*) {
-    if (column.name.empty()) return;
-    std::string own = Concat(" [", column.unit, "]");
-    if (column.factor != 1) own += Concat(" × ", FormatNumber(column.factor));
-    if (own != unit) finish();
-    unit = own;
-    group.push_back(column.name);
+std::vector<ReadColumn> ReadColumnsOf(const LogColumns& columns) {
+  std::vector<ReadColumn> read;
+  ForEachColumn(columns, [&](const std::string& key, const LogColumn& column, const char*) {
+    if (!column.name.empty()) read.push_back({key, column.name, column.unit, column.factor});
   });
-  finish();
-  return Join(texts, "; ");
+  return read;
 }
 
 void CheckRows(const MachineLog& log, const std::string& where) {
@@ -416,9 +404,27 @@ std::vector<MachineLog> ParseLog(std::string_view csv, const LogColumns* columns
     StartClock(piece);
     FinishAngles(own, piece);
     if (own.torque_follows) ToCyclesEnds(piece.commanded);
-    piece.units = UnitsText(own);
+    piece.columns = ReadColumnsOf(own);
   }
   return pieces;
+}
+
+std::string UnitsText(std::span<const ReadColumn> columns) {
+  std::vector<std::string> texts, group;
+  std::string unit;  // of the group
+  const auto finish = [&] {
+    if (!group.empty()) texts.push_back(Concat(Join(group, ", "), unit));
+    group.clear();
+  };
+  for (const ReadColumn& column : columns) {
+    std::string own = Concat(" [", column.unit, "]");
+    if (column.factor != 1) own += Concat(" × ", FormatNumber(column.factor));
+    if (own != unit) finish();
+    unit = own;
+    group.push_back(column.name);
+  }
+  finish();
+  return Join(texts, "; ");
 }
 
 std::vector<MachineLog> ReadLog(const fs::path& file, const fs::path& columns) {

@@ -14,6 +14,17 @@ namespace upswing::machine {
 /// One number for each joint.
 using Joints = std::array<double, 2>;
 
+/// A column of numbers that a log was read from.
+struct ReadColumn {
+  std::string key;   // such as `angle1`
+  std::string name;  // in the file
+  std::string unit;  // of the file's numbers
+  double factor = 1;
+};
+
+/// The units of columns: `t [ms]; q1, q2 [rad]; u [Nm] × 0.05`.
+std::string UnitsText(std::span<const ReadColumn> columns);
+
 /// A log in SI units. Angles are those of PendulumState: 0 hanging, joint 2 relative to link 1. All
 /// torques act at the joints, after the gears. The vectors have a value for each row, or are empty
 /// if the file does not have the quantity.
@@ -29,7 +40,7 @@ struct MachineLog {
   std::vector<Joints> commanded;  // sent to the motors in this cycle, before clipping, N·m
   std::vector<Joints> measured;   // from the motors' currents, N·m
   std::vector<Joints> push;       // added to the commanded torque after clipping, N·m
-  std::string units = {};         // that were read, by column: `t [ms]; q1, q2 [deg]`
+  std::vector<ReadColumn> columns = {};
 
   int rows() const { return static_cast<int>(time.size()); }
 };

@@ -339,7 +339,7 @@ TEST(MachineLog, ReadsRolloutsOfThisAndOfOlderVersions) {
   // A log's command is sent at the reading of the next row; a rollout's torque begins at its own.
   EXPECT_EQ(now.commanded[0], (Joints{0, 8}));
   EXPECT_EQ(now.commanded[1], (Joints{0, 7}));
-  EXPECT_EQ(now.units, "t [s]; q1, q2 [rad]; w1, w2 [rad/s]; torque1, torque2 [N·m]");
+  EXPECT_EQ(UnitsText(now.columns), "t [s]; q1, q2 [rad]; w1, w2 [rad/s]; torque1, torque2 [N·m]");
   const MachineLog old =
       Parsed("t,qpos0,qpos1,qvel0,qvel1,torque\n0,1,2,3,4,9\n0.02,1.5,2.5,3.5,4.5,8\n");
   EXPECT_EQ(old.angle.back(), (Joints{1.5, 2.5}));
