@@ -14,6 +14,7 @@
 #include "base/json.h"
 #include "base/sample.h"
 #include "base/text.h"
+#include "extras/machine/logs/angle_noise.h"
 #include "extras/machine/logs/smooth_motion.h"
 
 namespace upswing::machine {
@@ -76,19 +77,22 @@ struct Step {
   double changes;  // by which these two differ, rad
   double more;     // by which the step is longer than the usual one, rad
 
-  /// Whether the step is that of two cycles between those of one.
-  bool IsDouble() const {
+  /// Whether the step is that of `cycles` between those of one.
+  bool IsThatOf(double cycles) const {
     constexpr double kNear = 0.35;
-    return std::abs(more / usual - 1) < kNear && std::abs(changes / usual) < kNear;
+    return std::abs(more / usual - (cycles - 1)) < kNear && std::abs(changes / usual) < kNear;
   }
 };
 
-/// The steps of a joint's angle to the rows 2 to rows - 2 of all pieces.
-std::vector<Step> StepsOf(Pieces pieces, int joint) {
+/// The steps of a joint's angle to the rows 2 to rows - 2 of all pieces, within three cycles of the
+/// usual length (s).
+std::vector<Step> StepsOf(Pieces pieces, int joint, double cycle) {
+  constexpr double kLongest = 3.5;  // cycles; after longer ones the clock tells of the loss
   std::vector<Step> steps;
   for (const MachineLog& log : pieces) {
     const auto step = [&](int k) { return log.angle[k][joint] - log.angle[k - 1][joint]; };
     for (int k = 2; k + 1 < log.rows(); ++k) {
+      if (log.time[k + 1] - log.time[k - 2] > kLongest * cycle) continue;
       const double usual = (step(k - 1) + step(k + 1)) / 2;
       steps.push_back({usual, step(k + 1) - step(k - 1), step(k) - usual});
     }
@@ -97,33 +101,39 @@ std::vector<Step> StepsOf(Pieces pieces, int joint) {
 }
 
 /// Reports rows that are lost without a trace in the clock: both joints then move twice as far.
-void CheckLostRows(Pieces pieces, const Reporter& report) {
-  constexpr double kClear = 8;                 // standard deviations of a step without a loss
-  constexpr double kOverEncoder = 6;           // steps of the encoder
-  constexpr double kNormal = 0.6745;           // median of the size of a normal number
+/// `cycle`: usual one, s.
+void CheckLostRows(Pieces pieces, double cycle, const Reporter& report) {
+  constexpr double kClear = 8;        // standard deviations of a step without a loss
+  constexpr double kOverEncoder = 6;  // steps of the encoder
+  constexpr double kNormal = 0.6745;  // median of the size of a normal number
+  constexpr double kSigmas = 3;
   constexpr double kMuch = 2e-3, kFewest = 5;  // share of the clear steps, rows
-  const std::array steps{StepsOf(pieces, 0), StepsOf(pieces, 1)};
+  const std::array steps{StepsOf(pieces, 0, cycle), StepsOf(pieces, 1, cycle)};
   Joints least{};  // clear steps, rad
   for (const int joint : {0, 1}) {
     std::vector<double> sizes;
     for (const Step& step : steps[joint]) sizes.push_back(std::abs(step.more));
     if (sizes.empty()) return;
     least[joint] = std::max(kClear * QuartilesOf(std::move(sizes)).median / kNormal,
-                            kOverEncoder * RoughnessOf(pieces, joint));
+                            kOverEncoder * StepOfNoise(AngleNoise(pieces, joint)));
   }
-  double clear = 0, lost = 0;
+  double clear = 0, lost = 0, missing = 0;
   for (size_t k = 0; k < steps[0].size(); ++k) {
-    bool is_clear = false, is_double = true;
+    bool is_clear = false, is_double = true, is_none = true;
     for (const int joint : {0, 1}) {
       const Step& step = steps[joint][k];
       if (!(std::abs(step.usual) > least[joint])) continue;
       is_clear = true;
-      is_double = is_double && step.IsDouble();
+      is_double = is_double && step.IsThatOf(2);
+      is_none = is_none && step.IsThatOf(0);
     }
     clear += is_clear;
     lost += is_clear && is_double;
+    missing += is_clear && is_none;
   }
-  if (lost < kFewest || lost < kMuch * clear) return;
+  // Accelerations make as many steps of none as of two.
+  const double least_lost = std::max(kFewest, kSigmas * std::sqrt(lost + missing));
+  if (lost - missing < std::max(least_lost, kMuch * clear)) return;
   report(Severity::kFault,
          fmt::format("about {:.2g}% of the rows are lost, but the clock counts on: write the time "
                      "of each row",
@@ -244,7 +254,7 @@ void CheckClock(Pieces pieces, Findings& findings) {
   CheckClockUnit(usual, report);
   CheckStandingClock(cycles, report);
   CheckLostCycles(cycles, usual, report);
-  if (IsNominal(cycles, usual)) CheckLostRows(pieces, report);
+  if (IsNominal(cycles, usual)) CheckLostRows(pieces, usual, report);
   CheckGaps(cycles, usual, OwnTime(pieces), report);
 }
 
@@ -261,6 +271,14 @@ bool IsStuck(const Findings& findings, int joint) {
   });
 }
 
+/// Whether the equations of motion explain a log as it is, or after a change.
+bool IsJudgedByMotion(const Findings& findings) {
+  return std::ranges::any_of(findings, [](const Finding& finding) {
+    const bool is_motion = !finding.numbers.empty() && finding.numbers[0].first == "unexplained";
+    return is_motion && (finding.severity == Severity::kNote || finding.numbers.size() > 1);
+  });
+}
+
 LogCheck CheckLog(const std::string& name, Pieces pieces) {
   LogCheck check{name, 0, static_cast<int>(pieces.size()), 0, pieces.front().columns, {}};
   for (const MachineLog& piece : pieces) {
@@ -269,10 +287,12 @@ LogCheck CheckLog(const std::string& name, Pieces pieces) {
   }
   CheckClock(pieces, check.findings);
   CheckAngles(pieces, check.findings);
+  CheckJumps(pieces, check.findings);
   CheckVelocities(pieces, check.findings);
   const std::vector<MachineLog> without_rotors = WithoutRotors(pieces);
   CheckTorques(without_rotors, check.findings);
   CheckMotion(without_rotors, check.findings);
+  if (!IsJudgedByMotion(check.findings)) CheckSpeeds(pieces, check.findings);
   return check;
 }
 

@@ -92,8 +92,10 @@ struct Reporter {
 
 /// Rate, jitter, lost cycles and gaps.
 void CheckClock(Pieces pieces, Findings& findings);
-/// Resolution, saturation, degrees and stuck encoders.
+/// Resolution, saturation and stuck encoders.
 void CheckAngles(Pieces pieces, Findings& findings);
+/// Angles that jump: wrapped ones, wrong samples, and encoders that slip.
+void CheckJumps(Pieces pieces, Findings& findings);
 /// Unit, sign, joint and saturation of the velocities, compared with differences of the angles.
 void CheckVelocities(Pieces pieces, Findings& findings);
 /// Delay, lag, gain, unit and joint of the measured torque, compared with the commanded one.
@@ -102,6 +104,8 @@ void CheckTorques(Pieces pieces, Findings& findings);
 void CheckMotion(Pieces pieces, Findings& findings);
 /// Encoders that stick, by the equations of motion.
 void CheckStuck(Pieces pieces, Findings& findings);
+/// Speeds that no pendulum reaches: it would turn round several times within a swing.
+void CheckSpeeds(Pieces pieces, Findings& findings);
 /// Signs, zeros, units and joints of angles and torques, by the equations of motion.
 void CheckEquations(Pieces pieces, Findings& findings);
 
@@ -128,16 +132,15 @@ double UsualCycle(Pieces pieces);
 /// still.
 double CentralDifference(const MachineLog& log, int k, int joint);
 
+/// |speed| of a joint from row k - 1 to row k, rad/s; 0 beyond the piece's ends. A row that comes
+/// early after a late one counts as a usual `cycle` (s).
+double SpeedTo(const MachineLog& log, int joint, int k, double cycle);
+
 /// The values of a quantity at a joint (0 or 1) in all pieces; empty if the log lacks it.
 std::vector<double> ValuesOf(Pieces pieces, std::vector<Joints> MachineLog::*quantity, int joint);
 
 /// Range of a joint's angle over all pieces: largest minus smallest, rad.
 double AngleRange(Pieces pieces, int joint);
-
-/// How rough a joint's angle is, rad: the median of its second differences that are not 0. Of an
-/// encoder it is about its step, of angles that are printed with few digits at least the last
-/// digit.
-double RoughnessOf(Pieces pieces, int joint);
 
 /// Step of a joint's encoder, rad: the smallest distance of two values. Nothing if other distances
 /// are not multiples of it.

@@ -31,8 +31,10 @@ double AccelerationAt(const MachineLog& log, int k, int joint, int span) {
 constexpr double kMostPairs = 1e5;  // rows of a fit; more would only take longer
 
 /// Command of joint `from`, delayed and lagged, against the measured torque of joint `to`.
-/// `is_swapped`: the measured torque as the command.
-Response Respond(Pieces pieces, int from, int to, int rows, double lag, bool is_swapped) {
+/// `cycle`: usual one, s. `is_swapped`: the measured torque as the command.
+Response Respond(Pieces pieces, double cycle, int from, int to, int rows, double lag,
+                 bool is_swapped) {
+  constexpr double kLost = 0.5;  // cycles, after which a delay in rows is another one in time
   Response response{rows, lag, {}};
   for (const MachineLog& piece : pieces) {
     const std::vector<Joints>& in = is_swapped ? piece.measured : piece.commanded;
@@ -44,6 +46,7 @@ Response Respond(Pieces pieces, int from, int to, int rows, double lag, bool is_
       if (!piece.push.empty()) command += piece.push[sent][from];
       const double seconds = k > rows ? piece.time[k] - piece.time[k - 1] : 1e9;
       torque += (lag > 0 ? 1 - std::exp(-seconds / lag) : 1) * (command - torque);
+      if (piece.time[k] - piece.time[sent] > (rows + kLost) * cycle) continue;
       response.pairs.Add(torque, out[k][to]);
     }
   }
@@ -56,9 +59,9 @@ std::vector<Response> ResponsesOf(Pieces pieces, int from, int to, bool is_swapp
   const int most = std::clamp(static_cast<int>(std::ceil(0.05 / std::max(cycle, 1e-4))), 3, 25);
   std::vector<Response> responses;
   for (int rows = 0; rows <= most; ++rows) {
-    Response best = Respond(pieces, from, to, rows, 0, is_swapped);
+    Response best = Respond(pieces, cycle, from, to, rows, 0, is_swapped);
     for (const double lag : {.001, .002, .003, .004, .005, .006, .008, .01, .012, .016, .02}) {
-      const Response next = Respond(pieces, from, to, rows, lag, is_swapped);
+      const Response next = Respond(pieces, cycle, from, to, rows, lag, is_swapped);
       if (next.pairs.correlation() > best.pairs.correlation()) best = next;
     }
     responses.push_back(best);

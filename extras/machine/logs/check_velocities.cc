@@ -6,17 +6,43 @@
 #include <numbers>
 
 #include "base/text.h"
+#include "extras/machine/logs/angle_noise.h"
 #include "extras/machine/logs/check.h"
 
 namespace upswing::machine {
 namespace {
 
-/// Velocities of `joint` against central differences of the angle of `other`.
-Pairs VelocityPairs(Pieces pieces, int joint, int other) {
+/// Rows in which a moving joint usually passes some steps of its encoder, at least 1.
+int SpanOf(Pieces pieces, int joint) {
+  constexpr double kSteps = 5;
+  constexpr int kLongest = 50;
+  const double step = StepOfNoise(AngleNoise(pieces, joint));
+  const double cycle = UsualCycle(pieces);
+  double squares = 0, rows = 0;
+  for (const double v : ValuesOf(pieces, &MachineLog::velocity, joint)) {
+    squares += v * v;
+    rows += 1;
+  }
+  const double way = std::sqrt(squares / std::max(1.0, rows)) * cycle;  // in a usual cycle
+  if (!(way > 0)) return 1;
+  return static_cast<int>(std::clamp(std::ceil(kSteps * step / (2 * way)), 1.0, 1.0 * kLongest));
+}
+
+/// Velocities of `joint` against differences of the angle of `other` from `span` rows before to
+/// `span` rows after. The velocities are means over these rows.
+Pairs VelocityPairs(Pieces pieces, int joint, int other, int span) {
   Pairs pairs;
   for (const MachineLog& piece : pieces) {
-    for (int k = 1; k + 1 < piece.rows(); ++k) {
-      pairs.Add(CentralDifference(piece, k, other), piece.velocity[k][joint]);
+    for (int k = span; k + span < piece.rows(); ++k) {
+      const int first = k - span, last = k + span;
+      const double seconds = piece.time[last] - piece.time[first];
+      if (!(seconds > 0)) continue;
+      double way = 0;  // the integral of the velocity
+      for (int i = first; i < last; ++i) {
+        const double mean = (piece.velocity[i][joint] + piece.velocity[i + 1][joint]) / 2;
+        way += mean * (piece.time[i + 1] - piece.time[i]);
+      }
+      pairs.Add((piece.angle[last][other] - piece.angle[first][other]) / seconds, way / seconds);
     }
   }
   return pairs;
@@ -105,13 +131,14 @@ void CheckVelocity(Pieces pieces, int joint, const Reporter& report) {
   const auto add = [&](Severity severity, const std::string& text, const Pairs& pairs) {
     report(severity, text, {}, {{"gain", pairs.gain()}, {"correlation", pairs.correlation()}});
   };
-  const Pairs own = VelocityPairs(pieces, joint, joint);
+  const int span = SpanOf(pieces, joint);
+  const Pairs own = VelocityPairs(pieces, joint, joint, span);
   const double r = own.correlation(), gain = own.gain();
   if (AngleRange(pieces, joint) < kMoves) {
     return add(Severity::kNote, "not compared: the joint hardly moves", own);
   }
   constexpr double kAgree = 0.8, kClear = 0.9, kBetter = 0.02;  // correlations
-  const Pairs other = VelocityPairs(pieces, joint, 1 - joint);
+  const Pairs other = VelocityPairs(pieces, joint, 1 - joint, span);
   const double of_other = std::abs(other.correlation());
   const bool equals_other = of_other > 0.98 && std::abs(other.gain() - 1) < 0.1 &&
                             std::abs(gain - 1) > 0.3;  // also where the joints move in proportion
@@ -127,7 +154,7 @@ void CheckVelocity(Pieces pieces, int joint, const Reporter& report) {
   }
   if (std::abs(gain - 1) > 0.3) {
     return add(Severity::kFault,
-               fmt::format("{:.4g} times the change of the angle: {}", gain, MeaningOf(gain)), own);
+               fmt::format("{:.3g} times the change of the angle: {}", gain, MeaningOf(gain)), own);
   }
   const std::string difference = DifferenceOf(pieces, joint);
   if (!difference.empty()) {
@@ -140,6 +167,26 @@ void CheckVelocity(Pieces pieces, int joint, const Reporter& report) {
       fmt::format("{:.3f} times the change of the angle, correlation {:.3f}", gain, r), own);
 }
 
+/// Reports velocities of both joints that are the same multiple of the change of the angles: then
+/// the clock is more likely wrong than both sensors.
+void CheckClockByVelocities(Pieces pieces, const Reporter& report) {
+  constexpr double kOff = 0.025, kEqual = 0.01, kExact = 0.999;  // gains, correlation
+  Joints gain{};
+  for (const int joint : {0, 1}) {
+    const Pairs own = VelocityPairs(pieces, joint, joint, SpanOf(pieces, joint));
+    gain[joint] = own.gain();
+    if (AngleRange(pieces, joint) < kMoves || own.correlation() < kExact) return;
+  }
+  const double mean = (gain[0] + gain[1]) / 2;
+  if (std::abs(gain[0] - gain[1]) > kEqual || std::abs(mean - 1) < kOff) return;
+  if (std::abs(mean - 1) > 0.3) return;  // CheckVelocity reports it
+  report(Severity::kFault,
+         fmt::format("both velocities are {:.3f} times the change of their angles: suspect a clock "
+                     "that is {:.2g}% {} (key factor), or another unit of both velocities",
+                     mean, 100 * std::abs(1 / mean - 1), mean < 1 ? "fast" : "slow"),
+         {}, {{"gain", mean}});
+}
+
 }  // namespace
 
 void CheckVelocities(Pieces pieces, Findings& findings) {
@@ -149,6 +196,7 @@ void CheckVelocities(Pieces pieces, Findings& findings) {
     CheckVelocity(pieces, joint, report);
     CheckVelocityLimit(pieces, joint, report);
   }
+  CheckClockByVelocities(pieces, {findings, Aspect::kClock});
 }
 
 }  // namespace upswing::machine

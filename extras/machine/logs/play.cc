@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "extras/machine/logs/angle_noise.h"
 #include "extras/machine/logs/check.h"
 #include "extras/machine/logs/weak_form.h"
 
@@ -65,7 +66,8 @@ class PlaySearch {
  public:
   PlaySearch(std::span<const MachineLog> logs, double time, double delay)
       : logs_(logs), time_(time), delay_(delay) {
-    for (const int j : {0, 1}) step_[j] = QuantumOf(logs, j).value_or(RoughnessOf(logs, j));
+    for (const int j : {0, 1})
+      step_[j] = QuantumOf(logs, j).value_or(StepOfNoise(AngleNoise(logs, j)));
     none_ = FitOf({logs.begin(), logs.end()});
     best_ = none_;
   }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "extras/machine/logs/angle_noise.h"
 #include "extras/machine/logs/check.h"
 #include "extras/machine/logs/windows.h"
 
@@ -130,7 +131,8 @@ double OwnTime(std::span<const MachineLog> pieces) {
   double least = 0;
   for (const int joint : {0, 1}) {
     const double turn = std::min(kShare * AngleRange(pieces, joint), kMost);
-    if (AngleRange(pieces, joint) < kMoves || turn < 3 * RoughnessOf(pieces, joint)) continue;
+    if (AngleRange(pieces, joint) < kMoves || turn < 3 * StepOfNoise(AngleNoise(pieces, joint)))
+      continue;
     std::vector<double> times;
     size_t turns = 0;
     for (const MachineLog& log : pieces) {

@@ -27,8 +27,13 @@ Joints Read(const TorqueReading& reading, const Joints& torque, double place) {
   const double flip = reading.flips_at >= 0 && place > reading.flips_at ? -1 : 1;
   for (const int j : {0, 1}) {
     double u = flip * reading.sign[j] * torque[reading.swapped ? 1 - j : j];
-    if (reading.largest > 0) u = std::clamp(u, -reading.largest, reading.largest);
-    if (reading.dead_band > 0) u = std::copysign(std::max(0.0, std::abs(u) - reading.dead_band), u);
+    const double largest = reading.largest[j], dead_band = reading.dead_band[j];
+    if (largest > 0) u = std::clamp(u, -largest, largest);
+    if (dead_band > 0) {
+      const double beyond = std::max(0.0, std::abs(u) - dead_band);
+      const double arrives = reading.only_small && beyond > 0 ? std::abs(u) : beyond;
+      u = std::copysign(arrives, u);
+    }
     read[j] = u;
   }
   return read;
@@ -137,6 +142,7 @@ WeakFit Solve(const Grams& grams, const std::vector<bool>& is_free, int windows)
       left[row] = square(row, x, 0, n);
       const double motion =
           square(row, x, weak::kJ1, weak::kG1) + square(row, x, weak::kG1, weak::kD1);
+      fit.motion[row] = motion;
       fit.unexplained[row] = motion > 0 ? left[row] / motion : 1;
       left[row] = std::max(left[row], 1e-9 * motion);
       least = row == 0 ? left[row] : std::min(least, left[row]);
@@ -144,6 +150,8 @@ WeakFit Solve(const Grams& grams, const std::vector<bool>& is_free, int windows)
     for (const int row : {0, 1}) weight[row] = left[row] > 0 ? least / left[row] : 1;
     fit.constants = scaling * x;
   }
+  const auto used = static_cast<double>((fit.constants.array() != 0).count());
+  fit.freedom = std::max(0.05, 1 - used / (2 * windows));
   return fit;
 }
 
@@ -215,6 +223,19 @@ WeakForm::WeakForm(std::span<const MachineLog> pieces, double time)
   // Slower motion tells of friction only.
   constexpr double kQuiet = 0.25;  // rad in a natural time, or share of the fast motion
   FindWindows(std::min(kQuiet / time, kQuiet * fast));
+}
+
+double WeakForm::NoiseGain(double cycle) const {
+  // φ'' = 2 π² / L² cos(2 π t / L), whose square has the integral 2 π⁴ / L³.
+  return cycle * 2 * std::pow(std::numbers::pi, 4) / std::pow(length_, 3);
+}
+
+WeakForm WeakForm::Thinned(int most) const {
+  WeakForm thin = *this;
+  const int stride = (windows() + most - 1) / most;
+  thin.windows_.clear();
+  for (int i = 0; i < windows(); i += stride) thin.windows_.push_back(windows_[i]);
+  return thin;
 }
 
 std::vector<WeakForm::Sample> WeakForm::SamplesOf(int piece, double begin, double late) const {

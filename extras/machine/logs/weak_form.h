@@ -33,9 +33,10 @@ struct AngleReading {
 struct TorqueReading {
   Joints sign{1, 1};
   bool swapped = false;
-  double largest = 0;    // the motors saturate there, N·m; 0: they do not
-  double dead_band = 0;  // torque that does not arrive, N·m
-  double flips_at = -1;  // the signs turn at this share of the log; negative: never
+  Joints largest{};         // the motors saturate there, N·m; 0: they do not
+  Joints dead_band{};       // torques that do not arrive, N·m
+  bool only_small = false;  // whether torques beyond the dead band arrive whole
+  double flips_at = -1;     // the signs turn at this share of the log; negative: never
 };
 
 /// The torques of a log over time, as their integrals.
@@ -94,6 +95,11 @@ class WeakForm {
   double time() const { return time_; }
   /// The integral of a window's weight, s.
   double weight() const { return weight_.sum(); }
+  /// The variance of the integral of φ' ẋ over a window for noise with a variance of 1 on x in each
+  /// row, `cycle` (s) apart.
+  double NoiseGain(double cycle) const;
+  /// The same form with `most` windows at most.
+  WeakForm Thinned(int most) const;
   /// The equations with the torques `delay` (s) later.
   WeakEquations Equations(const AngleReading& angles, const TorqueReading& torques,
                           double delay) const;
@@ -136,6 +142,8 @@ struct WeakFit {
   // (joints) share of the squares of inertial forces and gravity that the equations leave
   // unexplained.
   Joints unexplained{1, 1};
+  Joints motion{};     // (joints) mean of these squares, in units of the constants
+  double freedom = 1;  // share of the equations that is not used up by constants
 
   /// The unexplained share of the joint with more.
   double left() const;

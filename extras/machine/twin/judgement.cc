@@ -11,7 +11,7 @@
 #include "base/sample.h"
 #include "extras/machine/logs/check.h"
 #include "extras/machine/logs/windows.h"
-#include "extras/machine/twin/encoder_noise.h"
+#include "extras/machine/logs/angle_noise.h"
 #include "extras/machine/twin/residuals.h"
 #include "extras/machine/twin/validate.h"
 

@@ -1,4 +1,4 @@
-#include "extras/machine/twin/encoder_noise.h"
+#include "extras/machine/logs/angle_noise.h"
 
 #include <algorithm>
 #include <cmath>
@@ -81,5 +81,17 @@ double NoiseOf(std::span<const Series> values, int stride) {
   }
   return std::isfinite(least) ? least : 0;
 }
+
+double AngleNoise(std::span<const MachineLog> pieces, int joint) {
+  constexpr int kLongest = 64;
+  std::vector<Series> angles;
+  for (const MachineLog& log : pieces) {
+    Series& own = angles.emplace_back();
+    for (const Joints& q : log.angle) own.push_back(q[joint]);
+  }
+  return NoiseOf(angles, StrideOf(angles, kLongest));
+}
+
+double StepOfNoise(double noise) { return std::sqrt(12) * noise; }
 
 }  // namespace upswing::machine

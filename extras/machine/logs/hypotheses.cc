@@ -1,0 +1,299 @@
+#include "extras/machine/logs/hypotheses.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "extras/machine/logs/angle_noise.h"
+
+namespace upswing::machine {
+namespace {
+
+constexpr double kChange = 2.5;       // by which a change must reduce the misfit
+constexpr double kExactChange = 0.9;  // the same, where it explains the log to the encoders' noise
+constexpr int kThinWindows = 64;      // of a scan
+
+bool HasScale(double scale) { return std::abs(scale) != 1; }
+
+/// The largest torques of a log, N·m.
+Joints LargestTorques(Pieces pieces) {
+  Joints largest{};
+  for (const auto quantity : {&MachineLog::commanded, &MachineLog::measured}) {
+    for (const int joint : {0, 1}) {
+      for (const double u : ValuesOf(pieces, quantity, joint)) {
+        largest[joint] = std::max(largest[joint], std::abs(u));
+      }
+    }
+  }
+  return largest;
+}
+
+/// The equations in the windows that `keeps` keeps, by their places in the log.
+WeakEquations Selected(const WeakEquations& all, const std::function<bool(double place)>& keeps) {
+  std::vector<int> rows;
+  WeakEquations some;
+  some.length = all.length;
+  for (int row = 0; row < all.windows(); ++row) {
+    if (!keeps(all.when[row])) continue;
+    rows.push_back(row);
+    some.when.push_back(all.when[row]);
+  }
+  for (const int joint : {0, 1}) some.A[joint] = all.A[joint](rows, Eigen::all);
+  return some;
+}
+
+}  // namespace
+
+WeakFit FitSmallZeros(const WeakEquations& equations, const std::array<Eigen::MatrixXd, 2>& free) {
+  using namespace weak;
+  WeakFit fit = Fit(equations, free);
+  const auto [zero1, zero12, zero2] = fit.zeros();
+  if (std::max({std::abs(zero1), std::abs(zero12), std::abs(zero12 - zero1)}) <= kZero) return fit;
+  WeakEquations without = equations;
+  for (const int joint : {0, 1}) without.A[joint].middleCols(kZero1, 3).setZero();
+  return Fit(without, free);
+}
+
+int Hypothesis::changes() const {
+  const bool has_unit = HasScale(angles.scale[0]) || HasScale(angles.scale[1]);
+  return (angles.scale[0] < 0) + (angles.scale[1] < 0) + has_unit + (angles.link1 != 0) +
+         angles.swapped + (angles.swapped != torques.swapped) + (torques.sign[0] < 0) +
+         (torques.sign[1] < 0) + (std::abs(angles.zero[0]) > kZero) +
+         (std::abs(angles.zero[1]) > kZero) + (angles.late != 0) + is_late +
+         (torques.largest != Joints{}) + (torques.dead_band != Joints{}) + (torques.flips_at >= 0) +
+         (change.kind != Change::kNone);
+}
+
+bool IsSameKind(const Hypothesis& a, const Hypothesis& b) {
+  return HasScale(a.angles.scale[0]) == HasScale(b.angles.scale[0]) &&
+         HasScale(a.angles.scale[1]) == HasScale(b.angles.scale[1]) &&
+         a.angles.scale[0] * b.angles.scale[0] > 0 && a.angles.scale[1] * b.angles.scale[1] > 0 &&
+         a.angles.link1 == b.angles.link1 && a.angles.swapped == b.angles.swapped &&
+         a.torques.swapped == b.torques.swapped && a.torques.sign == b.torques.sign &&
+         (a.angles.late != 0) == (b.angles.late != 0) && a.is_late == b.is_late &&
+         (a.torques.largest != Joints{}) == (b.torques.largest != Joints{}) &&
+         (a.torques.dead_band != Joints{}) == (b.torques.dead_band != Joints{}) &&
+         (a.torques.flips_at >= 0) == (b.torques.flips_at >= 0) && a.change.kind == b.change.kind;
+}
+
+Hypotheses::Hypotheses(const WeakForm& form, Pieces pieces, Driven driven)
+    : form_(form),
+      thin_(form.Thinned(kThinWindows)),
+      driven_(driven),
+      range_{AngleRange(pieces, 0), AngleRange(pieces, 1)},
+      noise_{AngleNoise(pieces, 0), AngleNoise(pieces, 1)},
+      largest_(LargestTorques(pieces)),
+      cycle_(UsualCycle(pieces)),
+      per_change_(kChange * (1 + 8.0 / form.windows())) {
+  ImproveDelay(log_);
+  equations_ = EquationsOf(log_);
+  best_ = second_ = log_;
+  least_cost_ = log_.cost(per_change_);
+}
+
+void Hypotheses::TryAll() {
+  TryReadings();
+  TryScales();
+  TryTimes();
+  TryTorques();
+  TryEncoders();
+  ImproveDelays();
+  Choose();
+}
+
+bool Hypotheses::HasNoEffect(int joint) const {
+  constexpr double kExplained = 0.02, kMore = 0.3, kWorse = 1;  // share, of the misfit
+  if (!driven_[joint] || log_.fit.left() > kExplained) return false;
+  const int own = joint == 0 ? weak::kTorque1 : weak::kTorque2;
+  const int other = joint == 0 ? weak::kTorque2 : weak::kTorque1;
+  WeakEquations without = equations_;
+  without.A[joint].col(own).setZero();
+  if (Fit(without).misfit() > log_.fit.misfit() + kMore) return false;
+  if (!driven_[1 - joint]) return true;
+  // If it had the effect of the other one, its torques would be seen.
+  without.A[joint].col(other) = equations_.A[joint].col(own);
+  return Fit(without).misfit() > log_.fit.misfit() + kWorse;
+}
+
+bool Hypotheses::HasNoEffect() const {
+  constexpr double kExplained = 0.02, kMore = 0.3;  // share, of the misfit
+  if (!IsDriven() || log_.fit.left() > kExplained) return false;
+  WeakEquations without = equations_;
+  without.A[0].col(weak::kTorque1).setZero();
+  without.A[1].col(weak::kTorque2).setZero();
+  return Fit(without).misfit() < log_.fit.misfit() + kMore;
+}
+
+/// Delays that motors have, s.
+std::vector<double> Hypotheses::UsualDelays() const {
+  const double first = -1.5 * cycle_ - 0.04 * form_.time();
+  const double last = 2 * cycle_ + 0.1 * form_.time();
+  std::vector<double> delays;
+  constexpr int kSteps = 8;
+  for (int i = 0; i <= kSteps; ++i) delays.push_back(first + i * (last - first) / kSteps);
+  return delays;
+}
+
+/// Finds the delay of the torques that explains the motion best.
+void Hypotheses::ImproveDelay(Hypothesis& h) const {
+  WeakEquations equations = EquationsOf(h);
+  h.fit = FitSmallZeros(equations);
+  if (!IsDriven()) return;
+  const std::vector<double> usual = UsualDelays();
+  const auto with = [&](double delay) {
+    Hypothesis next = h;
+    next.delay = std::clamp(delay, usual.front(), usual.back());
+    SetTorques(next.torques, next.delay, equations);
+    next.fit = FitSmallZeros(equations);
+    return next;
+  };
+  Hypothesis found = h;
+  for (const double delay : usual) {
+    const Hypothesis next = with(delay);
+    if (next.fit.misfit() < found.fit.misfit()) found = next;
+  }
+  h = Refined(found, found.delay, (usual[1] - usual[0]) / 2, 0.002 * form_.time(), with);
+}
+
+void Hypotheses::Offer(const Hypothesis& h) {
+  if (h.changes() == 0) return;
+  least_cost_ = std::min(least_cost_, h.cost(per_change_));
+  const auto same =
+      std::ranges::find_if(offered_, [&](const Hypothesis& own) { return IsSameKind(own, h); });
+  if (same == offered_.end()) {
+    offered_.push_back(h);
+  } else if (h.misfit() < same->misfit()) {
+    *same = h;
+  }
+}
+
+/// Finds the delays of the best hypotheses: that of the log may be wrong where its angles are.
+void Hypotheses::ImproveDelays() {
+  constexpr size_t kMost = 4;
+  std::ranges::sort(offered_, {}, [](const Hypothesis& h) { return h.misfit(); });
+  for (size_t i = 0; i < std::min(kMost, offered_.size()); ++i) {
+    Hypothesis& h = offered_[i];
+    if (!h.is_late && h.change.kind == Change::kNone) ImproveDelay(h);
+  }
+}
+
+/// Chooses the best hypotheses. One that explains the log to the noise of its encoders needs less
+/// to convince.
+void Hypotheses::Choose() {
+  const auto find = [&](double per_change, bool is_exact, const Hypothesis* other) {
+    const Hypothesis* found = &log_;
+    for (const Hypothesis& h : offered_) {
+      if (other != nullptr && IsSameKind(h, *other)) continue;
+      if (is_exact && !ExplainsToNoise(h.fit)) continue;
+      if (h.cost(per_change) < found->cost(per_change)) found = &h;
+    }
+    return found;
+  };
+  bool is_exact = false;
+  const Hypothesis* best = find(per_change_, is_exact, nullptr);
+  if (best == &log_ && !ExplainsToNoise(log_.fit)) {
+    is_exact = true;
+    per_change_ *= kExactChange / kChange;
+    best = find(per_change_, is_exact, nullptr);
+  }
+  best_ = *best;
+  second_ = *find(per_change_, is_exact, &best_);
+}
+
+/// The shares of the squares of a fit's motion that the noise of the encoders makes.
+Joints Hypotheses::NoiseShares(const WeakFit& fit) const {
+  const Eigen::VectorXd& x = fit.constants;
+  const double J1 = x(weak::kJ1), J2 = x(weak::kJ2), b = x(weak::kB), a = x(weak::kA);
+  // Mean squares of the mass matrix over all angles 2.
+  const double m11 = std::pow(J1 + J2, 2) + 2 * b * b, m12 = J2 * J2 + b * b / 2;
+  const double m22 = std::pow(J2 + a, 2);
+  const double n1 = noise_[0] * noise_[0], n2 = noise_[1] * noise_[1];
+  const double gain = form_.NoiseGain(cycle_);
+  const auto share = [&](double squares, double motion) {
+    return motion > 0 ? gain * squares / motion : 1;
+  };
+  return {share(m11 * n1 + m12 * n2, fit.motion[0]), share(m12 * n1 + m22 * n2, fit.motion[1])};
+}
+
+bool Hypotheses::ExplainsToNoise(const WeakFit& fit) const {
+  constexpr double kTimes = 4, kExact = 4e-6;  // the noise, share
+  const Joints noise = NoiseShares(fit);
+  return fit.unexplained[0] < kTimes * noise[0] + kExact &&
+         fit.unexplained[1] < kTimes * noise[1] + kExact;
+}
+
+WeakEquations Hypotheses::EquationsOf(const WeakForm& form, const Hypothesis& h) const {
+  WeakEquations equations = form.Equations(h.angles, h.torques, h.delay);
+  DropIdleTorques(h.torques, equations);
+  return equations;
+}
+
+void Hypotheses::SetTorques(const TorqueReading& torques, double delay,
+                            WeakEquations& equations) const {
+  form_.SetTorques(torques, delay, equations);
+  DropIdleTorques(torques, equations);
+}
+
+/// Idle motors report torques that have nothing to do with the motion.
+void Hypotheses::DropIdleTorques(const TorqueReading& torques, WeakEquations& equations) const {
+  if (!driven_[torques.swapped ? 1 : 0]) equations.A[0].col(weak::kTorque1).setZero();
+  if (!driven_[torques.swapped ? 0 : 1]) equations.A[1].col(weak::kTorque2).setZero();
+}
+
+Hypothesis Hypotheses::WithAngles(const AngleReading& angles) const {
+  Hypothesis next = log_;
+  next.angles = angles;
+  next.fit = FitSmallZeros(EquationsOf(next));
+  return next;
+}
+
+Hypothesis Hypotheses::WithTorques(const TorqueReading& torques, double delay) const {
+  Hypothesis next = log_;
+  next.torques = torques;
+  next.delay = delay;
+  WeakEquations equations = equations_;
+  SetTorques(torques, delay, equations);
+  next.fit = FitSmallZeros(equations);
+  return next;
+}
+
+Hypothesis Hypotheses::WithChange(const Change& change) const {
+  constexpr int kEnough = 24;  // windows for more constants
+  Hypothesis next = log_;
+  if (equations_.windows() < kEnough) return next;
+  next.change = change;
+  // No window has a smooth motion where the encoder slips.
+  const auto keeps = [&](double place) {
+    return change.kind != Change::kSlip || std::abs(place - change.place) > equations_.length;
+  };
+  const WeakEquations equations = Selected(equations_, keeps);
+  if (equations.windows() < equations_.windows()) {
+    next.excused = std::max(0.0, log_.fit.misfit() - FitSmallZeros(equations).misfit());
+  }
+  next.fit = FitSmallZeros(equations, ColumnsOf(change, equations));
+  return next;
+}
+
+/// The columns of a change that there is.
+std::array<Eigen::MatrixXd, 2> Hypotheses::ColumnsOf(const Change& change,
+                                                     const WeakEquations& equations) const {
+  std::array<Eigen::MatrixXd, 2> columns;
+  const int windows = equations.windows();
+  if (change.kind == Change::kOffset) {
+    for (const int joint : {0, 1}) {
+      columns[joint].setConstant(windows, 1, joint == change.joint ? -form_.weight() : 0);
+    }
+    return columns;
+  }
+  for (const int joint : {0, 1}) {
+    columns[joint] = equations.A[joint].middleCols(weak::kZero1, 3);
+    for (int row = 0; row < windows; ++row) {
+      const double place = equations.when[row];
+      const bool after = place > change.place;
+      columns[joint].row(row) *= change.kind == Change::kSlip ? (after ? 1 : 0) : place - 0.5;
+    }
+  }
+  return columns;
+}
+
+}  // namespace upswing::machine

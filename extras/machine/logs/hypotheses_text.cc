@@ -1,0 +1,111 @@
+// Hypotheses in words.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "extras/machine/logs/hypotheses.h"
+
+namespace upswing::machine {
+namespace {
+
+/// The factor of an angle, in words.
+std::string ScaleText(double scale) {
+  if (std::abs(scale - kFullTurn) < 1e-9) return "turns (key unit)";
+  if (std::abs(scale - kOneDegree) < 1e-9) return "degrees (key unit)";
+  return fmt::format(
+      "an angle of {:.3g} times the true one: the counts of the encoder, a belt or a gear "
+      "(factor = {:.4g})",
+      1 / scale, scale);
+}
+
+/// A change of an encoder or a torque during the log. `seconds`: length of the log.
+Suspicion SuspicionOfChange(const Hypothesis& h, double seconds) {
+  const Eigen::VectorXd& x = h.fit.constants;
+  const auto extra = [&](int i) { return x(weak::kColumns + i); };
+  if (h.change.kind == Change::kOffset) {
+    const int joint = h.change.joint;
+    const double effect = x(joint == 0 ? weak::kTorque1 : weak::kTorque2);
+    return {Aspect::kTorque, joint + 1,
+            fmt::format("an offset of {:.2g} N·m", effect > 0 ? -extra(0) / effect : 0)};
+  }
+  // Both angles turn gravity at link 2, angle 1 at link 1, too.
+  const double first = extra(0) / x(weak::kG1), both = extra(1) / x(weak::kG2);
+  const bool is_first = std::abs(first) > std::abs(both - first);
+  const double turn = -(is_first ? first : both - first);
+  const std::string text =
+      h.change.kind == Change::kSlip
+          ? fmt::format("an encoder that slips by {:.2g} rad near {:.3g} s", turn,
+                        h.change.place * seconds)
+          : fmt::format("an encoder that drifts by {:.2g} rad/s", turn / seconds);
+  return {Aspect::kAngle, is_first ? 1 : 2, text};
+}
+
+}  // namespace
+
+std::vector<Suspicion> SuspicionsOf(const Hypothesis& h, double seconds) {
+  std::vector<Suspicion> all;
+  const auto add = [&](Aspect aspect, int joint, const std::string& text) {
+    all.push_back({aspect, joint, text});
+  };
+  const AngleReading& r = h.angles;
+  const TorqueReading& t = h.torques;
+  if (r.swapped && t.swapped) add(Aspect::kMotion, 0, "swapped columns of both joints");
+  if (r.swapped && !t.swapped) add(Aspect::kAngle, 0, "swapped angles");
+  if (!r.swapped && t.swapped) add(Aspect::kTorque, 0, "swapped torques");
+  if (r.link1 != 0) {
+    add(Aspect::kAngle, 2,
+        r.link1 > 0 ? "an angle against the vertical (key absolute)"
+                    : "an angle against link 1 (without key absolute)");
+  }
+  if (r.late != 0) {
+    const double late = -r.late;
+    add(Aspect::kAngle, 2,
+        fmt::format("angles that are {:.2g} ms {} than those of joint 1", 1e3 * std::abs(late),
+                    late < 0 ? "later" : "earlier"));
+  }
+  for (const int j : {0, 1}) {
+    if (std::abs(r.scale[j]) != 1) add(Aspect::kAngle, j + 1, ScaleText(std::abs(r.scale[j])));
+    if (r.scale[j] < 0) add(Aspect::kAngle, j + 1, "the opposite sign (factor = -1)");
+    if (t.sign[j] < 0) add(Aspect::kTorque, j + 1, "the opposite sign (factor = -1)");
+    if (std::abs(r.zero[j]) <= kZero) continue;
+    // The reading of a link that hangs, by the column's own sign.
+    const double hangs =
+        -std::copysign(1.0, r.scale[j]) * (j == 1 ? r.zero[1] + r.link1 * r.zero[0] : r.zero[j]);
+    const double zero = std::remainder(hangs, kFullTurn);
+    add(Aspect::kAngle, j + 1,
+        fmt::format("another zero, {:.2f} rad ({:.0f} deg) when its link {} (add it to the key "
+                    "hanging, in the column's unit)",
+                    zero, zero / kOneDegree,
+                    j == 0 || r.link1 > 0 ? "hangs" : "is in line with link 1"));
+  }
+  if (h.is_late) {
+    add(Aspect::kTorque, 0,
+        fmt::format("torques that are {:.2g} ms {} than they act", 1e3 * std::abs(h.delay),
+                    h.delay > 0 ? "earlier" : "later"));
+  }
+  for (const int j : {0, 1}) {
+    if (t.largest[j] > 0) {
+      add(Aspect::kTorque, j + 1,
+          fmt::format("motors that saturate near {:.2g} N·m", t.largest[j]));
+    }
+    if (t.dead_band[j] > 0) {
+      add(Aspect::kTorque, j + 1, fmt::format("a dead band of about {:.2g} N·m", t.dead_band[j]));
+    }
+  }
+  if (t.flips_at >= 0) {
+    add(Aspect::kTorque, 0, fmt::format("a sign that turns near {:.3g} s", t.flips_at * seconds));
+  }
+  if (h.change.kind != Change::kNone) all.push_back(SuspicionOfChange(h, seconds));
+  return all;
+}
+
+std::string SentenceOf(const std::vector<Suspicion>& suspicions) {
+  std::string text;
+  for (const Suspicion& s : suspicions) {
+    if (!text.empty()) text += " and ";
+    text += s.joint > 0 ? fmt::format("{} {}: {}", NameOf(s.aspect), s.joint, s.text) : s.text;
+  }
+  return text;
+}
+
+}  // namespace upswing::machine
