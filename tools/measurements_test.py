@@ -60,6 +60,14 @@ class Results(unittest.TestCase):
         self.assertIn("|delta|", self.succeed("tools/results/upright_modes.py", "fast", "--episodes", 4,
                                               "--physics", "closed-form"))
 
+    @unittest.skipUnless(importlib.util.find_spec("numpy"), "needs NumPy")
+    def test_logs_of_drawn_machines(self):
+        with tempfile.TemporaryDirectory(prefix="upswing-") as folder:
+            text = self.succeed("tools/results/logs.py", "--machines", 2, "--kind", "angle 1 doubled",
+                                "--keep", folder)
+        self.assertIn("angle 1 doubled: ", text)
+        self.assertIn("2 named", text)
+
     def test_seeds(self):
         with tempfile.TemporaryDirectory(prefix="upswing-") as folder:
             runs = Path(folder, "runs")
