@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "base/sample.h"
 #include "extras/machine/logs/check.h"
 #include "extras/machine/logs/hypotheses.h"
 #include "extras/machine/logs/weak_form.h"
@@ -197,6 +198,42 @@ double UnknownShare(Pieces pieces) {
   return std::max(0.0, 1 - rows / cycles);
 }
 
+/// The way of the faster joint from a row to the next in the fastest hundredth of the rows, rad.
+double LongestWay(Pieces pieces) {
+  std::vector<double> ways;
+  for (const MachineLog& log : pieces) {
+    for (int k = 1; k < log.rows(); ++k) {
+      const Joints &a = log.angle[k - 1], &b = log.angle[k];
+      ways.push_back(std::max(std::abs(b[0] - a[0]), std::abs(b[1] - a[1])));
+    }
+  }
+  std::ranges::sort(ways);
+  return Quantile(ways, 0.99);
+}
+
+/// Reports the share of the motion that the equations leave unexplained, and what that means.
+void ReportUnexplained(Pieces pieces, double left, Findings& findings) {
+  constexpr double kFar = 1;  // rad; the motion between such rows is not known
+  // A larger share is none of a pendulum, unless the torques of lost rows are unknown.
+  const double most = 0.1 + 2 * UnknownShare(pieces);
+  const double way = LongestWay(pieces);
+  Severity severity = Severity::kNote;
+  std::string meaning;
+  if (left > most && way > kFar) {
+    severity = Severity::kWarning;
+    meaning = fmt::format(
+        ": the rows are too far apart, a joint moves by {:.2g} rad from one to the next", way);
+  } else if (left > most) {
+    severity = Severity::kFault;
+    meaning = ", and no other reading of the columns explains it";
+  }
+  Reporter{findings, Aspect::kMotion}(
+      severity,
+      fmt::format("the equations of a pendulum leave {:.2g}% of the motion unexplained{}",
+                  100 * left, meaning),
+      {}, {{"unexplained", left}});
+}
+
 }  // namespace
 
 void CheckEquations(Pieces pieces, Findings& findings) {
@@ -226,15 +263,7 @@ void CheckEquations(Pieces pieces, Findings& findings) {
     for (const MachineLog& log : pieces) seconds += log.time.back();
     return Report(tried, seconds, in_proportion, findings);
   }
-  // A larger share is none of a pendulum, unless the torques of lost rows are unknown.
-  const double most = 0.1 + 2 * UnknownShare(pieces);
-  const double left = tried.log().fit.left();
-  Reporter{findings, Aspect::kMotion}(
-      left > most ? Severity::kFault : Severity::kNote,
-      fmt::format("the equations of a pendulum leave {:.2g}% of the motion unexplained{}",
-                  100 * left,
-                  left > most ? ", and no other reading of the columns explains it" : ""),
-      {}, {{"unexplained", left}});
+  ReportUnexplained(pieces, tried.log().fit.left(), findings);
   ReportNoEffect(pieces, tried, findings);
 }
 

@@ -459,6 +459,19 @@ TEST(MachineCheck, TheEquationsOfMotionNameEachChangeOfTheColumns) {
   expect([](Joints&, Joints& u) { u[0] = -u[0]; }, {"torque 1: suspect the opposite sign"});
 }
 
+/// Each `stride`-th row of a log, with angles in steps of an encoder.
+MachineLog Sampled(const MachineLog& log, int stride, double counts) {
+  const double step = 2 * std::numbers::pi / counts;
+  MachineLog sampled;
+  for (int k = 0; k < log.rows(); k += stride) {
+    const Joints& q = log.angle[k];
+    sampled.time.push_back(log.time[k]);
+    sampled.angle.push_back({step * std::round(q[0] / step), step * std::round(q[1] / step)});
+    if (!log.commanded.empty()) sampled.commanded.push_back(log.commanded[k]);
+  }
+  return sampled;
+}
+
 TEST(MachineCheck, AMachineThatTurnsRoundHasNoFaultAndHidesNone) {
   const MachineLog exact = Simulated({0, 0, 25, -12}, SwingTorque, 12);
   ASSERT_GT(AngleRange(std::span(&exact, 1), 1), 9);
@@ -470,6 +483,17 @@ TEST(MachineCheck, AMachineThatTurnsRoundHasNoFaultAndHidesNone) {
   }
   EXPECT_EQ(FaultsOf(exact), "");
   EXPECT_EQ(FaultsOf(slow), "");
+  // Nothing is known of the motion between rows that are 1 rad apart.
+  Plant light;
+  light.mass1 = light.mass2 = 0.5;
+  light.length1 = 0.2;
+  light.length2 = 0.3;
+  light.damping1 = light.damping2 = 0.005;
+  const MachineLog coarse = Sampled(Simulated({0, 0, 12, 20}, SwingTorque, 12, light), 30, 1 << 20);
+  EXPECT_EQ(FaultsOf(coarse), "");
+  EXPECT_TRUE(std::ranges::any_of(CheckAll(coarse), [](const Finding& f) {
+    return f.text.find("the rows are too far apart") != std::string::npos;
+  }));
   const auto faults_after = [&](const std::function<void(Joints & q, double share)>& change) {
     MachineLog log = exact;
     for (int k = 0; k < log.rows(); ++k) change(log.angle[k], k / double(log.rows()));
@@ -561,19 +585,6 @@ TEST(MachineCheck, PiecesAreNotJoined) {
   ASSERT_NE(fault, findings.end());
   EXPECT_EQ((*fault)["rows"], (std::vector<int>{6000, 6001}));
   EXPECT_EQ((*fault)["aspect"], "clock");
-}
-
-/// Each `stride`-th row of a log, with angles in steps of an encoder.
-MachineLog Sampled(const MachineLog& log, int stride, double counts) {
-  const double step = 2 * std::numbers::pi / counts;
-  MachineLog sampled;
-  for (int k = 0; k < log.rows(); k += stride) {
-    const Joints& q = log.angle[k];
-    sampled.time.push_back(log.time[k]);
-    sampled.angle.push_back({step * std::round(q[0] / step), step * std::round(q[1] / step)});
-    if (!log.commanded.empty()) sampled.commanded.push_back(log.commanded[k]);
-  }
-  return sampled;
 }
 
 /// A log of 30 swings of a machine like the default plant, of another size, driven at joint 1. The
