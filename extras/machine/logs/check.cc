@@ -192,14 +192,21 @@ void CheckGaps(const std::vector<Cycle>& cycles, double usual, double own_time,
     return seconds > fault ? Severity::kFault : Severity::kWarning;
   };
   int gaps = 0;
+  double longest = 0;  // of the gaps without a line, s
   for (const Cycle& cycle : cycles) {
     if (cycle.seconds <= GapOf(usual)) continue;
     ++gaps;
-    if (gaps > kMostGaps) continue;
+    if (gaps > kMostGaps) {
+      longest = std::max(longest, cycle.seconds);
+      continue;
+    }
     report(severity(cycle.seconds), fmt::format("a gap of {:.4g} s", cycle.seconds), RangeOf(cycle),
            {{"gap", cycle.seconds}});
   }
-  if (gaps > kMostGaps) report(Severity::kWarning, Counted(gaps - kMostGaps, "more gap"));
+  if (gaps > kMostGaps) {
+    report(severity(longest),
+           fmt::format("{}, the longest {:.4g} s", Counted(gaps - kMostGaps, "more gap"), longest));
+  }
 }
 
 }  // namespace

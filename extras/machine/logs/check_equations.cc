@@ -74,12 +74,15 @@ void Report(const Hypotheses& tried, double seconds, bool in_proportion, Finding
     rivals =
         fmt::format("; or {}: this log does not tell", SentenceOf(SuspicionsOf(second, seconds)));
   }
-  for (const Suspicion& s : SuspicionsOf(best, seconds)) {
+  const std::vector<Suspicion> suspicions = SuspicionsOf(best, seconds);
+  const bool is_one = suspicions.size() == 1;
+  for (const Suspicion& s : suspicions) {
     Reporter{findings, s.aspect, s.joint}(
         Severity::kFault,
-        fmt::format("suspect {}: with it the equations of a pendulum leave {:.2g}% of the motion "
-                    "unexplained, without it {:.2g}%{}",
-                    s.text, 100 * best.fit.left(), 100 * log.fit.left(), rivals),
+        fmt::format("suspect {}: with {} the equations of a pendulum leave {:.2g}% of the motion "
+                    "unexplained, without {} {:.2g}%{}",
+                    s.text, is_one ? "it" : "all suspicions", 100 * best.fit.left(),
+                    is_one ? "it" : "them", 100 * log.fit.left(), rivals),
         {}, {{"unexplained", log.fit.left()}, {"unexplained_after", best.fit.left()}});
   }
 }

@@ -141,7 +141,20 @@ TEST(MachineCheck, ManyGapsGetALineTogether) {
   for (int k = 0; k < log.rows(); ++k) log.time[k] += k / 200 / 2.0;  // 24 gaps
   const Findings found = Check(log);
   EXPECT_EQ(std::ranges::count(found, Severity::kWarning, &Finding::severity), 11);
-  EXPECT_TRUE(std::ranges::count(found, "14 more gaps", &Finding::text) == 1);
+  EXPECT_TRUE(std::ranges::count(found, "14 more gaps, the longest 0.502 s", &Finding::text) == 1);
+  // A long one is a fault, and not less because of the others.
+  for (int k = 4500; k < log.rows(); ++k) log.time[k] += 60;
+  const Findings longer = Check(log);
+  EXPECT_EQ(std::ranges::count(longer, Severity::kFault, &Finding::severity), 1);
+}
+
+TEST(MachineCheck, AClockThatIsSetAnewCostsNoTime) {
+  for (const double jump : {1.7e9, 9e11}) {
+    MachineLog log = GoodLog();
+    for (int k = log.rows() / 2; k < log.rows(); ++k) log.time[k] += jump;
+    const Findings found = Check(log);
+    EXPECT_EQ(std::ranges::count(found, Severity::kFault, &Finding::severity), 1) << jump;
+  }
 }
 
 TEST(MachineCheck, Clocks) {

@@ -57,15 +57,19 @@ WeakFit FitSmallZeros(const WeakEquations& equations, const std::array<Eigen::Ma
 int Hypothesis::changes() const {
   const bool has_unit = HasScale(angles.scale[0]) || HasScale(angles.scale[1]);
   return (angles.scale[0] < 0) + (angles.scale[1] < 0) + has_unit + (angles.link1 != 0) +
-         angles.swapped + (angles.swapped != torques.swapped) + (torques.sign[0] < 0) +
-         (torques.sign[1] < 0) + (std::abs(angles.zero[0]) > kZero) +
-         (std::abs(angles.zero[1]) > kZero) + (angles.late != 0) + is_late +
-         (torques.largest != Joints{}) + (torques.dead_band != Joints{}) + (torques.flips_at >= 0) +
-         (change.kind != Change::kNone);
+         (angles.swapped || torques.swapped) + (torques.sign[0] < 0) + (torques.sign[1] < 0) +
+         (std::abs(angles.zero[0]) > kZero) + (std::abs(angles.zero[1]) > kZero) +
+         (angles.late != 0) + is_late + (torques.largest != Joints{}) +
+         (torques.dead_band != Joints{}) + (torques.flips_at >= 0) + (change.kind != Change::kNone);
 }
 
 bool IsSameKind(const Hypothesis& a, const Hypothesis& b) {
-  return HasScale(a.angles.scale[0]) == HasScale(b.angles.scale[0]) &&
+  const auto has_zero = [](const Hypothesis& h, int joint) {
+    return std::abs(h.angles.zero[joint]) > kZero;
+  };
+  return has_zero(a, 0) == has_zero(b, 0) && has_zero(a, 1) == has_zero(b, 1) &&
+         a.change.joint == b.change.joint &&
+         HasScale(a.angles.scale[0]) == HasScale(b.angles.scale[0]) &&
          HasScale(a.angles.scale[1]) == HasScale(b.angles.scale[1]) &&
          a.angles.scale[0] * b.angles.scale[0] > 0 && a.angles.scale[1] * b.angles.scale[1] > 0 &&
          a.angles.link1 == b.angles.link1 && a.angles.swapped == b.angles.swapped &&

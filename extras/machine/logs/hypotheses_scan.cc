@@ -24,7 +24,8 @@ Hypothesis Hypotheses::Refined(Hypothesis found, double value, double step, doub
 }
 
 void Hypotheses::TryScales() {
-  for (const double scale : {1.0 / 2, 1.0 / 3, 1.0 / 4, 1.0 / 7, 2.0, 3.0, 4.0, 7.0}) {
+  for (const double scale :
+       {1.0 / 2, 1.0 / 3, 1.0 / 4, 1.0 / 5, 1.0 / 6, 1.0 / 7, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0}) {
     for (const Joints& both : {Joints{scale, 1}, {1, scale}, {scale, scale}}) {
       Offer(WithAngles({.scale = both}));
     }

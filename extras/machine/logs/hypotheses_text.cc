@@ -28,8 +28,11 @@ Suspicion SuspicionOfChange(const Hypothesis& h, double seconds) {
     return {Aspect::kTorque, joint + 1,
             fmt::format("an offset of {:.2g} N·m", effect > 0 ? -extra(0) / effect : 0)};
   }
-  // Both angles turn gravity at link 2, angle 1 at link 1, too.
-  const double first = extra(0) / x(weak::kG1), both = extra(1) / x(weak::kG2);
+  // Both angles turn gravity at link 2, angle 1 at link 1, too. Without gravity nothing is known.
+  const auto turn_of = [](double extra, double gravity) {
+    return gravity > 0 ? extra / gravity : 0;
+  };
+  const double first = turn_of(extra(0), x(weak::kG1)), both = turn_of(extra(1), x(weak::kG2));
   const bool is_first = std::abs(first) > std::abs(both - first);
   const double turn = -(is_first ? first : both - first);
   const std::string text =
@@ -58,10 +61,9 @@ std::vector<Suspicion> SuspicionsOf(const Hypothesis& h, double seconds) {
                     : "an angle against link 1 (without key absolute)");
   }
   if (r.late != 0) {
-    const double late = -r.late;
     add(Aspect::kAngle, 2,
-        fmt::format("angles that are {:.2g} ms {} than those of joint 1", 1e3 * std::abs(late),
-                    late < 0 ? "later" : "earlier"));
+        fmt::format("angles that are {:.2g} ms {} than those of joint 1", 1e3 * std::abs(r.late),
+                    r.late > 0 ? "later" : "earlier"));
   }
   for (const int j : {0, 1}) {
     if (std::abs(r.scale[j]) != 1) add(Aspect::kAngle, j + 1, ScaleText(std::abs(r.scale[j])));
@@ -69,8 +71,8 @@ std::vector<Suspicion> SuspicionsOf(const Hypothesis& h, double seconds) {
     if (t.sign[j] < 0) add(Aspect::kTorque, j + 1, "the opposite sign (factor = -1)");
     if (std::abs(r.zero[j]) <= kZero) continue;
     // The reading of a link that hangs, by the column's own sign.
-    const double hangs =
-        -std::copysign(1.0, r.scale[j]) * (j == 1 ? r.zero[1] + r.link1 * r.zero[0] : r.zero[j]);
+    const double hangs = -std::copysign(1.0, r.scale[j]) *
+                         (j == 1 && r.link1 > 0 ? r.zero[1] + r.zero[0] : r.zero[j]);
     const double zero = std::remainder(hangs, kFullTurn);
     add(Aspect::kAngle, j + 1,
         fmt::format("another zero, {:.2f} rad ({:.0f} deg) when its link {} (add it to the key "

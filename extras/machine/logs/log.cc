@@ -280,7 +280,7 @@ void Unwrap(std::vector<Joints>& angle, int joint, double wrap) {
 
 /// Undoes the wrapping of a clock (s) that begins again after `wrap` (s).
 void UnwrapClock(std::vector<double>& time, double wrap) {
-  if (wrap == 0) return;
+  if (wrap == 0 || time.empty()) return;
   double turns = 0, before = time.front();
   for (double& x : time) {
     if (x < before - wrap / 2) ++turns;
@@ -292,7 +292,9 @@ void UnwrapClock(std::vector<double>& time, double wrap) {
 /// Turns torques that act from a row's angles on into the command that is sent at their reading:
 /// that of the row before.
 void ToCyclesEnds(std::vector<Joints>& commanded) {
-  std::rotate(commanded.begin(), commanded.begin() + 1, commanded.end());
+  if (commanded.empty()) return;
+  commanded.erase(commanded.begin());
+  commanded.push_back(commanded.empty() ? Joints{} : commanded.back());  // it is not in the log
 }
 
 /// Makes the angles of a piece continuous, and those of joint 2 relative to link 1.

@@ -78,6 +78,10 @@ void SmoothMotion::AddKnots(const MachineLog& log, double block) {
   };
   for (double now = log.time[0] + block / 2; now < log.time.back(); now += block) {
     const int first = row_at(now - block), last = row_at(now + block);
+    if (last == first) {  // within a gap: go on at its end
+      now = std::max(now, log.time[first] - block);
+      continue;
+    }
     if (last - first < kFewestRows) continue;
     if (log.time[last - 1] - log.time[first] < kCovered * 2 * block) continue;
     time_.push_back(now);
@@ -105,13 +109,14 @@ void SmoothMotion::FindCurvatures() {
   }
 }
 
-bool SmoothMotion::HasGap(double first, double last, double gap) const {
+std::optional<double> SmoothMotion::EndOfGap(double first, double last, double gap) const {
+  std::optional<double> end;
   const auto begin = std::ranges::upper_bound(time_, first);
   for (auto knot = std::max(begin, time_.begin() + 1); knot != time_.end(); ++knot) {
-    if (*knot - *(knot - 1) > gap) return true;
-    if (*knot >= last) return false;
+    if (*knot - *(knot - 1) > gap) end = *knot;
+    if (*knot >= last) break;
   }
-  return false;
+  return end;
 }
 
 SmoothMotion::Point SmoothMotion::At(int joint, double time) const {

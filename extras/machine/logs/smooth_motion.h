@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -22,8 +23,11 @@ class SmoothMotion {
   double end() const { return time_.back(); }
   /// Distance of usual knots, s.
   double spacing() const { return spacing_; }
-  /// Whether two neighbouring knots between these times are further apart than `gap`. All in s.
-  bool HasGap(double first, double last, double gap) const;
+  /// The end of the last gap between these times: two neighbouring knots further apart than `gap`.
+  /// Nothing without such a gap. All in s.
+  std::optional<double> EndOfGap(double first, double last, double gap) const;
+  /// The knots' times, s.
+  std::span<const double> knots() const { return time_; }
 
   struct Point {
     double angle, velocity;  // rad, rad/s

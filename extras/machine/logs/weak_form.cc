@@ -39,6 +39,13 @@ Joints Read(const TorqueReading& reading, const Joints& torque, double place) {
   return read;
 }
 
+/// The time (s) before each piece of a log, and that of the whole log.
+std::vector<double> BeginsOf(std::span<const MachineLog> pieces) {
+  std::vector<double> begins{0};
+  for (const MachineLog& log : pieces) begins.push_back(begins.back() + log.time.back());
+  return begins;
+}
+
 /// Columns whose coefficients are not negative come first.
 constexpr int kNotNegative = weak::kZero1;
 
@@ -124,29 +131,31 @@ WeakFit Solve(const Grams& grams, const std::vector<bool>& is_free, int windows)
   for (const int row : {0, 1}) scaled[row] = scaling * grams[row] * scaling / windows;
   Eigen::VectorXd target = Eigen::VectorXd::Zero(n);
   for (const int i : {weak::kJ1, weak::kJ2, weak::kB}) target(i) = 1;
-  const auto square = [&](int row, const Eigen::VectorXd& x, int first, int last) {
-    const auto part = x.segment(first, last - first);
-    return std::max(0.0,
-                    part.dot(scaled[row].block(first, first, last - first, last - first) * part));
+  // The mean square of some terms of an equation.
+  const auto square = [&](int row, const Eigen::VectorXd& x, const std::vector<int>& columns) {
+    const Eigen::VectorXd part = x(columns);
+    return std::max(0.0, part.dot(scaled[row](columns, columns) * part));
   };
+  // Where the zero of an angle is wrong, a part of gravity is in the column of the zero.
+  const std::vector<int> inertias{weak::kJ1, weak::kJ2, weak::kB, weak::kA};
+  const std::vector<int> gravities{weak::kG1, weak::kG2, weak::kZero1, weak::kZero12};
   WeakFit fit;
   Joints weight{1, 1};
   constexpr int kRounds = 3;
+  constexpr double kLeastShare = 1e-9;  // unexplained; a smaller one would get all the weight
   for (int round = 0; round < kRounds; ++round) {
     Eigen::MatrixXd gram = weight[0] * scaled[0] + weight[1] * scaled[1];
     gram.diagonal().array() += 1e-12 * gram.trace() / n;
     const Eigen::VectorXd x = SolveNotNegative(gram, target, is_free);
-    double least = 0;
     Joints left{};
     for (const int row : {0, 1}) {
-      left[row] = square(row, x, 0, n);
-      const double motion =
-          square(row, x, weak::kJ1, weak::kG1) + square(row, x, weak::kG1, weak::kD1);
+      left[row] = std::max(0.0, x.dot(scaled[row] * x));
+      const double motion = square(row, x, inertias) + square(row, x, gravities);
       fit.motion[row] = motion;
       fit.unexplained[row] = motion > 0 ? left[row] / motion : 1;
-      left[row] = std::max(left[row], 1e-9 * motion);
-      least = row == 0 ? left[row] : std::min(least, left[row]);
+      left[row] = std::max(left[row], kLeastShare * motion);
     }
+    const double least = std::min(left[0], left[1]);
     for (const int row : {0, 1}) weight[row] = left[row] > 0 ? least / left[row] : 1;
     fit.constants = scaling * x;
   }
@@ -157,10 +166,10 @@ WeakFit Solve(const Grams& grams, const std::vector<bool>& is_free, int windows)
 
 }  // namespace
 
-TorqueIntegral::TorqueIntegral(const MachineLog& log, const TorqueReading& reading)
+TorqueIntegral::TorqueIntegral(const MachineLog& log, const TorqueReading& reading, double before,
+                               double seconds)
     : time_(log.time), integral_(log.time.size()) {
-  const double rows = std::max(1, log.rows() - 1);
-  const auto place = [&](int k) { return k / rows; };
+  const auto place = [&](int k) { return (before + log.time[k]) / seconds; };
   const bool is_measured = HasTorque(log.measured, 0) || HasTorque(log.measured, 1);
   for (int k = 1; k < log.rows(); ++k) {
     const double h = log.time[k] - log.time[k - 1];
@@ -194,8 +203,11 @@ WeakForm::WeakForm(std::span<const MachineLog> pieces, double time)
   for (const MachineLog& log : pieces) {
     const SmoothMotion& motion = motions_.emplace_back(log, kBlock * time);
     if (motion.empty()) continue;
-    for (double t = motion.begin(); t < motion.end(); t += time) {
+    double next = motion.begin();
+    for (const double t : motion.knots()) {
+      if (t < next) continue;
       speeds.push_back(std::hypot(motion.At(0, t).velocity, motion.At(1, t).velocity));
+      next = t + time;
     }
   }
   if (speeds.empty()) return;
@@ -249,10 +261,18 @@ std::vector<WeakForm::Sample> WeakForm::SamplesOf(int piece, double begin, doubl
   return samples;
 }
 
+/// The longest gap between the knots of a window, s.
+double WeakForm::LongestGap(const SmoothMotion& motion) const {
+  return std::max(kLongestGap * time_, 3 * motion.spacing());
+}
+
 void WeakForm::FindWindows(double quiet) {
-  double seconds = 0;
+  double seconds = 0;  // without gaps
   for (const SmoothMotion& motion : motions_) {
-    if (!motion.empty()) seconds += motion.end() - motion.begin();
+    const std::span<const double> knots = motion.knots();
+    for (size_t i = 1; i < knots.size(); ++i) {
+      seconds += std::min(knots[i] - knots[i - 1], LongestGap(motion));
+    }
   }
   const double hop = std::max(length_ / 2, seconds / kMostWindows);
   for (int piece = 0; piece < static_cast<int>(motions_.size()); ++piece) {
@@ -262,8 +282,11 @@ void WeakForm::FindWindows(double quiet) {
     const double margin = 0.11 * time_;
     for (double begin = motion.begin() + margin; begin + length_ + margin < motion.end();
          begin += hop) {
-      const double gap = std::max(kLongestGap * time_, 3 * motion.spacing());
-      if (motion.HasGap(begin, begin + length_, gap)) continue;
+      const auto end = motion.EndOfGap(begin, begin + length_, LongestGap(motion));
+      if (end) {  // go on after the gap, with as many hops as that takes
+        begin += std::max(0.0, std::ceil((*end - begin) / hop) - 1) * hop;
+        continue;
+      }
       Window window{piece, begin, SamplesOf(piece, begin, 0)};
       double squares = 0;
       for (const Sample& s : window.samples) squares += s.w[0] * s.w[0] + s.w[1] * s.w[1];
@@ -311,12 +334,8 @@ WeakEquations WeakForm::Equations(const AngleReading& angles, const TorqueReadin
                                   double delay) const {
   WeakEquations equations;
   for (const int joint : {0, 1}) equations.A[joint].setZero(windows(), weak::kColumns);
-  double seconds = 0;
-  std::vector<double> before;  // of each piece, s
-  for (const MachineLog& log : pieces_) {
-    before.push_back(seconds);
-    seconds += log.time.back();
-  }
+  const std::vector<double> before = BeginsOf(pieces_);
+  const double seconds = before.back();
   equations.length = length_ / seconds;
   for (int row = 0; row < windows(); ++row) {
     const Window& window = windows_[row];
@@ -329,8 +348,11 @@ WeakEquations WeakForm::Equations(const AngleReading& angles, const TorqueReadin
 
 void WeakForm::SetTorques(const TorqueReading& torques, double delay,
                           WeakEquations& equations) const {
+  const std::vector<double> begins = BeginsOf(pieces_);
   std::vector<TorqueIntegral> integrals;
-  for (const MachineLog& log : pieces_) integrals.emplace_back(log, torques);
+  for (size_t i = 0; i < pieces_.size(); ++i) {
+    integrals.emplace_back(pieces_[i], torques, begins[i], begins.back());
+  }
   for (int row = 0; row < windows(); ++row) {
     const Window& window = windows_[row];
     const TorqueIntegral& integral = integrals[window.piece];

@@ -43,7 +43,9 @@ struct TorqueReading {
 class TorqueIntegral {
  public:
   /// The measured torques, or the commands and pushes of a log without.
-  TorqueIntegral(const MachineLog& log, const TorqueReading& reading);
+  /// `before`: time of the log before this piece. `seconds`: length of the whole log, s.
+  TorqueIntegral(const MachineLog& log, const TorqueReading& reading, double before,
+                 double seconds);
   /// The integral from the beginning to a time (s), N·m·s.
   Joints At(double time) const;
 
@@ -118,6 +120,7 @@ class WeakForm {
   };
 
   void FindWindows(double quiet);
+  double LongestGap(const SmoothMotion& motion) const;
   /// The samples of a window whose angles 2 are `late` (s).
   std::vector<Sample> SamplesOf(int piece, double begin, double late) const;
   void SetMotion(const AngleReading& reading, const Window& window, int row,
