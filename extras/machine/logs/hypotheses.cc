@@ -64,11 +64,7 @@ int Hypothesis::changes() const {
 }
 
 bool IsSameKind(const Hypothesis& a, const Hypothesis& b) {
-  const auto has_zero = [](const Hypothesis& h, int joint) {
-    return std::abs(h.angles.zero[joint]) > kZero;
-  };
-  return has_zero(a, 0) == has_zero(b, 0) && has_zero(a, 1) == has_zero(b, 1) &&
-         a.change.joint == b.change.joint &&
+  return a.change.joint == b.change.joint &&
          HasScale(a.angles.scale[0]) == HasScale(b.angles.scale[0]) &&
          HasScale(a.angles.scale[1]) == HasScale(b.angles.scale[1]) &&
          a.angles.scale[0] * b.angles.scale[0] > 0 && a.angles.scale[1] * b.angles.scale[1] > 0 &&

@@ -106,23 +106,17 @@ bool IsOfWord(char c) {
   return IsLower(c) || IsUpper(c) || IsDigit(c) || c == '%' || static_cast<unsigned char>(c) >= 128;
 }
 
-void ReplaceAll(std::string& text, std::string_view from, std::string_view to) {
-  for (size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size()) {
-    text.replace(at, from.size(), to);
-  }
-}
-
 /// A word for a unit in one spelling: `ozin` of `oz-in` and `OZ.in`, `deg/s` of `°_per_s [0]`.
 std::string Normalized(std::string text) {
   while (!text.empty() && (!IsOfWord(text.back()) || IsDigit(text.back()))) text.pop_back();
   for (char& c : text) {
     if (IsUpper(c)) c = static_cast<char>(c - 'A' + 'a');
   }
-  for (const char* micro : {"µ", "μ"}) ReplaceAll(text, micro, "u");
-  ReplaceAll(text, "°", "deg");
-  for (const char* per : {"_per_", " per ", "-per-", ".per."}) ReplaceAll(text, per, "/");
+  for (const char* micro : {"µ", "μ"}) text = Replaced(text, micro, "u");
+  text = Replaced(text, "°", "deg");
+  for (const char* per : {"_per_", " per ", "-per-", ".per."}) text = Replaced(text, per, "/");
   for (const char* dot : {"·", "⋅", " ", "_", ".", "-", "*", "^", "(", ")", "[", "]"}) {
-    ReplaceAll(text, dot, "");
+    text = Replaced(text, dot, "");
   }
   return text;
 }
