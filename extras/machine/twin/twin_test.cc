@@ -64,7 +64,7 @@ TEST(Twin, IsAPlantFile) {
   const auto latency = std::ranges::find(file.conditions, "sensor_latency", &FlagValue::name);
   ASSERT_NE(latency, file.conditions.end());
   EXPECT_NEAR(std::stod(latency->text), 0.005, 1e-12);
-  // Simulated tasks have no zeros of encoders; a deviation of the lag is one of the latency.
+  // A deviation of the lag is one of the latency.
   const auto posterior = std::ranges::find(file.conditions, "posterior", &FlagValue::name);
   ASSERT_NE(posterior, file.conditions.end());
   EXPECT_EQ(posterior->text, "center2 4e-06; zero1 1e-06 9e-04; sensor_latency 0 0 1e-08");
