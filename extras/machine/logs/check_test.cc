@@ -148,7 +148,7 @@ TEST(MachineCheck, ManyGapsGetALineTogether) {
   EXPECT_EQ(std::ranges::count(longer, Severity::kFault, &Finding::severity), 1);
 }
 
-TEST(MachineCheck, AClockThatIsSetAnewCostsNoTime) {
+TEST(MachineCheck, AClockThatIsSetAgainCostsNoTime) {
   for (const double jump : {1.7e9, 9e11}) {
     MachineLog log = GoodLog();
     for (int k = log.rows() / 2; k < log.rows(); ++k) log.time[k] += jump;
