@@ -11,6 +11,8 @@ nothing.
 
 A usable log is 60 to 200 natural times of the machine long, with four rows and more in each. Both joints move by
 1 rad and more, by less than 1 rad between two rows, and half of the natural times have motion.
+
+Needs NumPy: `./upswing python tools/results/logs.py` has it.
 """
 
 import argparse
