@@ -80,6 +80,7 @@ PlantFile ParsePlantFile(std::string_view toml, const std::string& where) {
   for (const char* name : {"damping1", "damping2", "gravity", "torque_limit", "armature"}) {
     const Option& option = *of_plant.Get(name);
     if (given.contains(name)) continue;
+    file.defaults.emplace_back(name);
     left_out.push_back(Concat(name, " ", option.text(), " ", option.unit));
   }
   file.left_out = Join(left_out, ", ");

@@ -23,6 +23,7 @@ struct PlantFile {
   // Settings that change the motion of every machine and that the file leaves out, with their
   // defaults: `armature 0.01 kg·m², gravity 9.81 m/s²`; empty: none.
   std::string left_out;
+  std::vector<std::string> defaults = {};  // the names of these settings
 
   /// Each setting of the plant, as a flag.
   std::vector<FlagValue> PlantFlags() const;

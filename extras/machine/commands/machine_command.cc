@@ -18,10 +18,12 @@
 #include "cli/say.h"
 #include "extras/machine/logs/check.h"
 #include "extras/machine/twin/identify.h"
+#include "extras/machine/twin/length_by_motion.h"
 #include "os/file.h"
 #include "os/host.h"
 #include "os/streams.h"
 #include "report/figure.h"
+#include "runs/plant_file.h"
 
 namespace upswing::machine {
 
@@ -250,7 +252,9 @@ void Validate(const MachineArguments& a, bool& is_doubtful) {
   }
   if (!a.csv.empty()) WriteNamedFile(a.csv, MotionCsv(logs, predictors));
   const Judgement judgement = Judge(logs, predictors.front().twins, "these logs", &pool);
-  if (!judgement.explains()) is_doubtful = true;
+  const std::string contradiction = LengthContradiction(logs, twin);
+  if (!contradiction.empty()) SayError(Concat("warning: ", contradiction));
+  if (!judgement.explains() || !contradiction.empty()) is_doubtful = true;
   if (!a.as_json) fmt::print("{}\n", SentenceOf(judgement));
   ShowErrors(a, logs, predictors, rows, {{"judgement", JudgementJson(judgement)}}, pool);
 }
@@ -348,9 +352,19 @@ void CheckFitArguments(const MachineArguments& a) {
   CheckWritable("--out", a.out);
 }
 
-/// Reads the twin or plant that the fit begins with.
+/// Reads the twin or plant that the fit begins with. A plant file may leave out what the fit finds.
+/// The defaults of the built-in plant would be wrong for other sizes.
 Twin ReadFirst(const MachineArguments& a) {
-  return Adapts(a) ? ReadTwin(a.twin, "machine adapt") : ReadTwin(a.plant, "--plant");
+  if (Adapts(a)) return ReadTwin(a.twin, "machine adapt");
+  Twin first = ReadTwin(a.plant, "--plant");
+  const std::vector<std::string> defaults = ReadPlantFile(a.plant).defaults;
+  const auto is_left_out = [&](const char* name) {
+    return std::ranges::find(defaults, name) != defaults.end();
+  };
+  if (is_left_out("damping1")) first.plant.damping1 = 0;
+  if (is_left_out("damping2")) first.plant.damping2 = 0;
+  if (is_left_out("armature")) first.plant.armature = 0;
+  return first;
 }
 
 /// Fits a twin to the logs and shows the progress. The twin's name is that of --out.

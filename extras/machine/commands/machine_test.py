@@ -324,14 +324,15 @@ class Machine(ProgramTest):
             self.assertIn("all torques of the motors are 0", done.stderr)
 
     def test_our_own_simulations_give_their_plant(self):
-        """Logs of `simulate` at 50 Hz, of an acrobot of 20 cm, whose guess is up to 50% off."""
+        """Logs of `simulate` at 50 Hz, of an acrobot of 20 cm. The guess is up to 50% off, or has
+        masses and lengths only."""
         truth = {"center1": 0.05, "center2": 0.08, "inertia1": 8e-5, "inertia2": 1.2e-4,
                  "damping1": 5e-5, "damping2": 4e-5, "coulomb1": 5e-4, "coulomb2": 3e-4,
                  "armature": 3e-5}
         off = [1.15, 1.2, 0.8, 1.2, 1.5, 0.6, 0.5, 1.5, 0.7]
         known = {"mass1": 0.05, "mass2": 0.06, "length1": 0.08, "length2": 0.12, "torque_limit": 0.2}
-        for name, values in (("plant", truth), ("guess", dict(
-                zip(truth, (x * f for x, f in zip(truth.values(), off)))))):
+        guess = {key: x * factor for (key, x), factor in zip(truth.items(), off)}
+        for name, values in (("plant", truth), ("guess", guess), ("bare", {})):
             self.write(f"{name}.toml", "[plant]\nactuated_joint = 2\n" + "".join(
                 f"{key} = {x}\n" for key, x in (known | values).items()))
         for run in (1, 2):
@@ -339,17 +340,19 @@ class Machine(ProgramTest):
             self.write("torque.csv", "torque\n" + "".join(f"{x:.17g}\n" for x in torque))
             self.succeed("simulate", "--torque", "torque.csv", "--control-period", "0.02", "--plant",
                          "plant.toml", "--start", "0.7,-0.4,0,0", "--csv", f"run-{run}.csv")
-        said = self.succeed("machine", "identify", "run-1.csv", "run-2.csv", "--plant", "guess.toml",
-                            "--folds", "0", "--out", "twin.toml")
-        self.assertIn("the model explains the logs of the fit to ", said)
-        with open(self.folder / "twin.toml", "rb") as file:
-            found = tomllib.load(file)
-        self.assertNotIn("distrust", found)
-        for key, value in truth.items():
-            self.assertAlmostEqual(found["plant"][key] / value, 1, delta=0.01, msg=key)
-        # All runs are of one session, so the plant is that of the session.
-        for key, value in found["sessions"]["run-"].items():
-            self.assertAlmostEqual((found["plant"] | found["sensors"])[key], value, delta=1e-12)
+        for name in ("guess", "bare"):
+            with self.subTest(plant=name):
+                said = self.succeed("machine", "identify", "run-1.csv", "run-2.csv", "--plant",
+                                    f"{name}.toml", "--folds", "0", "--out", "twin.toml")
+                self.assertIn("the model explains the logs of the fit to ", said)
+                with open(self.folder / "twin.toml", "rb") as file:
+                    found = tomllib.load(file)
+                self.assertNotIn("distrust", found)
+                for key, value in truth.items():
+                    self.assertAlmostEqual(found["plant"][key] / value, 1, delta=0.01, msg=key)
+                # All runs are of one session, so the plant is that of the session.
+                for key, value in found["sessions"]["run-"].items():
+                    self.assertAlmostEqual((found["plant"] | found["sensors"])[key], value, delta=1e-12)
 
     def test_a_table_of_measured_and_predicted_angles(self):
         self.write("plant.toml", "[plant]\nmass1 = 0.5\n")

@@ -149,8 +149,9 @@ void PrintDriver(const RunArguments& a, const LoadedPolicy& policy) {
   const double cycles = CyclesIn(policy.control_period(), std::llround(a.hz));
   constexpr double kRounding = 1e-6;
   if (std::abs(cycles - std::round(cycles)) > kRounding * cycles) {
-    fmt::print("  decides every {:.4g} s, which is {:.4g} cycles: at the cycle nearest to its end\n",
-               policy.control_period(), cycles);
+    fmt::print(
+        "  decides every {:.4g} s, which is {:.4g} cycles: at the cycle nearest to its end\n",
+        policy.control_period(), cycles);
   }
 }
 
@@ -203,6 +204,17 @@ int Drive(const RunArguments& a, const MachinePolicy& policy, const std::optiona
   return ExitCodeOf(settings.limits, supervisor, loop.summary());
 }
 
+/// Warns of a twin whose torques act before the cycle in which this loop sends them. The delay of a
+/// twin counts from the reading of its own loop.
+void WarnOfRate(const Twin& twin, double hz) {
+  constexpr double kCycles = 1.5;
+  if (-twin.actuator.delay <= kCycles / hz) return;
+  fmt::print(stderr,
+             "warning: torques of the twin act {:.3g} ms before this loop sends them. The loop of "
+             "its logs has {:.4g} Hz: use --hz\n",
+             -1e3 * twin.actuator.delay, 1 / twin.loop.period);
+}
+
 int RunRun(const RunArguments& a) {
   if (a.policy.name.empty()) throw BadInput("run: expected a policy or a controller, got none");
   if (a.link.empty()) throw BadInput("run: expected --link, got none");
@@ -216,7 +228,10 @@ int RunRun(const RunArguments& a) {
   if (in_process || !a.twin.empty())
     twin =
         a.twin.empty() ? ReadTwin(address.place, "--link", kLinkForms) : ReadTwin(a.twin, "--twin");
-  if (twin) WarnOfDistrust(twin->name, twin->distrust);
+  if (twin) {
+    WarnOfDistrust(twin->name, twin->distrust);
+    WarnOfRate(*twin, a.hz);
+  }
   if (in_process && !a.twin.empty()) {
     throw BadInput("--twin: expected a link by UDP or a serial line with it, got a twin as --link");
   }

@@ -138,6 +138,9 @@ bool AddPlay(const SessionFacts& facts, std::vector<std::string>& causes) {
   const std::optional<Play> play = FindPlay(facts.logs, NaturalTimeOf(facts),
                                             facts.twin.actuator.delay, facts.config.actuated_joint);
   if (!play) return false;
+  // Links that move by less than the play show none.
+  const double range = std::max(AngleRange(facts.logs, 0), AngleRange(facts.logs, 1));
+  if (range < 2 * play->width) return false;
   const char* where = play->kind == PlayKind::kEncoder ? "between the link and its encoder"
                                                        : "of the gear before the link";
   causes.push_back(fmt::format(

@@ -54,7 +54,13 @@ LogRows RangeOf(const Cycle& cycle) {
 }
 
 void CheckClockUnit(double usual, const Reporter& report) {
-  constexpr double kSlow = 0.5, kVerySlow = 50;  // s
+  constexpr double kFast = 2e-5, kVeryFast = 2e-7, kSlow = 0.5, kVerySlow = 50;  // s
+  if (usual < kFast) {
+    report(Severity::kFault,
+           fmt::format("cycles of {:.4g} s: suspect that the key unit or factor makes the clock {} "
+                       "times too fast",
+                       usual, usual < kVeryFast ? "a million" : "a thousand"));
+  }
   if (usual < kSlow) return;
   const char* unit = usual < kVerySlow ? "ms" : "µs";
   std::string text =

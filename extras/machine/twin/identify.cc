@@ -159,7 +159,7 @@ class CrossValidation {
 /// Judges a fit of this structure by the middle third of each log. A second fit does not see these
 /// parts. Nothing if one of the parts has too few windows: a fit without a prior needs one for each
 /// value.
-std::optional<Judgement> JudgeByMiddles(std::span<const MachineLog> logs, const Twin& first,
+std::optional<Judgement> JudgeByMiddles(std::span<const MachineLog> logs, const Twin& start,
                                         const Structure& structure, const FitConfig& config,
                                         ThreadPool* pool) {
   std::vector<MachineLog> middles, others;
@@ -171,7 +171,7 @@ std::optional<Judgement> JudgeByMiddles(std::span<const MachineLog> logs, const 
     others.push_back(PieceOf(log, end, log.rows()));
   }
   try {
-    const FitResult fit = Fit(others, first, structure, ForComparison(config), pool);
+    const FitResult fit = Fit(others, start, structure, ForComparison(config), pool);
     const int fewest = config.adapts ? 4 : static_cast<int>(structure.values.size());
     if (fit.windows < fewest) return std::nullopt;
     const Judgement judgement = Judge(middles, PredictorOf("", fit.twin, middles).twins,
@@ -185,7 +185,9 @@ std::optional<Judgement> JudgeByMiddles(std::span<const MachineLog> logs, const 
 Judgement JudgeFit(const Identification& found, std::span<const MachineLog> logs, const Twin& first,
                    const Structure& structure, const FitConfig& config, ThreadPool* pool) {
   if (!found.left_out.empty()) return Judge(logs, found.left_out, "the left-out logs", pool);
-  const auto by_parts = JudgeByMiddles(logs, first, structure, config, pool);
+  // A prior is that of the first guess. Other fits begin where the fit to all logs ended.
+  const Twin& start = config.adapts ? first : found.fit.twin;
+  const auto by_parts = JudgeByMiddles(logs, start, structure, config, pool);
   if (by_parts) return *by_parts;
   return Judge(logs, PredictorOf("", found.fit.twin, logs).twins, "the logs of the fit", pool);
 }
@@ -249,6 +251,7 @@ bool Judge(const Structure& structure, const LeftOut& left_out, Identification& 
   if (!is_first && !(left_out.error < kWorthwhile * best)) return false;
   result.chosen = static_cast<int>(result.structures.size()) - 1;
   result.left_out = left_out.twins;
+  result.of_fold = left_out.of_folds.front();
   return true;
 }
 
@@ -335,6 +338,13 @@ Identification Identify(std::span<const MachineLog> logs, const Twin& first,
   const Structure chosen = folds > 0 ? result.structures[result.chosen].structure
                                      : Hanging(structures.back(), CauseIn(first));
   result.fit = Fit(logs, first, chosen, config.fit, pool, counter.NextPart());
+  if (!result.left_out.empty()) {
+    // The folds found their values structure by structure. Where all values at once end in a wrong
+    // minimum, those of a fold are a better start.
+    constexpr double kBetter = 0.9;
+    FitResult again = Fit(logs, result.of_fold, chosen, config.fit, pool);
+    if (again.error < kBetter * result.fit.error) result.fit = std::move(again);
+  }
   MeasureLoop(logs, result.fit.twin);
   result.judgement = JudgeFit(result, logs, first, chosen, config.fit, pool);
   result.fit.twin.distrust = DistrustOf(result.judgement, result.fit.twin, logs);

@@ -45,6 +45,7 @@ struct Identification {
   double seconds = 1;                      // length of the windows that choose it
   // The twin of the other folds for each log; empty without cross-validation.
   std::vector<Twin> left_out;
+  Twin of_fold;  // the twin of the first fold, with the chosen structure
   // On the left-out runs; without a cross-validation, on the middle third of each log, by a fit to
   // the rest; if that has no windows, on the logs of the fit.
   Judgement judgement;
