@@ -4,7 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <numbers>
+#include <string>
+#include <vector>
 
 #include "base/sample.h"
 #include "extras/machine/logs/angle_noise.h"
@@ -18,7 +21,7 @@ namespace {
 struct Jump {
   const MachineLog* piece;
   int row;
-  double size;  // from the row before, rad
+  double size;  // from the row before, or of a single wrong sample from its neighbours, rad
 };
 
 /// Speed of a joint, rad/s: the median of the three steps to row `first` and the two after it.
@@ -96,6 +99,24 @@ std::vector<Jump> JumpsOf(Pieces pieces, int joint, double own_time) {
   return jumps;
 }
 
+/// Reports jumps of one kind in a line, which is about the first. `text_of`: what a jump says.
+void ReportJumps(const std::vector<Jump>& jumps, const Reporter& report,
+                 const std::function<std::string(const Jump&)>& text_of) {
+  if (jumps.empty()) return;
+  const Jump& first = jumps.front();
+  std::string text = text_of(first);
+  if (jumps.size() > 1) text += fmt::format("; {} times, first", jumps.size());
+  report(Severity::kFault, text, RangeOf(*first.piece, first.row - 1, first.row),
+         {{"times", static_cast<double>(jumps.size())}, {"jump", first.size}});
+}
+
+void ReportWrongSamples(const std::vector<Jump>& samples, int joint, const Reporter& report) {
+  ReportJumps(samples, report, [&](const Jump& jump) {
+    return fmt::format("a wrong sample: {:.4g} rad after {:.4g} rad",
+                       jump.piece->angle[jump.row][joint], jump.piece->angle[jump.row - 1][joint]);
+  });
+}
+
 /// Reports wrapped angles, wrong samples, and encoders that slip.
 void CheckLargeJumps(Pieces pieces, int joint, double own_time, const Reporter& report) {
   constexpr int kShort = 3;      // rows of a wrong sample
@@ -117,22 +138,11 @@ void CheckLargeJumps(Pieces pieces, int joint, double own_time, const Reporter& 
       slips.push_back(jumps[i]);
     }
   }
-  const auto add = [&](const std::vector<Jump>& found, const auto& text_of) {
-    if (found.empty()) return;
-    const Jump& first = found.front();
-    std::string text = text_of(first);
-    if (found.size() > 1) text += fmt::format("; {} times, first", found.size());
-    report(Severity::kFault, text, RangeOf(*first.piece, first.row - 1, first.row),
-           {{"times", static_cast<double>(found.size())}, {"jump", first.size}});
-  };
-  add(wraps, [](const Jump&) {
+  ReportJumps(wraps, report, [](const Jump&) {
     return "jumps by a turn: suspect a wrapped angle; name the turn by the key wrap of its column";
   });
-  add(wrong, [&](const Jump& jump) {
-    return fmt::format("a wrong sample: {:.4g} rad after {:.4g} rad",
-                       jump.piece->angle[jump.row][joint], jump.piece->angle[jump.row - 1][joint]);
-  });
-  add(slips, [](const Jump& jump) {
+  ReportWrongSamples(wrong, joint, report);
+  ReportJumps(slips, report, [](const Jump& jump) {
     return fmt::format("jumps by {:.3g} rad: suspect an encoder that slips or loses counts",
                        jump.size);
   });
@@ -169,9 +179,7 @@ void CheckSpikes(Pieces pieces, int joint, const Reporter& report) {
   std::ranges::sort(sizes);
   const double least = std::max({kSmallest, kUnusual * Quantile(sizes, kShare),
                                  kSteps * StepOfNoise(AngleNoise(pieces, joint))});
-  int spikes = 0;
-  const MachineLog* piece = nullptr;
-  int row = 0;
+  std::vector<Jump> spikes;
   for (const MachineLog& log : pieces) {
     for (int k = 3; k + 3 < log.rows(); ++k) {
       const double own = Deviation(log, joint, k);
@@ -183,19 +191,10 @@ void CheckSpikes(Pieces pieces, int joint, const Reporter& report) {
       const double before = Deviation(log, joint, k - 1) / own;
       const double after = Deviation(log, joint, k + 1) / own;
       if (std::abs(before + 2.0 / 3) > kNear || std::abs(after + 2.0 / 3) > kNear) continue;
-      if (spikes == 0) {
-        piece = &log;
-        row = k;
-      }
-      ++spikes;
+      spikes.push_back({&log, k, own});
     }
   }
-  if (spikes == 0) return;
-  std::string text = fmt::format("a wrong sample: {:.4g} rad after {:.4g} rad",
-                                 piece->angle[row][joint], piece->angle[row - 1][joint]);
-  if (spikes > 1) text += fmt::format("; {} times, first", spikes);
-  report(Severity::kFault, text, RangeOf(*piece, row - 1, row),
-         {{"times", static_cast<double>(spikes)}, {"jump", Deviation(*piece, joint, row)}});
+  ReportWrongSamples(spikes, joint, report);
 }
 
 }  // namespace
