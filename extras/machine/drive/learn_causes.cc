@@ -14,6 +14,7 @@
 #include "extras/machine/logs/play.h"
 #include "extras/machine/twin/motion.h"
 #include "pendulum/runge_kutta.h"
+#include "pendulum/scale.h"
 
 namespace upswing::machine {
 namespace {
@@ -81,9 +82,10 @@ std::vector<Relief> ReliefsOf(const SessionFacts& facts) {
 /// Most machines of the twin that one of the quick candidates balances.
 int MostHeld(const LearnConfig& config, const Twin& twin) {
   constexpr int kQuick = 3;  // candidates without mpc
+  const std::vector<Candidate> candidates = CandidatesFor(twin.plant);
   int most = 0;
   for (int i = 0; i < kQuick && most < kDraws; ++i) {
-    const Candidate candidate = CandidatesFor(twin.plant)[i];
+    const Candidate& candidate = candidates[i];
     try {
       const MachinePolicy policy =
           GetMachinePolicy(ArgumentsOf(candidate, twin.plant), "", twin, std::llround(config.hz));
@@ -128,9 +130,8 @@ void AddDifference(const SessionFacts& facts, std::vector<std::string>& causes) 
 
 /// The natural time of the machine, s: that of the twin, or of the machine that the user knows.
 double NaturalTimeOf(const SessionFacts& facts) {
-  const Twin known = facts.config.Known();
-  const Manipulator m = ManipulatorOf(facts.twin.distrust.empty() ? facts.twin.plant : known.plant);
-  return std::sqrt(m.Mass(1).M11 / (m.G1 + m.G2));
+  const bool is_trusted = facts.twin.distrust.empty();
+  return NaturalUnits(is_trusted ? facts.twin.plant : facts.config.Known().plant).time;
 }
 
 /// Play that explains the motion. Returns whether there is some.
