@@ -28,20 +28,6 @@ Joints LargestTorques(Pieces pieces) {
   return largest;
 }
 
-/// The equations in the windows that `keeps` keeps, by their places in the log.
-WeakEquations Selected(const WeakEquations& all, const std::function<bool(double place)>& keeps) {
-  std::vector<int> rows;
-  WeakEquations some;
-  some.length = all.length;
-  for (int row = 0; row < all.windows(); ++row) {
-    if (!keeps(all.when[row])) continue;
-    rows.push_back(row);
-    some.when.push_back(all.when[row]);
-  }
-  for (const int joint : {0, 1}) some.A[joint] = all.A[joint](rows, Eigen::all);
-  return some;
-}
-
 }  // namespace
 
 WeakFit FitSmallZeros(const WeakEquations& equations, const std::array<Eigen::MatrixXd, 2>& free) {
@@ -263,10 +249,10 @@ Hypothesis Hypotheses::WithChange(const Change& change) const {
   if (equations_.windows() < kEnough) return next;
   next.change = change;
   // No window has a smooth motion where the encoder slips.
-  const auto keeps = [&](double place) {
+  const WeakEquations equations = equations_.Selected([&](int row) {
+    const double place = equations_.when[row];
     return change.kind != Change::kSlip || std::abs(place - change.place) > equations_.length;
-  };
-  const WeakEquations equations = Selected(equations_, keeps);
+  });
   if (equations.windows() < equations_.windows()) {
     next.excused = std::max(0.0, log_.fit.misfit() - FitSmallZeros(equations).misfit());
   }

@@ -166,6 +166,19 @@ WeakFit Solve(const Grams& grams, const std::vector<bool>& is_free, int windows)
 
 }  // namespace
 
+WeakEquations WeakEquations::Selected(const std::function<bool(int row)>& keeps) const {
+  std::vector<int> rows;
+  WeakEquations some;
+  some.length = length;
+  for (int row = 0; row < windows(); ++row) {
+    if (!keeps(row)) continue;
+    rows.push_back(row);
+    some.when.push_back(when[row]);
+  }
+  for (const int joint : {0, 1}) some.A[joint] = A[joint](rows, Eigen::all);
+  return some;
+}
+
 TorqueIntegral::TorqueIntegral(const MachineLog& log, const TorqueReading& reading, double before,
                                double seconds)
     : time_(log.time), integral_(log.time.size()) {

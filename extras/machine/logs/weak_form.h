@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -85,6 +86,8 @@ struct WeakEquations {
   double length = 0;                 // of a window, as a share of the log
 
   int windows() const { return static_cast<int>(when.size()); }
+  /// The equations of the windows for which `keeps`, called with their indices, is true.
+  WeakEquations Selected(const std::function<bool(int row)>& keeps) const;
 };
 
 /// The windows of a log in which it moves.

@@ -45,16 +45,7 @@ WeakEquations WithBestDelay(const WeakForm& form, double cycle) {
 /// The equations without a block of their windows.
 WeakEquations WithoutBlock(const WeakEquations& equations, int block) {
   const int n = equations.windows(), begin = n * block / kBlocks, end = n * (block + 1) / kBlocks;
-  std::vector<int> rows;
-  WeakEquations others;
-  others.length = equations.length;
-  for (int row = 0; row < n; ++row) {
-    if (row >= begin && row < end) continue;
-    rows.push_back(row);
-    others.when.push_back(equations.when[row]);
-  }
-  for (const int joint : {0, 1}) others.A[joint] = equations.A[joint](rows, Eigen::all);
-  return others;
+  return equations.Selected([&](int row) { return row < begin || row >= end; });
 }
 
 /// The variance of LogRatio by leaving out blocks of windows (the jackknife; Tukey, 1958).
