@@ -51,7 +51,9 @@ function(upswing_proto layer name)
   target_include_directories(upswing_${name}_proto SYSTEM PUBLIC $<BUILD_INTERFACE:${CMAKE_CURRENT_BINARY_DIR}>)
   target_link_libraries(upswing_${name}_proto PUBLIC protobuf::libprotobuf-lite)
   target_link_libraries(upswing_${layer} PRIVATE upswing_${name}_proto)
-  install(TARGETS upswing_${name}_proto EXPORT upswing)
+  if(NOT WIN32)
+    install(TARGETS upswing_${name}_proto EXPORT upswing)
+  endif()
 endfunction()
 
 # Sets the variable ENTRIES to the TOML files of a folder as C++: a name and a text each.

@@ -31,9 +31,9 @@ class FetchWheel(unittest.TestCase):
     def test_arguments(self):
         self.assert_refused([], "got 0 arguments")
         self.assert_refused(["mujoco", self.folder, "aarch64", "more"], "got 4 arguments")
-        self.assert_refused(["eigen", self.folder], "expected mujoco, node, zig, highway or muparser, got 'eigen'")
+        self.assert_refused(["eigen", self.folder], "expected mujoco, node, zig, highway, muparser, highway-source or protobuf, got 'eigen'")
         # Its versions are pinned, too, but it is not a wheel to unpack.
-        self.assert_refused(["python", self.folder], "expected mujoco, node, zig, highway or muparser, got 'python'")
+        self.assert_refused(["python", self.folder], "expected mujoco, node, zig, highway, muparser, highway-source or protobuf, got 'python'")
 
     def test_machine_without_a_wheel(self):
         self.assert_refused(["mujoco", self.folder, "riscv64"],

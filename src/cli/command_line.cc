@@ -14,6 +14,7 @@
 #include "cli/progress.h"
 #include "cli/say.h"
 #include "os/command.h"
+#include "os/terminal.h"
 
 namespace upswing {
 namespace {
@@ -289,7 +290,7 @@ std::vector<NamedFile> NamedFiles(const CLI::App& app) {
 /// Whether packages have a command: they leave out some programs, and the launcher.
 bool IsInPackages(const CommandEntry& entry) {
   return !entry.program.empty() &&
-         std::filesystem::exists(ProgramPath().replace_filename(entry.program));
+         std::filesystem::exists(SiblingProgram(std::string(entry.program)));
 }
 
 }  // namespace

@@ -186,8 +186,10 @@ void PrintComparison(const Comparison& comparison) {
 
 void PrintWritten(const std::vector<std::string>& files) {
   std::vector<std::string> names;
-  for (const std::string& file : files) names.push_back(std::filesystem::path(file).filename());
-  const std::string folder = std::filesystem::path(files.front()).parent_path();
+  for (const std::string& file : files) {
+    names.push_back(std::filesystem::path(file).filename().string());
+  }
+  const std::string folder = std::filesystem::path(files.front()).parent_path().string();
   fmt::print("Written: {} in {}\n", Join(names, ", "), Printable(folder));
 }
 

@@ -1,11 +1,7 @@
 #include "cli/program.h"
 
-#include <poll.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cerrno>
-#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -22,6 +18,7 @@
 #include "cli/signals.h"
 #include "os/command.h"
 #include "os/file.h"
+#include "os/terminal.h"
 
 namespace upswing {
 namespace {
@@ -32,24 +29,11 @@ constexpr const char* kExamples =
     "  ./upswing compare runs            compare the agents in runs over their seeds\n"
     "  ./upswing train --help            show all settings with their defaults\n";
 
-/// Whether standard output has no reader any more, as after `| head -1` has ended.
-bool OutputIsClosed() {
-  pollfd output{STDOUT_FILENO, 0, 0};
-  return poll(&output, 1, 0) == 1 && (output.revents & POLLERR) != 0;
-}
-
-/// Ends quietly by SIGPIPE, as programs usually do when the reader of their output has ended.
-int EndByPipe() {
-  std::signal(SIGPIPE, SIG_DFL);
-  std::raise(SIGPIPE);
-  return 128 + SIGPIPE;
-}
-
 /// The exit code; another one if the output cannot be written.
 int Finish(int exit_code) {
   std::cout.flush();
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.good()) return exit_code;
-  if (OutputIsClosed()) return EndByPipe();
+  if (OutputIsClosed()) return EndByClosedOutput();
   SayError(Concat("cannot write the output: ", std::strerror(errno)));
   return 1;
 }
@@ -67,8 +51,7 @@ void RunOtherProgram(int argc, char** argv, std::span<const Command> own) {
   const std::string_view name = CalledCommand(argc, argv);
   const auto entry = std::ranges::find(table, name, &CommandEntry::name);
   if (entry == table.end() || std::ranges::find(own, name, &Command::name) != own.end()) return;
-  const std::filesystem::path program = ProgramPath().replace_filename(entry->program);
-  if (!entry->program.empty()) execv(program.c_str(), argv);
+  if (!entry->program.empty()) BecomeProgram(SiblingProgram(std::string(entry->program)), argv);
   throw BadInput(Concat(name, ": expected ./upswing ", name, " in the source repository",
                         entry->program.empty() ? "" : Concat(", which builds ", entry->program)));
 }
@@ -103,7 +86,7 @@ int Main(int argc, char** argv, std::span<const Command> own) {
     SayError("out of memory");
     return 1;
   } catch (const std::exception& error) {
-    if (OutputIsClosed() && std::ferror(stdout) != 0) return EndByPipe();
+    if (OutputIsClosed() && std::ferror(stdout) != 0) return EndByClosedOutput();
     SayError(OneLine(error.what()));
     return 1;
   }
@@ -114,10 +97,7 @@ int Main(int argc, char** argv, std::span<const Command> own) {
 int MainProgram(int argc, char** argv, std::span<const Command> own) {
   ListenToSignals();
   OpenStandardFiles();
-  // A failed write then returns an error, which gets a message, instead of ending the program.
-  std::signal(SIGPIPE, SIG_IGN);
-  std::signal(SIGXFSZ, SIG_IGN);
-  std::vector<char*> words = WithHelpLast(argc, argv);
+  std::vector<char*> words = WithHelpLast(argc, Utf8Words(argc, argv));
   return Main(static_cast<int>(words.size()) - 1, words.data(), own);
 }
 

@@ -1,8 +1,6 @@
 #include "cli/progress.h"
 
 #include <fmt/format.h>
-#include <sys/ioctl.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,16 +9,11 @@
 #include "base/format.h"
 #include "base/text.h"
 #include "cli/say.h"
+#include "os/terminal.h"
 
 namespace upswing {
 
-int TerminalWidth(int unknown) {
-  winsize size{};
-  const bool known = ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
-  return known ? size.ws_col : unknown;
-}
-
-ProgressLine::ProgressLine() : terminal_(isatty(STDOUT_FILENO) == 1) {}
+ProgressLine::ProgressLine() : terminal_(IsTerminal(stdout)) {}
 
 bool ProgressLine::due() const {
   return terminal_ && Clock::now() - last_ > std::chrono::milliseconds(200);

@@ -6,9 +6,6 @@
 
 namespace upswing {
 
-/// Width of standard output's terminal in columns; `unknown` if there is no terminal.
-int TerminalWidth(int unknown);
-
 /// A line at the bottom of the terminal that is rewritten a few times a second. Without a
 /// terminal the line is not shown, and Print writes plain lines.
 class ProgressLine {

@@ -1,11 +1,9 @@
 #pragma once
 
-#include <sys/types.h>
-
 #include <optional>
 #include <string>
 
-#include "os/making.h"
+#include "os/duplex_child.h"
 
 namespace upswing {
 
@@ -14,11 +12,7 @@ class PythonChild {
  public:
   /// Starts Python with a program and its instructions (JSON). UPSWING_PYTHON names another one
   /// than `python3`. Errors begin with `command`. Throws Failure.
-  PythonChild(std::string command, std::string program, std::string job);
-  /// Ends Python if it still runs.
-  ~PythonChild();
-  PythonChild(const PythonChild&) = delete;
-  PythonChild& operator=(const PythonChild&) = delete;
+  PythonChild(std::string command, const std::string& program, const std::string& job);
 
   /// Waits for the next line. Returns nothing if Python ends, or if StopSignal tells to stop.
   std::optional<std::string> Next();
@@ -29,11 +23,8 @@ class PythonChild {
   int Finish();
 
  private:
-  int Wait();
-
   std::string command_;
-  Descriptor socket_;
-  pid_t child_ = -1;
+  std::optional<DuplexChild> child_;
   std::string read_;  // not yet a whole line
 };
 

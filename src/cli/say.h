@@ -7,10 +7,6 @@
 
 namespace upswing {
 
-/// Opens standard input, output and error if they are closed, so that none of our files gets their
-/// numbers. They still behave as closed: input is empty, and every write fails.
-void OpenStandardFiles();
-
 /// Prints `text` on standard output for people who watch long work. If this fails, the work
 /// continues, and the program reports the failure at its end.
 void SayText(std::string_view text);

@@ -1,7 +1,6 @@
 #include "cli/study_work.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <cstdio>
 #include <map>
@@ -17,6 +16,7 @@
 #include "cli/train_view.h"
 #include "os/file.h"
 #include "os/lock.h"
+#include "os/terminal.h"
 #include "runs/run_folder.h"
 #include "runs/study_plan.h"
 
@@ -24,28 +24,6 @@ namespace upswing {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Appends standard output and error to a file during its lifetime.
-class PrintedTo {
- public:
-  explicit PrintedTo(const fs::path& path)
-      : file_(path), output_(dup(STDOUT_FILENO)), error_(dup(STDERR_FILENO)) {
-    std::fflush(stdout);
-    dup2(file_.descriptor(), STDOUT_FILENO);
-    dup2(file_.descriptor(), STDERR_FILENO);
-  }
-  ~PrintedTo() {
-    std::fflush(stdout);
-    dup2(output_.get(), STDOUT_FILENO);
-    dup2(error_.get(), STDERR_FILENO);
-  }
-  PrintedTo(const PrintedTo&) = delete;
-  PrintedTo& operator=(const PrintedTo&) = delete;
-
- private:
-  AppendFile file_;
-  Descriptor output_, error_;
-};
 
 /// Removes the files of a finished run that `keep` does not keep.
 void Reduce(const SeedRun& run, Keep keep) {
@@ -100,7 +78,8 @@ std::unique_ptr<TrainingRun> MakeOrResume(const SeedRun& run) {
 /// Trains a run until its end or a stop signal, and writes the output of `train` to its log.
 /// Returns whether the training has ended.
 bool TrainLogged(const SeedRun& run) {
-  const PrintedTo log(run.log());
+  const AppendFile log(run.log());
+  const RedirectedOutput redirected(log.descriptor());
   try {
     return TrainAndShow(*MakeOrResume(run));
   } catch (const std::exception& error) {

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <csignal>
 #include <cstdio>
 #include <list>
 #include <map>
@@ -195,7 +194,7 @@ class LocalWorkers {
   void Run() {
     while (true) {
       const TrainRequest request = PollSignals();
-      if (request == TrainRequest::kCheckpoint) SignalAll(SIGUSR1);
+      if (request == TrainRequest::kCheckpoint) SignalAll(kCheckpointSignal);
       if (request == TrainRequest::kStop && !stopping_) {
         stopping_ = true;
         SignalAll(StopSignal());
@@ -227,7 +226,7 @@ class LocalWorkers {
   /// Removes the workers that have ended from the list.
   void Reap() {
     for (auto it = workers_.begin(); it != workers_.end();) {
-      const pid_t pid = it->pid();
+      const int64_t pid = it->pid();
       const auto code = it->Poll();
       const bool as_asked = stopping_ && code == 128 + StopSignal();
       if (code && *code != 0 && *code != 1 && *code != kTryAgain && !as_asked) {
@@ -239,7 +238,7 @@ class LocalWorkers {
 
   /// Leaves the run of a worker that died to another worker. A run whose workers die twice has
   /// failed.
-  void EndedBadly(pid_t pid, int code) {
+  void EndedBadly(int64_t pid, int code) {
     constexpr int kMostDeaths = 2;
     const auto how = [code](const fs::path& log) {
       return code > 128 ? Concat("ended by signal ", code - 128) : LastLine(log);

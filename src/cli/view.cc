@@ -45,7 +45,7 @@ struct ViewArguments {
 /// The kind of a recording: mp4, gif, png or folder. Throws BadInput.
 std::string KindOf(const std::string& path) {
   if (path.ends_with('/')) return "folder";
-  std::string ending = fs::path(path).extension();
+  std::string ending = fs::path(path).extension().string();
   std::ranges::transform(ending, ending.begin(),
                          [](char c) { return c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c; });
   if (ending == ".mp4" || ending == ".gif" || ending == ".png") return ending.substr(1);

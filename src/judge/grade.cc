@@ -122,7 +122,7 @@ std::vector<PendulumState> MotionOf(const Policy& policy, const PendulumEnvConfi
 void GradeEntry(const fs::path& folder, const GradeConfig& config, ThreadPool& pool,
                 const Progress& progress, Grade& grade) {
   const fs::path file = PolicyFile(folder / grade.file);
-  grade.file = file.lexically_relative(folder);
+  grade.file = file.lexically_relative(folder).generic_string();
   const LoadedPolicy loaded = PolicyOfEntry(file);
   const GridPolicy policy(*loaded.policy);
   const PendulumEnvConfig nominal = EnvironmentsFor(loaded, config, 0, pool);

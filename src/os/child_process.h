@@ -1,8 +1,8 @@
 #pragma once
 
-#include <sys/types.h>
-
+#include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,15 +22,17 @@ class ChildProcess {
   ChildProcess(ChildProcess&& other) noexcept;
   ChildProcess& operator=(ChildProcess&&) = delete;
 
+  /// Sends SIGINT, SIGTERM or kCheckpointSignal (os/signals.h).
   void Signal(int signal) const;
   /// Process ID; -1 once the process has ended.
-  pid_t pid() const { return pid_; }
+  int64_t pid() const { return pid_; }
 
   /// Exit code of the process, or 128 plus the signal that ended it; nothing while it runs.
   std::optional<int> Poll();
 
  private:
-  pid_t pid_;  // -1 once it has ended
+  int64_t pid_ = -1;                      // -1 once it has ended
+  std::shared_ptr<const void> handle_{};  // of the process, on Windows
 };
 
 }  // namespace upswing

@@ -20,8 +20,23 @@ struct CommandResult {
 std::optional<CommandResult> RunCommand(std::vector<std::string> words,
                                         const std::string& input = "");
 
+/// The usual name of Python 3 on this system.
+extern const char* const kUsualPython;
+
+/// Sets an environment variable, for programs that are started afterwards.
+void SetEnvironment(const std::string& name, const std::string& value);
+
 /// Path of the file of this program.
 std::filesystem::path ProgramPath();
+/// Path of the file with this code: the program, or the shared library of the Python package.
+std::filesystem::path CodePath();
+
+/// Path of another program of ours, in the folder of this one.
+std::filesystem::path SiblingProgram(const std::string& name);
+
+/// Continues as another program with the same command line; `words` ends with a null. Returns only
+/// if that fails.
+void BecomeProgram(const std::filesystem::path& program, char** words);
 
 /// Folder of an installed program's page and examples: `share/upswing` next to the program's
 /// folder. A program in a build folder has none.

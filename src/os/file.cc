@@ -1,9 +1,5 @@
 #include "os/file.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <cerrno>
@@ -13,21 +9,12 @@
 #include <tuple>
 #include <utility>
 
+#include "os/system.h"
+
 namespace upswing {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Writes all bytes, in as many calls as necessary; false with errno on failure.
-bool WriteAll(int fd, std::span<const std::byte> bytes) {
-  while (!bytes.empty()) {
-    const ssize_t written = write(fd, bytes.data(), bytes.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) return false;
-    bytes = bytes.subspan(static_cast<size_t>(written));
-  }
-  return true;
-}
 
 /// Whether an error of a system call is due to its path.
 bool IsOfPath(int error_number) {
@@ -38,14 +25,12 @@ bool IsOfPath(int error_number) {
 }
 
 void WriteInPlace(const fs::path& path, std::string_view text) {
-  // Without a reader, opening a pipe would wait for one.
-  const Descriptor fd(open(path.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC));
+  const Descriptor fd = system::Open(path, system::Access::kOverwrite);
   if (fd.get() < 0 && errno == ENXIO) {
     throw BadInput(Concat("cannot write ", path.string(), ": expected a file, got a pipe that no ",
                           "program reads"));
   }
-  if (fd.get() >= 0) fcntl(fd.get(), F_SETFL, O_WRONLY);
-  if (fd.get() < 0 || !WriteAll(fd.get(), BytesOf(text))) {
+  if (fd.get() < 0 || !system::WriteAll(fd.get(), BytesOf(text))) {
     throw PathError("cannot write", path, errno);
   }
 }
@@ -78,27 +63,27 @@ std::string ReadOwnFile(const fs::path& path, size_t most_bytes) {
 }
 
 std::vector<std::byte> ReadOwnBytes(const fs::path& path, size_t most_bytes) {
-  // Use O_NONBLOCK, because opening a pipe would wait for a writer.
-  const Descriptor fd(open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
+  const Descriptor fd = system::Open(path, system::Access::kRead);
   const auto cannot = [&](std::string_view why) {
     return BadInput(Concat("cannot read ", path.string(), ": ", why));
   };
-  struct stat info {};
-  if (fd.get() < 0 || fstat(fd.get(), &info) != 0) throw cannot(std::strerror(errno));
-  if (S_ISDIR(info.st_mode)) throw cannot("expected a file, got a folder");
-  if (!S_ISREG(info.st_mode)) throw cannot("expected a file, got a pipe or a device");
+  std::optional<system::OpenFile> file;
+  if (fd.get() >= 0) file = system::Describe(fd.get());
+  if (!file) throw cannot(std::strerror(errno));
+  using Kind = system::OpenFile::Kind;
+  if (file->kind == Kind::kFolder) throw cannot("expected a file, got a folder");
+  if (file->kind != Kind::kFile) throw cannot("expected a file, got a pipe or a device");
   const auto expect_fits = [&](uintmax_t size) {
     if (size <= most_bytes) return;
     throw cannot(Concat("expected at most ", most_bytes, " bytes, got ", size));
   };
-  expect_fits(static_cast<uintmax_t>(info.st_size));
+  expect_fits(static_cast<uintmax_t>(file->size));
   // Read until the end, because a system file reports no size.
-  std::vector<std::byte> bytes(static_cast<size_t>(info.st_size));
+  std::vector<std::byte> bytes(static_cast<size_t>(file->size));
   size_t filled = 0;
   while (true) {
     if (filled == bytes.size()) bytes.resize(bytes.size() + 65536);
-    const ssize_t got = read(fd.get(), bytes.data() + filled, bytes.size() - filled);
-    if (got < 0 && errno == EINTR) continue;
+    const ptrdiff_t got = system::Read(fd.get(), std::span(bytes).subspan(filled));
     if (got < 0) throw cannot(std::strerror(errno));
     if (got == 0) break;
     filled += static_cast<size_t>(got);
@@ -120,8 +105,10 @@ std::string ReadEnd(const fs::path& path, std::streamoff most_bytes) {
 void WriteFileAtomically(const fs::path& path, std::span<const std::span<const std::byte>> parts) {
   Making file(path, Making::Kind::kFile);
   bool written = true;
-  for (const auto part : parts) written = written && WriteAll(file.descriptor(), part);
-  if (!written || fsync(file.descriptor()) != 0) throw PathError("cannot write", path, errno);
+  for (const auto part : parts) {
+    written = written && system::WriteAll(file.descriptor(), part);
+  }
+  if (!written || !system::Sync(file.descriptor())) throw PathError("cannot write", path, errno);
   file.Publish();
 }
 
@@ -140,19 +127,20 @@ void CheckNoLink(const fs::path& folder) {
 }
 
 void WriteNamedFile(const fs::path& path, std::string_view text) {
-  struct stat info {};
-  if (stat(path.c_str(), &info) != 0) {
-    if (errno != ENOENT) throw PathError("cannot write", path, errno);
-    if (lstat(path.c_str(), &info) == 0) {
+  std::error_code error;
+  const fs::file_status there = fs::status(path, error);
+  if (there.type() == fs::file_type::not_found) {
+    if (fs::is_symlink(fs::symlink_status(path, error))) {
       throw BadInput(
           Concat("cannot write ", path.string(), ": expected a file, got a link to nothing"));
     }
     return WriteFileAtomically(path, text);
   }
-  if (S_ISDIR(info.st_mode)) throw PathError("cannot write", path, EISDIR);
-  if (!S_ISREG(info.st_mode)) return WriteInPlace(path, text);
+  if (!fs::exists(there)) throw PathError("cannot write", path, error.value());
+  if (fs::is_directory(there)) throw PathError("cannot write", path, EISDIR);
+  if (!fs::is_regular_file(there)) return WriteInPlace(path, text);
   // Replacing a file needs no right to write it.
-  if (access(path.c_str(), W_OK) != 0) throw PathError("cannot write", path, errno);
+  if (!system::MayWrite(path)) throw PathError("cannot write", path, errno);
   WriteFileAtomically(fs::canonical(path), text);
 }
 
@@ -205,14 +193,14 @@ NewFolder::~NewFolder() { Remove(); }
 
 void NewFolder::Remove() const {
   // Fails where another process has put something.
-  for (auto part = made_.rbegin(); part != made_.rend(); ++part) rmdir(part->c_str());
+  std::error_code ignored;
+  for (auto part = made_.rbegin(); part != made_.rend(); ++part) fs::remove(*part, ignored);
 }
 
 AppendFile::AppendFile(fs::path path) : path_(std::move(path)) {
-  constexpr int kFlags = O_WRONLY | O_CREAT | O_APPEND | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC;
-  descriptor_ = Descriptor(open(path_.c_str(), kFlags | O_EXCL, 0666));
+  descriptor_ = system::Open(path_, system::Access::kAppendNew);
   is_new_ = descriptor_.get() >= 0;
-  if (!is_new_ && errno == EEXIST) descriptor_ = Descriptor(open(path_.c_str(), kFlags, 0666));
+  if (!is_new_ && errno == EEXIST) descriptor_ = system::Open(path_, system::Access::kAppend);
   const auto refuse = [&](std::string_view what) {
     return BadInput(Concat("cannot write ", path_.string(),
                            ": expected a regular file that only this folder has, got ", what));
@@ -224,28 +212,28 @@ AppendFile::AppendFile(fs::path path) : path_(std::move(path)) {
         ? refuse("a link")
         : PathError("cannot write", path_, error_number);
   }
-  struct stat info {};
-  if (fstat(descriptor_.get(), &info) != 0) throw PathError("cannot write", path_, errno);
-  if (!S_ISREG(info.st_mode)) throw refuse("a pipe or a device");
-  if (info.st_nlink > 1) {
-    throw refuse(Concat("one with ", info.st_nlink, " names (hard links; a copy would do)"));
+  const auto file = system::Describe(descriptor_.get());
+  if (!file) throw PathError("cannot write", path_, errno);
+  if (file->kind != system::OpenFile::Kind::kFile) throw refuse("a pipe or a device");
+  if (file->names > 1) {
+    throw refuse(Concat("one with ", file->names, " names (hard links; a copy would do)"));
   }
-  size_ = info.st_size;
+  size_ = file->size;
 }
 
 void AppendFile::CutTo(int64_t size) {
-  if (ftruncate(descriptor_.get(), size) != 0) throw PathError("cannot write", path_, errno);
+  if (!system::CutTo(descriptor_.get(), size)) throw PathError("cannot write", path_, errno);
   size_ = size;
 }
 
 void AppendFile::Sync() const {
-  if (fsync(descriptor_.get()) != 0) throw PathError("cannot write", path_, errno);
+  if (!system::Sync(descriptor_.get())) throw PathError("cannot write", path_, errno);
 }
 
 void AppendFile::Append(std::span<const std::byte> bytes) {
-  if (!WriteAll(descriptor_.get(), bytes)) {
+  if (!system::WriteAll(descriptor_.get(), bytes)) {
     const int error_number = errno;
-    std::ignore = ftruncate(descriptor_.get(), size_);
+    std::ignore = system::CutTo(descriptor_.get(), size_);
     throw PathError("cannot write", path_, error_number);
   }
   size_ += static_cast<int64_t>(bytes.size());

@@ -8,6 +8,9 @@ namespace upswing {
 /// Network name of this machine.
 std::string HostName();
 
+/// Number of this process.
+int64_t ProcessId();
+
 /// Identifies this machine until its next boot: host name and boot ID.
 std::string HostAndBoot();
 

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -34,9 +35,7 @@ class FolderLock {
   explicit FolderLock(const Making& folder);
 
  private:
-  void Lock(const std::filesystem::path& folder) const;
-
-  Descriptor descriptor_;
+  std::shared_ptr<const void> held_;  // of system::LockOpen
 };
 
 /// Opens or makes a file to append to, and locks it while it is open. Returns none if another

@@ -1,9 +1,5 @@
 #include "os/lock_check.h"
 
-#include <sys/stat.h>
-#include <unistd.h>
-
-#include <cerrno>
 #include <chrono>
 #include <thread>
 
@@ -24,9 +20,10 @@ struct Stopped {};
 
 /// Makes a folder; false if it exists. Only one of several processes makes it, also on NFS.
 bool MakesFolder(const fs::path& path) {
-  if (mkdir(path.c_str(), 0777) == 0) return true;
-  if (errno != EEXIST) throw PathError("cannot make", path, errno);
-  return false;
+  std::error_code error;
+  const bool made = fs::create_directory(path, error);
+  if (error) throw PathError("cannot make", path, error.value());
+  return made;
 }
 
 /// A folder in which two processes leave messages for each other. A message is an empty folder
@@ -75,7 +72,7 @@ class Meeting {
   std::optional<std::string> TextOf(const std::string& topic) const {
     std::error_code ignored;
     for (const auto& entry : fs::directory_iterator(path_, ignored)) {
-      const std::string name = entry.path().filename();
+      const std::string name = entry.path().filename().string();
       if (name.starts_with(topic + "=")) return name.substr(topic.size() + 1);
     }
     return std::nullopt;
@@ -115,7 +112,7 @@ bool TryWhileHeld(Meeting& meeting, const char* held, const char* answer) {
 std::optional<LockCheck> CheckLocks(const fs::path& folder, double patience,
                                     const std::function<bool()>& stopped) {
   LockCheck check;
-  check.mine = Concat(HostName(), " ", getpid());
+  check.mine = Concat(HostName(), " ", ProcessId());
   try {
     Meeting meeting(folder, patience, stopped);
     bool second_kept_out = false, first_kept_out = false;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -38,6 +39,8 @@ class Making {
 
   /// Descriptor: of a file open for writing, of a folder open for reading.
   int descriptor() const { return descriptor_.get(); }
+  /// Its lock, which outlives this object with a copy; null on a file system without locks.
+  const std::shared_ptr<const void>& lock() const { return lock_; }
   /// The final path.
   const std::filesystem::path& target() const { return target_; }
   /// The temporary path.
@@ -48,8 +51,10 @@ class Making {
   void Publish();
 
  private:
+  /// Opens the parent folder.
+  Descriptor OpenParent() const;
   void RemoveAbandoned() const;
-  /// Makes and locks it under a random name; false if another name is needed.
+  /// Makes and locks it under its temporary name; false if another name is needed.
   bool TryOpen(Kind kind);
 
   std::filesystem::path target_;  // final path
@@ -57,6 +62,7 @@ class Making {
   std::string name_;
   std::filesystem::path path_;
   Descriptor descriptor_;
+  std::shared_ptr<const void> lock_;
   bool published_ = false;
 };
 

@@ -1,8 +1,5 @@
 #include "os/streams.h"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <array>
 #include <cerrno>
 #include <cstdio>
@@ -12,6 +9,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "os/file.h"
+#include "os/system.h"
 
 namespace upswing {
 
@@ -43,14 +41,12 @@ void CheckWritable(const std::string& flag, const std::string& path) {
   };
   if (std::filesystem::is_directory(path, error)) throw cannot("it is a folder");
   if (std::filesystem::exists(path, error)) {
-    if (access(path.c_str(), W_OK) != 0) throw cannot(std::strerror(errno));
+    if (!system::MayWrite(path)) throw cannot(std::strerror(errno));
     return;
   }
   if (std::filesystem::is_symlink(path, error)) throw cannot("it is a link to nothing");
-  const int descriptor = open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-  if (descriptor < 0) throw cannot(std::strerror(errno));
-  close(descriptor);
-  unlink(path.c_str());
+  if (system::Open(path, system::Access::kAppendNew).get() < 0) throw cannot(std::strerror(errno));
+  system::Remove(path);
 }
 
 void WriteOutput(const std::string& path, std::string_view text) {

@@ -192,7 +192,7 @@ std::vector<std::string> ShippedPolicies() {
   std::vector<std::string> names;
   std::error_code none;
   for (const auto& entry : fs::directory_iterator(PageFile("agents"), none)) {
-    const std::string name = entry.path().stem();
+    const std::string name = entry.path().stem().string();
     const bool is_stage = name.find("-at-") != std::string::npos;  // of the page's training
     if (entry.path().extension() == ".safetensors" && !is_stage) names.push_back(name);
   }

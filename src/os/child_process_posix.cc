@@ -1,5 +1,3 @@
-#include "os/child_process.h"
-
 #include <fcntl.h>
 #include <sys/auxv.h>
 #include <sys/prctl.h>
@@ -13,6 +11,7 @@
 
 #include "base/error.h"
 #include "base/text.h"
+#include "os/child_process.h"
 #include "os/file.h"
 
 namespace upswing {
@@ -38,6 +37,8 @@ namespace {
   _exit(127);
 }
 
+pid_t Pid(int64_t pid) { return static_cast<pid_t>(pid); }
+
 }  // namespace
 
 ChildProcess::ChildProcess(const std::vector<std::string>& arguments,
@@ -61,18 +62,18 @@ ChildProcess::ChildProcess(ChildProcess&& other) noexcept : pid_(std::exchange(o
 
 ChildProcess::~ChildProcess() {
   if (pid_ < 0) return;
-  kill(pid_, SIGKILL);
-  while (waitpid(pid_, nullptr, 0) < 0 && errno == EINTR) {
+  kill(Pid(pid_), SIGKILL);
+  while (waitpid(Pid(pid_), nullptr, 0) < 0 && errno == EINTR) {
   }
 }
 
 void ChildProcess::Signal(int signal) const {
-  if (pid_ >= 0) kill(pid_, signal);
+  if (pid_ >= 0) kill(Pid(pid_), signal);
 }
 
 std::optional<int> ChildProcess::Poll() {
   int status = 0;
-  if (waitpid(pid_, &status, WNOHANG) != pid_) return std::nullopt;
+  if (waitpid(Pid(pid_), &status, WNOHANG) != pid_) return std::nullopt;
   pid_ = -1;
   return WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
 }

@@ -1,11 +1,11 @@
-#include "cli/signals.h"
-
 #include <unistd.h>
 
 #include <array>
 #include <atomic>
 #include <cerrno>
 #include <csignal>
+
+#include "os/signals.h"
 
 namespace upswing {
 namespace {
@@ -77,11 +77,7 @@ void GuardMotors(void (*switch_off)()) {
   }
 }
 
-TrainRequest PollSignals() {
-  if (g_stop_signal != 0) return TrainRequest::kStop;
-  if (g_checkpoint_wanted.exchange(false)) return TrainRequest::kCheckpoint;
-  return TrainRequest::kGoOn;
-}
+bool TakeCheckpointRequest() { return g_checkpoint_wanted.exchange(false); }
 
 int StopSignal() { return g_stop_signal; }
 
