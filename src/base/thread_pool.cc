@@ -11,21 +11,22 @@
 #include <utility>
 #include <vector>
 
+#include "base/wait.h"
+
 namespace upswing {
 namespace {
 
 /// Waits until `value` differs from `old`. It spins at first, because pieces of work far shorter
 /// than a millisecond follow each other closely. Then it sleeps, so that an idle pool costs
 /// nothing.
-template <typename T>
-void WaitWhile(const std::atomic<T>& value, T old) {
+void WaitWhile(const std::atomic<uint32_t>& value, uint32_t old) {
   for (int spin = 0; spin < 2000; ++spin) {
     if (value.load(std::memory_order_acquire) != old) return;
 #if defined(__x86_64__)
     __builtin_ia32_pause();
 #endif
   }
-  value.wait(old, std::memory_order_acquire);
+  Wait(value, old);
 }
 
 // A ticket packs the number of tasks and the index of the next task into one number. A thread takes
@@ -37,31 +38,31 @@ constexpr int kTaskBits = 32;
 
 /// The worker threads: all threads except the caller's.
 struct ThreadPool::Workers {
-  explicit Workers(int count);
+  explicit Workers(uint32_t count);
   ~Workers() { Stop(); }
   Workers(const Workers&) = delete;
   Workers& operator=(const Workers&) = delete;
 
   void ParallelFor(int n, const std::function<void(int)>& task);
-  void Use(int count);
+  void Use(uint32_t count);
   void Stop();
-  void Work(int index);
+  void Work(uint32_t index);
   void RunTasks();
 
   const std::function<void(int)>* task_ = nullptr;
   std::atomic<uint64_t> ticket_{0};      // the next task to take
   std::atomic<uint32_t> round_{0};       // increases at each ParallelFor; idle threads wait for it
   std::atomic<uint32_t> unfinished_{0};  // tasks of this round that are not done
-  std::atomic<int> used_;                // workers that wait for rounds; the others sleep
+  std::atomic<uint32_t> used_;           // workers that wait for rounds; the others sleep
   std::atomic<bool> stopping_{false};
   std::mutex error_mutex_;
   std::exception_ptr error_;
   std::vector<std::thread> threads_;
 };
 
-ThreadPool::Workers::Workers(int count) : used_(count) {
+ThreadPool::Workers::Workers(uint32_t count) : used_(count) {
   try {
-    for (int index = 0; index < count; ++index) {
+    for (uint32_t index = 0; index < count; ++index) {
       threads_.emplace_back([this, index] { Work(index); });
     }
   } catch (...) {
@@ -72,9 +73,9 @@ ThreadPool::Workers::Workers(int count) : used_(count) {
 
 void ThreadPool::Workers::Stop() {
   stopping_ = true;
-  Use(std::numeric_limits<int>::max());
+  Use(std::numeric_limits<uint32_t>::max());
   ++round_;
-  round_.notify_all();
+  WakeAll(round_);
   for (std::thread& thread : threads_) thread.join();
 }
 
@@ -84,20 +85,20 @@ void ThreadPool::Workers::ParallelFor(int n, const std::function<void(int)>& tas
   unfinished_ = static_cast<uint32_t>(n);
   ticket_ = static_cast<uint64_t>(n) << kTaskBits;
   ++round_;
-  round_.notify_all();
+  WakeAll(round_);
   RunTasks();
   for (uint32_t left = unfinished_; left != 0; left = unfinished_) WaitWhile(unfinished_, left);
   if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
 }
 
-void ThreadPool::Workers::Use(int count) {
-  if (used_.exchange(count) < count) used_.notify_all();
+void ThreadPool::Workers::Use(uint32_t count) {
+  if (used_.exchange(count) < count) WakeAll(used_);
 }
 
-void ThreadPool::Workers::Work(int index) {
+void ThreadPool::Workers::Work(uint32_t index) {
   uint32_t seen = 0;
   while (true) {
-    for (int used = used_; used <= index; used = used_) used_.wait(used);
+    for (uint32_t used = used_; used <= index; used = used_) Wait(used_, used);
     WaitWhile(round_, seen);
     seen = round_;
     if (stopping_) return;
@@ -118,14 +119,14 @@ void ThreadPool::Workers::RunTasks() {
       const std::lock_guard lock(error_mutex_);
       if (!error_) error_ = std::current_exception();
     }
-    if (--unfinished_ == 0) unfinished_.notify_one();
+    if (--unfinished_ == 0) WakeOne(unfinished_);
     ticket = ticket_;
   }
 }
 
 ThreadPool::ThreadPool(int threads, bool adapts)
     : threads_(std::max(threads, 1)), adapts_(adapts), used_(threads_) {
-  if (threads_ > 1) workers_ = std::make_unique<Workers>(threads_ - 1);
+  if (threads_ > 1) workers_ = std::make_unique<Workers>(static_cast<uint32_t>(threads_ - 1));
 }
 
 ThreadPool::~ThreadPool() = default;
@@ -133,7 +134,7 @@ ThreadPool::~ThreadPool() = default;
 void ThreadPool::Use(int threads) {
   if (used_ == threads) return;
   used_ = threads;
-  if (workers_ != nullptr) workers_->Use(threads - 1);
+  if (workers_ != nullptr) workers_->Use(static_cast<uint32_t>(threads - 1));
 }
 
 void ThreadPool::ParallelFor(int n, const std::function<void(int)>& task) {

@@ -46,6 +46,8 @@ TARGET = [*MACHINE, "-fwasm-exceptions", "-fvisibility=hidden", "-DNDEBUG"]
 MEMORY = 512 << 20  # bytes at most; see learner.cc
 STACK = 1 << 20
 
+# Threads, which web/wasm/thread_pool.cc replaces.
+NOT_HERE = {"thread_pool.cc", "wait.cc", "wait_windows.cc"}
 LAYERS = ["base", "nn", "pendulum", "rl", "control", "agents"]
 # Sources compiled for speed, because trainings spend their time there. All others are compiled for
 # size.
@@ -76,7 +78,7 @@ def include(*folders):
 
 def own_sources():
     sources = [path for layer in LAYERS for path in sorted((SOURCE / layer).rglob("*.cc"))
-               if not path.stem.endswith(("_test", "_bench")) and path.name != "thread_pool.cc"]
+               if not path.stem.endswith(("_test", "_bench")) and path.name not in NOT_HERE]
     return sources + sorted(HERE.glob("*.cc"))
 
 

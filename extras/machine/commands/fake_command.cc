@@ -12,6 +12,7 @@
 #include "cli/signals.h"
 #include "extras/machine/drive/fake_machine.h"
 #include "extras/machine/drive/link.h"
+#include "extras/machine/drive/real_time.h"
 #include "extras/machine/drive/supervisor.h"
 
 namespace upswing::machine {

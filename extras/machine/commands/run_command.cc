@@ -15,6 +15,7 @@
 #include "cli/signals.h"
 #include "extras/machine/drive/control_loop.h"
 #include "extras/machine/drive/policy_controller.h"
+#include "extras/machine/drive/real_time.h"
 #include "os/streams.h"
 
 namespace upswing::machine {

@@ -1,14 +1,11 @@
 #pragma once
 
-#include <sys/socket.h>
-
 #include <cstddef>
+#include <memory>
 #include <span>
 #include <string>
 
-#include "os/making.h"
-
-/// Bytes to and from another program or device. Only channel.cc knows sockets and terminals.
+/// Bytes to and from another program or device. Only channel_posix.cc knows sockets and terminals.
 namespace upswing::machine {
 
 /// The address of a link, such as `udp:192.168.1.5:4000`, `serial:/dev/ttyACM0:921600`, `pty`, or
@@ -37,6 +34,8 @@ class Channel {
   static Channel Connect(const LinkAddress& address);
   /// Binds a UDP socket, or makes a pseudo-terminal. Throws BadInput.
   static Channel Listen(const LinkAddress& address);
+  Channel(Channel&& other) noexcept;
+  ~Channel();
 
   /// Sends bytes, whole or not at all. Returns whether it could. Bytes that cannot be sent are
   /// lost, as on the line.
@@ -54,15 +53,12 @@ class Channel {
   const std::string& name() const { return name_; }
 
  private:
-  Channel(Descriptor fd, bool datagrams, std::string name)
-      : fd_(std::move(fd)), datagrams_(datagrams), name_(std::move(name)) {}
+  struct Line;
+  Channel(Line line, bool datagrams, std::string name);
 
-  Descriptor fd_;
+  std::unique_ptr<Line> line_;
   bool datagrams_;
   std::string name_;
-  Descriptor other_end_{-1};  // of a pseudo-terminal, which stays open between two users
-  sockaddr_storage sender_{}, peer_{};
-  socklen_t sender_size_ = 0, peer_size_ = 0;
 };
 
 }  // namespace upswing::machine

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "extras/machine/drive/link.h"
+#include "extras/machine/drive/real_time.h"
 
 namespace upswing::machine {
 

@@ -1,4 +1,5 @@
 #include "extras/machine/drive/learning_run.h"
+#include "extras/machine/drive/real_time.h"
 
 #include <algorithm>
 #include <future>

@@ -1,31 +1,17 @@
 #include "extras/machine/drive/link.h"
 
-#include <sched.h>
-#include <sys/mman.h>
-#include <sys/prctl.h>
-
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
-#include <ctime>
 #include <utility>
 
-#include "base/text.h"
+#include "extras/machine/drive/real_time.h"
 
 namespace upswing::machine {
 namespace {
 
-constexpr int64_t kSecond = 1'000'000'000;    // ns
-constexpr clockid_t kClock = CLOCK_BOOTTIME;  // goes on while the computer sleeps
+constexpr double kNanoseconds = 1e9;  // in a second
 
 }  // namespace
-
-int64_t MonotonicNanoseconds() {
-  timespec now{};
-  clock_gettime(kClock, &now);
-  return now.tv_sec * kSecond + now.tv_nsec;
-}
 
 TwinLink::TwinLink(const Twin& twin, const PendulumState& start, uint64_t seed)
     : timing_(twin.loop),
@@ -110,14 +96,11 @@ ChannelLink::ChannelLink(Channel channel)
       protocol_(channel_.datagrams()) {}
 
 double ChannelLink::Now() const {
-  return static_cast<double>(MonotonicNanoseconds() - begin_) / kSecond;
+  return static_cast<double>(MonotonicNanoseconds() - begin_) / kNanoseconds;
 }
 
 void ChannelLink::WaitUntil(double time) {
-  const int64_t at = begin_ + std::llround(time * kSecond);
-  const timespec moment{at / kSecond, at % kSecond};
-  while (clock_nanosleep(kClock, TIMER_ABSTIME, &moment, nullptr) == EINTR) {
-  }
+  SleepUntil(begin_ + std::llround(time * kNanoseconds));
 }
 
 std::optional<LinkReading> ChannelLink::Exchange(const Joints& torque, bool enabled, double until) {
@@ -145,20 +128,6 @@ LinkCounts ChannelLink::counts() const {
   LinkCounts counts = protocol_.counts();
   counts.sent = sent_;
   return counts;
-}
-
-std::string EnterRealTime() {
-  std::string problems;
-  const auto add = [&](const char* what) {
-    problems += Concat(problems.empty() ? "" : ", ", what, " (", std::strerror(errno), ")");
-  };
-  // Only memory that exists: later allocations, of other threads, must not fail at a limit.
-  if (mlockall(MCL_CURRENT) != 0) add("locked memory");
-  prctl(PR_SET_TIMERSLACK, 1UL);  // without a real-time priority, timers may be 50 µs late
-  sched_param priority{};
-  priority.sched_priority = 50;
-  if (sched_setscheduler(0, SCHED_FIFO, &priority) != 0) add("real-time priority");
-  return problems;
 }
 
 }  // namespace upswing::machine

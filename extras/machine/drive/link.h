@@ -121,11 +121,4 @@ class ChannelLink : public MachineLink {
   int64_t sent_ = 0;
 };
 
-/// Nanoseconds of a clock that never goes back, and that goes on while the computer sleeps.
-int64_t MonotonicNanoseconds();
-
-/// Locks the program's memory and gives this thread a real-time priority. Returns the missing
-/// permissions in one line; empty: none.
-std::string EnterRealTime();
-
 }  // namespace upswing::machine

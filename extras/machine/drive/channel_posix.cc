@@ -14,7 +14,6 @@
 #include <cmath>
 #include <cstring>
 #include <ctime>
-#include <filesystem>
 #include <memory>
 #include <utility>
 
@@ -24,42 +23,9 @@
 namespace upswing::machine {
 namespace {
 
-constexpr int kLeastBaud = 1200, kMostBaud = 1 << 30;
-
 Error LinkError(const std::string& place, const std::string& what, int error_number) {
   return BadInput(
       Concat("--link ", Printable(place), ": ", what, ": ", std::strerror(error_number)));
-}
-
-int ParsePort(std::string_view text, const std::string& link, int lowest) {
-  const auto port = ParseInteger(text);
-  if (!port || *port < lowest || *port > 65535) {
-    throw BadInput(Concat("--link ", Printable(link), ": expected a port from ", lowest,
-                          " to 65535, got \"", Printable(text), "\""));
-  }
-  return static_cast<int>(*port);
-}
-
-LinkAddress ParseSerial(std::string place, const std::string& link) {
-  LinkAddress address{LinkAddress::Transport::kSerial, std::move(place), kUsualBaud};
-  bool is_valid = true;
-  const size_t colon = address.place.rfind(':');
-  if (colon != std::string::npos) {
-    const auto rate = ParseInteger(address.place.substr(colon + 1));
-    address.place.resize(colon);
-    if (!rate || *rate < kLeastBaud) {
-      is_valid = false;
-    } else if (*rate > kMostBaud) {
-      address.number = kMostBaud;
-    } else {
-      address.number = static_cast<int>(*rate);
-    }
-  }
-  if (!is_valid || address.place.empty()) {
-    throw BadInput(Concat("--link ", Printable(link), ": expected serial:DEVICE[:BAUD] with BAUD ",
-                          kLeastBaud, " or more, such as ", kUsualBaud));
-  }
-  return address;
 }
 
 /// Sets a terminal to raw bytes (8 data bits, no parity, no flow control) at any rate (bit/s).
@@ -115,50 +81,24 @@ bool HasHungUp(int fd) {
 
 }  // namespace
 
-LinkAddress ParseLink(const std::string& text, bool listens) {
-  using Transport = LinkAddress::Transport;
-  if (text.starts_with("udp:")) {
-    const std::string place = text.substr(4);
-    const size_t colon = place.rfind(':');
-    if (colon == std::string::npos && listens) {
-      return {Transport::kUdp, "127.0.0.1", ParsePort(place, text, 0)};
-    }
-    if (colon == std::string::npos || colon == 0) {
-      throw BadInput(Concat("--link ", Printable(text), ": expected udp:HOST:PORT"));
-    }
-    std::string host = place.substr(0, colon);
-    const bool in_brackets = host.starts_with('[') && host.ends_with(']');
-    if (in_brackets) host = host.substr(1, host.size() - 2);
-    if (!in_brackets && host.find(':') != std::string::npos) {
-      throw BadInput(Concat("--link ", Printable(text),
-                            ": expected an IPv6 address in brackets, udp:[ADDRESS]:PORT"));
-    }
-    return {Transport::kUdp, host,
-            ParsePort(std::string_view(place).substr(colon + 1), text, listens ? 0 : 1)};
-  }
-  if (listens) {
-    if (text == "pty") return {Transport::kPty, "pty", 0};
-    throw BadInput(
-        Concat("--link: expected udp:PORT, udp:HOST:PORT or pty, got \"", Printable(text), "\""));
-  }
-  if (text.starts_with("serial:")) return ParseSerial(text.substr(7), text);
-  if (text.starts_with("tcp:")) {
-    throw BadInput(Concat("--link ", Printable(text), ": expected udp:HOST:PORT; TCP would repeat ",
-                          "old commands"));
-  }
-  if (text.starts_with("/dev/")) return ParseSerial(text, text);
-  // A plant file has no colon, unless a folder has one.
-  const size_t colon = text.rfind(':');
-  if (colon != std::string::npos && !std::filesystem::exists(text)) {
-    throw BadInput(Concat("--link: expected udp:HOST:PORT, serial:DEVICE or a plant file, got \"",
-                          Printable(text), "\""));
-  }
-  return {Transport::kTwin, text, 0};
-}
+/// The open socket or terminal.
+struct Channel::Line {
+  Descriptor fd{-1};
+  Descriptor other_end{-1};  // of a pseudo-terminal, which stays open between two users
+  sockaddr_storage sender{}, peer{};
+  socklen_t sender_size = 0, peer_size = 0;
+};
+
+Channel::Channel(Line line, bool datagrams, std::string name)
+    : line_(std::make_unique<Line>(std::move(line))),
+      datagrams_(datagrams),
+      name_(std::move(name)) {}
+Channel::Channel(Channel&&) noexcept = default;
+Channel::~Channel() = default;
 
 Channel Channel::Connect(const LinkAddress& address) {
   if (address.transport == LinkAddress::Transport::kUdp) {
-    return {OpenUdp(address, /*binds=*/false), true,
+    return {Line{OpenUdp(address, /*binds=*/false)}, true,
             Concat("udp:", address.place, ":", address.number)};
   }
   const std::string name = "serial:" + address.place;
@@ -172,7 +112,7 @@ Channel Channel::Connect(const LinkAddress& address) {
   }
   MakeRaw(fd.get(), address.number, name);
   ioctl(fd.get(), TIOCEXCL);  // no second program may write to the motors
-  return {std::move(fd), false, name};
+  return {Line{std::move(fd)}, false, name};
 }
 
 Channel Channel::Listen(const LinkAddress& address) {
@@ -181,7 +121,7 @@ Channel Channel::Listen(const LinkAddress& address) {
     sockaddr_storage own{};
     socklen_t size = sizeof own;
     getsockname(fd.get(), reinterpret_cast<sockaddr*>(&own), &size);
-    return {std::move(fd), true, UdpName(own, size)};
+    return {Line{std::move(fd)}, true, UdpName(own, size)};
   }
   Descriptor fd(posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
   if (fd.get() < 0 || grantpt(fd.get()) != 0 || unlockpt(fd.get()) != 0) {
@@ -191,9 +131,9 @@ Channel Channel::Listen(const LinkAddress& address) {
   if (ptsname_r(fd.get(), name.data(), name.size()) != 0) {
     throw LinkError("pty", "cannot name the pseudo-terminal", errno);
   }
-  Channel channel(std::move(fd), false, name.data());
-  channel.other_end_ = Descriptor(open(name.data(), O_RDWR | O_NOCTTY | O_CLOEXEC));
-  MakeRaw(channel.other_end_.get(), 4000000, channel.name_);
+  Channel channel(Line{std::move(fd)}, false, name.data());
+  channel.line_->other_end = Descriptor(open(name.data(), O_RDWR | O_NOCTTY | O_CLOEXEC));
+  MakeRaw(channel.line_->other_end.get(), 4000000, channel.name_);
   return channel;
 }
 
@@ -201,10 +141,10 @@ bool Channel::Send(std::span<const std::byte> bytes) {
   ssize_t sent = 0;
   if (datagrams_) {
     // A socket without a peer sends to what it is connected to, else nowhere.
-    const auto* peer = peer_size_ > 0 ? reinterpret_cast<const sockaddr*>(&peer_) : nullptr;
-    sent = sendto(fd_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL, peer, peer_size_);
+    const auto* peer = line_->peer_size > 0 ? reinterpret_cast<const sockaddr*>(&line_->peer) : nullptr;
+    sent = sendto(line_->fd.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL, peer, line_->peer_size);
   } else {
-    sent = write(fd_.get(), bytes.data(), bytes.size());
+    sent = write(line_->fd.get(), bytes.data(), bytes.size());
   }
   return sent == static_cast<ssize_t>(bytes.size());
 }
@@ -212,19 +152,19 @@ bool Channel::Send(std::span<const std::byte> bytes) {
 size_t Channel::Receive(std::span<std::byte> buffer) {
   ssize_t got = 0;
   if (datagrams_) {
-    sender_size_ = sizeof sender_;
-    got = recvfrom(fd_.get(), buffer.data(), buffer.size(), 0,
-                   reinterpret_cast<sockaddr*>(&sender_), &sender_size_);
+    line_->sender_size = sizeof line_->sender;
+    got = recvfrom(line_->fd.get(), buffer.data(), buffer.size(), 0,
+                   reinterpret_cast<sockaddr*>(&line_->sender), &line_->sender_size);
   } else {
-    got = read(fd_.get(), buffer.data(), buffer.size());
+    got = read(line_->fd.get(), buffer.data(), buffer.size());
   }
   if (got > 0) return static_cast<size_t>(got);
   // A device that was pulled out hangs up. Errors such as a refused packet are ignored, because the
   // age of the last reading shows them.
-  const bool is_device = !datagrams_ && other_end_.get() < 0;
+  const bool is_device = !datagrams_ && line_->other_end.get() < 0;
   if (is_device) {
     const bool failed = got < 0 && errno != EAGAIN && errno != EINTR;
-    if (failed || HasHungUp(fd_.get())) {
+    if (failed || HasHungUp(line_->fd.get())) {
       throw Failure(Concat("--link ", Printable(name_), ": disconnected"));
     }
   }
@@ -232,7 +172,7 @@ size_t Channel::Receive(std::span<std::byte> buffer) {
 }
 
 void Channel::Wait(double seconds) const {
-  pollfd waits{fd_.get(), POLLIN, 0};
+  pollfd waits{line_->fd.get(), POLLIN, 0};
   const double limited = std::clamp(seconds, 0.0, 1e6);
   const timespec time{static_cast<time_t>(limited),
                       static_cast<long>((limited - std::floor(limited)) * 1e9)};
@@ -240,8 +180,8 @@ void Channel::Wait(double seconds) const {
 }
 
 void Channel::AnswerSender() {
-  peer_ = sender_;
-  peer_size_ = sender_size_;
+  line_->peer = line_->sender;
+  line_->peer_size = line_->sender_size;
 }
 
 }  // namespace upswing::machine
