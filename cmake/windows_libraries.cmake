@@ -73,5 +73,6 @@ find_program(Protobuf_PROTOC_EXECUTABLE protoc REQUIRED)
 set(Protobuf_INCLUDE_DIR ${PROTOBUF})
 set(Protobuf_LIBRARIES protobuf::libprotobuf-lite)
 find_package(Protobuf QUIET MODULE)
-set(ZLIB_USE_STATIC_LIBS ON)
+find_library(UPSWING_ZLIB libz.a REQUIRED)  # of libz-mingw-w64-dev; zlib1.dll is next to it
+set(ZLIB_LIBRARY ${UPSWING_ZLIB})
 find_package(ZLIB REQUIRED)

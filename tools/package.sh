@@ -10,7 +10,8 @@ Usage: ./upswing package [KIND...] [--arch ARCH] [--out FOLDER] [--allow-changes
 Builds packages of the last commit: the same commit gives the same bits. Installs what it needs. Build on
 Debian 12, whose glibc is the oldest that the packages then run with.
 
-  KIND             tarball, deb or wheels; default: all
+  KIND             tarball, deb or wheels; default: all three. windows: a zip archive for 64-bit Windows,
+                   which is cross-compiled; no other kind with it
   --arch ARCH      x86-64 (default) or arm64, which is cross-compiled. Build the x86-64 wheels before
                    the arm64 wheels
   --out FOLDER     folder for the packages and their checksums (default build/packages)
@@ -22,6 +23,7 @@ headers is on the PATH. Debian 12 has only Python 3.11.
 Examples:
   ./upswing package
   ./upswing package tarball --arch arm64
+  ./upswing package windows
 END_OF_USAGE
 }
 
@@ -43,15 +45,19 @@ package() {
         shift
         ;;
       --allow-changes) changes=$1 ;;
-      tarball | deb | wheels) kinds="$kinds $1" ;;
+      tarball | deb | wheels | windows) kinds="$kinds $1" ;;
       -*) bad_input "unknown flag $1 (see ./upswing package --help)" ;;
-      *) bad_input "expected tarball, deb or wheels, got \"$1\"" ;;
+      *) bad_input "expected tarball, deb, wheels or windows, got \"$1\"" ;;
     esac
     shift
   done
   case $arch in
     x86-64 | arm64) ;;
     *) bad_input "--arch: expected x86-64 or arm64, got \"$arch\"" ;;
+  esac
+  case $kinds:$arch in
+    " windows:x86-64") arch=windows kinds='' ;;
+    *windows*) bad_input "expected windows without another kind or --arch, got$kinds --arch $arch" ;;
   esac
   [ "$setup" = yes ] || bad_input "expected ./upswing package without --no-setup"
   [ "$(uname -m)" = x86_64 ] || bad_input "expected an x86-64 machine, got $(uname -m)"
@@ -67,7 +73,8 @@ package() {
   rm -rf "$root/build/docs-work" "$docs" # an earlier build leaves pages and words of the index
   build_docs
   build_demo
-  [ "$arch" = x86-64 ] || set_up_arm64
+  [ "$arch" != arm64 ] || set_up_arm64
+  [ "$arch" != windows ] || set_up_windows
   set_up_package
   # shellcheck disable=SC2086  # a list of words
   (lock && exec "$root/build/package/venv/bin/python" -B tools/package/package.py $kinds \
@@ -80,7 +87,13 @@ set_up_package() {
     </dev/null || exit 1
 }
 
-# Cross-compiles the program.
+# Cross-compiles the program for Windows.
+set_up_windows() {
+  # shellcheck disable=SC2046,SC2086  # lists of words
+  (install_packages $windows_packages && build windows upswing $(extra_programs)) </dev/null || exit 1
+}
+
+# Cross-compiles the program for 64-bit Arm.
 set_up_arm64() {
   # shellcheck disable=SC2086  # a list of words
   (

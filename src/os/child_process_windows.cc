@@ -48,9 +48,8 @@ ChildProcess::ChildProcess(const std::vector<std::string>& arguments,
   SECURITY_ATTRIBUTES inherited{sizeof(SECURITY_ATTRIBUTES), nullptr, TRUE};
   const Handle nothing(CreateFileW(L"NUL", GENERIC_READ, FILE_SHARE_READ | FILE_SHARE_WRITE,
                                    &inherited, OPEN_EXISTING, 0, nullptr));
-  win32::Process child = win32::Start(
-      words, ProgramPath().wstring(), nothing.get(), output.get(), output.get(),
-      CREATE_NEW_PROCESS_GROUP | CREATE_NO_WINDOW);
+  win32::Process child = win32::Start(words, ProgramPath().wstring(), nothing.get(), output.get(),
+                                      output.get(), CREATE_NEW_PROCESS_GROUP | CREATE_NO_WINDOW);
   if (!child.process.valid()) {
     throw Failure(Concat("cannot start a process: error ", GetLastError(), " of Windows"));
   }

@@ -66,8 +66,8 @@ std::optional<CommandResult> RunCommand(std::vector<std::string> words, const st
     throw SystemFailure("write a temporary file");
   }
   Rewind(files[0]);
-  const win32::Process child = win32::Start(words, L"", files[0].get(), files[1].get(),
-                                            files[2].get(), CREATE_NO_WINDOW);
+  const win32::Process child =
+      win32::Start(words, L"", files[0].get(), files[1].get(), files[2].get(), CREATE_NO_WINDOW);
   if (!child.process.valid()) {
     const DWORD error = GetLastError();
     if (error == ERROR_FILE_NOT_FOUND || error == ERROR_PATH_NOT_FOUND) return std::nullopt;

@@ -31,9 +31,8 @@ struct DuplexChild::Process {
 
 DuplexChild::DuplexChild(std::vector<std::string> words) : process_(std::make_unique<Process>()) {
   Pipe input(/*child_reads=*/true), output(/*child_reads=*/false);
-  win32::Process child =
-      win32::Start(words, L"", input.reader.get(), output.writer.get(),
-                   GetStdHandle(STD_ERROR_HANDLE), CREATE_NEW_PROCESS_GROUP);
+  win32::Process child = win32::Start(words, L"", input.reader.get(), output.writer.get(),
+                                      GetStdHandle(STD_ERROR_HANDLE), CREATE_NEW_PROCESS_GROUP);
   if (!child.process.valid()) {
     const DWORD error = GetLastError();
     process_.reset();
@@ -63,7 +62,8 @@ std::optional<size_t> DuplexChild::Read(std::span<char> buffer,
   }
   DWORD got = 0;
   const DWORD most = std::min(waiting, static_cast<DWORD>(buffer.size()));
-  if (ReadFile(process_->output.get(), buffer.data(), most, &got, nullptr) == 0) return std::nullopt;
+  if (ReadFile(process_->output.get(), buffer.data(), most, &got, nullptr) == 0)
+    return std::nullopt;
   return got;
 }
 

@@ -35,9 +35,9 @@ std::string HostAndBoot() {
 std::string CpuModel() {
   std::array<wchar_t, 256> name{};
   DWORD size = sizeof name - sizeof(wchar_t);
-  const LSTATUS failed = RegGetValueW(
-      HKEY_LOCAL_MACHINE, L"HARDWARE\\DESCRIPTION\\System\\CentralProcessor\\0",
-      L"ProcessorNameString", RRF_RT_REG_SZ, nullptr, name.data(), &size);
+  const LSTATUS failed =
+      RegGetValueW(HKEY_LOCAL_MACHINE, L"HARDWARE\\DESCRIPTION\\System\\CentralProcessor\\0",
+                   L"ProcessorNameString", RRF_RT_REG_SZ, nullptr, name.data(), &size);
   return failed == ERROR_SUCCESS ? std::string(Trim(win32::Narrow(name.data()))) : "unknown";
 }
 

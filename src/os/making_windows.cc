@@ -49,9 +49,9 @@ int64_t SecondsSinceChange(const fs::path& path) {
 
 /// Opens a file or folder that exists, with rights that no other process can withhold.
 Descriptor OpenAny(const fs::path& path) {
-  return win32::DescriptorOf(Handle(
-      CreateFileW(path.c_str(), FILE_READ_ATTRIBUTES, kShared, nullptr, OPEN_EXISTING,
-                  FILE_FLAG_BACKUP_SEMANTICS | FILE_FLAG_OPEN_REPARSE_POINT, nullptr)));
+  return win32::DescriptorOf(
+      Handle(CreateFileW(path.c_str(), FILE_READ_ATTRIBUTES, kShared, nullptr, OPEN_EXISTING,
+                         FILE_FLAG_BACKUP_SEMANTICS | FILE_FLAG_OPEN_REPARSE_POINT, nullptr)));
 }
 
 fs::path ParentOf(const fs::path& path) {
@@ -82,8 +82,8 @@ Descriptor Making::OpenParent() const { return system::OpenFolder(ParentOf(targe
 bool Making::TryOpen(Kind kind) {
   descriptor_ = Descriptor(-1);
   if (kind == Kind::kFile) {
-    descriptor_ = win32::DescriptorOf(
-        Handle(CreateFileW(path_.c_str(), GENERIC_WRITE, kShared, nullptr, CREATE_NEW, 0, nullptr)));
+    descriptor_ = win32::DescriptorOf(Handle(
+        CreateFileW(path_.c_str(), GENERIC_WRITE, kShared, nullptr, CREATE_NEW, 0, nullptr)));
   } else if (CreateDirectoryW(path_.c_str(), nullptr) != 0) {
     descriptor_ = OpenAny(path_);
     // Another process removed the folder before it was locked.
@@ -116,9 +116,8 @@ void Making::RemoveAbandoned() const {
     if (left.get() < 0) continue;
     // The lock is held while the file or folder is removed.
     const auto lock = system::LockOpen(left.get());
-    const bool abandoned = IsOfThisHost(name)
-                               ? lock != nullptr
-                               : SecondsSinceChange(entry.path()) > kAbandonedAfter;
+    const bool abandoned =
+        IsOfThisHost(name) ? lock != nullptr : SecondsSinceChange(entry.path()) > kAbandonedAfter;
     left = Descriptor(-1);
     std::error_code ignored;
     if (abandoned) fs::remove_all(entry.path(), ignored);

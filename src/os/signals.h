@@ -18,9 +18,10 @@ inline constexpr int kCheckpointSignal = 10;  // SIGUSR1 of Linux, for processes
 /// the first line of main(), because they may arrive at any moment.
 void ListenToSignals();
 
-/// Starts recording SIGINT (Ctrl-C) and SIGTERM (on Windows also a console that closes). The second signal of a kind ends the program at once. Call
-/// this before work that has to end in order. If standard error is a terminal, the handler prints
-/// `notice` (a literal, because it must outlive the handlers); empty: prints nothing.
+/// Starts recording SIGINT (Ctrl-C) and SIGTERM (on Windows also a console that closes). The second
+/// signal of a kind ends the program at once. Call this before work that has to end in order. If
+/// standard error is a terminal, the handler prints `notice` (a literal, because it must outlive
+/// the handlers); empty: prints nothing.
 void InstallSignalHandlers(std::string_view notice);
 
 /// Like InstallSignalHandlers, for a program that drives motors. Records every signal that would

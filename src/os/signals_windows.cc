@@ -29,8 +29,9 @@ std::wstring EventName(DWORD process, int signal) {
 /// Receives the signals of other processes until this one ends.
 void Listen(std::array<HANDLE, kSignals.size()> events) {
   while (true) {
-    const DWORD got = WaitForMultipleObjects(static_cast<DWORD>(events.size()), events.data(),
-                                             FALSE, INFINITE) - WAIT_OBJECT_0;
+    const DWORD got =
+        WaitForMultipleObjects(static_cast<DWORD>(events.size()), events.data(), FALSE, INFINITE) -
+        WAIT_OBJECT_0;
     if (got >= kSignals.size()) return;
     if (kSignals.at(got) == kCheckpointSignal) {
       g_checkpoint_wanted = true;

@@ -7,9 +7,9 @@
 namespace upswing {
 
 /// Opens standard input, output and error if they are closed, so that none of our files gets their
-/// numbers. They still behave as closed: input is empty, and every write fails. A failed write then returns an
-/// error, which gets a message, instead of ending the program. On Windows, bytes pass as they are,
-/// and the terminal takes UTF-8 and colours.
+/// numbers. They still behave as closed: input is empty, and every write fails. A failed write then
+/// returns an error, which gets a message, instead of ending the program. On Windows, bytes pass as
+/// they are, and the terminal takes UTF-8 and colours.
 void OpenStandardFiles();
 
 /// The words of the command line in UTF-8, ending with a null.

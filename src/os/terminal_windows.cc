@@ -1,12 +1,6 @@
 #include <fcntl.h>
 #include <io.h>
 
-#include <csignal>
-#include <string>
-#include <vector>
-
-#include <shellapi.h>
-
 #include "os/terminal.h"
 #include "os/win32.h"
 
@@ -28,18 +22,6 @@ void OpenStandardFiles() {
   if (GetConsoleMode(output, &mode) != 0) {
     SetConsoleMode(output, mode | ENABLE_VIRTUAL_TERMINAL_PROCESSING);
   }
-}
-
-char** Utf8Words(int /*argc*/, char** /*argv*/) {
-  static std::vector<std::string> texts;
-  static std::vector<char*> words;
-  int count = 0;
-  wchar_t** wide = CommandLineToArgvW(GetCommandLineW(), &count);
-  for (int i = 0; i < count; ++i) texts.push_back(win32::Narrow(wide[i]));
-  LocalFree(wide);
-  for (std::string& text : texts) words.push_back(text.data());
-  words.push_back(nullptr);
-  return words.data();
 }
 
 bool IsTerminal(FILE* file) { return _isatty(_fileno(file)) != 0; }

@@ -7,6 +7,7 @@ same bits.
 
 import argparse
 import dataclasses
+import datetime
 import gzip
 import hashlib
 import os
@@ -41,7 +42,8 @@ class Target:
 
 
 TARGETS = {"x86-64": Target("amd64", "x86_64", "release"),
-           "arm64": Target("arm64", "aarch64", "arm64", "aarch64-linux-gnu-")}
+           "arm64": Target("arm64", "aarch64", "arm64", "aarch64-linux-gnu-"),
+           "windows": Target("", "x86_64", "windows", "x86_64-w64-mingw32-")}
 
 
 def say(text):
@@ -116,9 +118,10 @@ class Packager:
         self.epoch = int(output("git", "-C", ROOT, "log", "-1", "--format=%ct"))
         self.environment = {"DPKG_DEB_COMPRESSOR_TYPE": "xz"} | os.environ | {
             "SOURCE_DATE_EPOCH": str(self.epoch)}
-        self.name = f"upswing-{self.version}-linux-{target.machine}"
+        system = "windows" if target.preset == "windows" else "linux"
+        self.name = f"upswing-{self.version}-{system}-{target.machine}"
         self.venvs = arguments.work
-        self.work = arguments.work / target.machine
+        self.work = arguments.work / (system if system == "windows" else target.machine)
         self.tree = self.work / self.name
 
     def make_tree(self):
@@ -126,8 +129,7 @@ class Packager:
         import notices  # --check runs without its packages  # pylint: disable=import-outside-toplevel
         shutil.rmtree(self.work, ignore_errors=True)
         output("cmake", "--install", self.target.build, "--strip", "--prefix", self.tree)
-        add_libraries(self.target, self.programs(), self.tree / "lib/upswing")
-        self.check_linking(self.tree, {"bin"})
+        self.finish_programs()
         shutil.copytree(self.page, self.tree / "share/upswing/page", dirs_exist_ok=True)
         documents = self.tree / "share/doc/upswing"
         shutil.copytree(self.docs, documents / "html",
@@ -136,6 +138,15 @@ class Packager:
         (documents / "sbom.cdx.json").write_text(notices.sbom(self.version, self.epoch),
                                                  encoding="utf-8")
         normalise(self.tree, self.epoch)
+
+    def finish_programs(self):
+        add_libraries(self.target, self.programs(), self.tree / "lib/upswing")
+        self.check_linking(self.tree, {"bin"})
+
+    def requirements(self):
+        """What the packages need, as a sentence."""
+        return (f"The packages need Linux on {self.target.machine} with glibc {self.glibc()} and libstdc++ with "
+                f"GLIBCXX_{needed_version(self.target, self.elves(), 'GLIBCXX')} or newer.")
 
     def check_linking(self, folder, own):
         """Refuses to ship programs, modules and libraries that are linked unsafely."""
@@ -286,6 +297,41 @@ Description: controllers that swing up and balance a double pendulum
         return Path(shutil.copy2(wheel, self.out))
 
 
+class WindowsPackager(Packager):
+    """Makes the zip archive for Windows. Its programs bring all libraries but those of the system, of
+    MuJoCo, and Visual C++'s, which MuJoCo needs."""
+
+    LIBRARIES = re.compile(r"(?i)(mujoco|msvcrt|kernel32|user32|advapi32|shell32|api-ms-win-core-synch-[\w-]+)\.dll")
+
+    def finish_programs(self):
+        for program in self.tree.glob("bin/*.exe"):
+            listed = output(f"{self.target.tools}objdump", "-p", program)
+            needed = re.findall(r"DLL Name: (\S+)", listed)
+            missing = [name for name in needed if not self.LIBRARIES.fullmatch(name)]
+            if missing:
+                raise Refused(f"expected {program.name} to need libraries of Windows only, got {missing[0]}")
+            for what in ("DYNAMIC_BASE", "NX_COMPAT", "HIGH_ENTROPY_VA"):
+                if what not in listed:
+                    raise Refused(f"expected a safely linked {program.name}, got one without {what}")
+
+    def requirements(self):
+        return ("The archive needs 64-bit Windows 10 or 11 and the Microsoft Visual C++ Redistributable of "
+                "2022 (x64), which MuJoCo uses.")
+
+    def zip(self):
+        """The archive, with the same bits for the same files."""
+        path = self.out / f"{self.name}.zip"
+        time = datetime.datetime.fromtimestamp(self.epoch, datetime.timezone.utc).timetuple()[:6]
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+            for member in sorted(self.tree.rglob("*")):
+                if member.is_file():
+                    entry = zipfile.ZipInfo(str(Path(self.name) / member.relative_to(self.tree)), time)
+                    entry.compress_type = zipfile.ZIP_DEFLATED
+                    entry.external_attr = 0o644 << 16
+                    archive.writestr(entry, member.read_bytes())
+        return [path]
+
+
 def find_pythons():
     """Pythons with headers: 3.11, and the newest from 3.12 on, whose wheel serves all later ones. Also
     returns the missing versions."""
@@ -344,13 +390,14 @@ def main():
     arguments.out, arguments.work = arguments.out.absolute(), arguments.work.absolute()
     try:
         check_source(arguments.allow_changes)
-        kinds = arguments.kinds or KINDS
+        for_windows = arguments.arch == "windows"
+        kinds = ["zip"] if for_windows else arguments.kinds or KINDS
         if "wheels" in kinds:
             check_wheels(kinds)
         if arguments.check:
             return
         arguments.out.mkdir(parents=True, exist_ok=True)
-        packager = Packager(TARGETS[arguments.arch], arguments)
+        packager = (WindowsPackager if for_windows else Packager)(TARGETS[arguments.arch], arguments)
         packager.make_tree()
         try:
             for kind in kinds:
@@ -358,9 +405,7 @@ def main():
                     print(f"{path}: {path.stat().st_size / 1e6:.1f} MB")
         finally:
             write_checksums(arguments.out)
-        target = packager.target
-        print(f"The packages need Linux on {target.machine} with glibc {packager.glibc()} and libstdc++ with "
-              f"GLIBCXX_{needed_version(target, packager.elves(), 'GLIBCXX')} or newer.")
+        print(packager.requirements())
     except (Refused, OSError) as error:
         say(error)
         sys.exit(2)

@@ -1,5 +1,3 @@
-#include "extras/machine/drive/channel.h"
-
 #include <arpa/inet.h>
 #include <asm/termbits.h>  // termios2, which glibc's <termios.h> excludes
 #include <fcntl.h>
@@ -19,6 +17,8 @@
 
 #include "base/error.h"
 #include "base/text.h"
+#include "extras/machine/drive/channel.h"
+#include "os/making.h"
 
 namespace upswing::machine {
 namespace {
@@ -141,8 +141,10 @@ bool Channel::Send(std::span<const std::byte> bytes) {
   ssize_t sent = 0;
   if (datagrams_) {
     // A socket without a peer sends to what it is connected to, else nowhere.
-    const auto* peer = line_->peer_size > 0 ? reinterpret_cast<const sockaddr*>(&line_->peer) : nullptr;
-    sent = sendto(line_->fd.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL, peer, line_->peer_size);
+    const auto* peer =
+        line_->peer_size > 0 ? reinterpret_cast<const sockaddr*>(&line_->peer) : nullptr;
+    sent =
+        sendto(line_->fd.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL, peer, line_->peer_size);
   } else {
     sent = write(line_->fd.get(), bytes.data(), bytes.size());
   }

@@ -1,4 +1,5 @@
-// Windows has no links yet: every channel is refused when it is asked for, with a line that says so.
+// Windows has no links yet: every channel is refused when it is asked for, with a line that says
+// so.
 #include "base/error.h"
 #include "base/text.h"
 #include "extras/machine/drive/channel.h"

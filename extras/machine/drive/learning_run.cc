@@ -1,9 +1,10 @@
 #include "extras/machine/drive/learning_run.h"
-#include "extras/machine/drive/real_time.h"
 
 #include <algorithm>
 #include <future>
 #include <utility>
+
+#include "extras/machine/drive/real_time.h"
 
 namespace upswing::machine {
 

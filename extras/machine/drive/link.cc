@@ -99,9 +99,7 @@ double ChannelLink::Now() const {
   return static_cast<double>(MonotonicNanoseconds() - begin_) / kNanoseconds;
 }
 
-void ChannelLink::WaitUntil(double time) {
-  SleepUntil(begin_ + std::llround(time * kNanoseconds));
-}
+void ChannelLink::WaitUntil(double time) { SleepUntil(begin_ + std::llround(time * kNanoseconds)); }
 
 std::optional<LinkReading> ChannelLink::Exchange(const Joints& torque, bool enabled, double until) {
   if (channel_.Send(protocol_.Command(torque, enabled, Now()))) ++sent_;
