@@ -6,7 +6,7 @@ if(WIN32)
   # Windows aligns the stack to 16 bytes only, and g++ stores vectors of 32 and 64 bytes there as if they were
   # aligned (GCC's bug 54412). The assembler turns these instructions into those for any address.
   add_compile_options(-Wa,-muse-unaligned-vector-move)
-else()
+elseif(NOT APPLE)
   # Hardening: addresses of functions are read-only (full RELRO). A build ID would depend on the folder
   # that a program is built in.
   add_link_options(-Wl,-z,relro,-z,now -Wl,--build-id=none)

@@ -1,7 +1,5 @@
 // Texts of a program are UTF-8, on Windows too: the words of its command line, and what it makes
 // paths of.
-#include <shellapi.h>
-
 #include <cerrno>
 #include <cwchar>
 #include <string>

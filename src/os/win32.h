@@ -7,7 +7,10 @@
 #ifndef NOMINMAX
 #define NOMINMAX
 #endif
+// clang-format off: the second header needs the first
 #include <windows.h>
+#include <shellapi.h>
+// clang-format on
 
 #include <string>
 #include <string_view>
