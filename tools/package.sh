@@ -56,7 +56,7 @@ package() {
     *) bad_input "--arch: expected x86-64 or arm64, got \"$arch\"" ;;
   esac
   case $kinds:$arch in
-    " windows:x86-64") arch=windows kinds='' ;;
+    " windows:x86-64") arch=windows kinds=zip ;;
     *windows*) bad_input "expected windows without another kind or --arch, got$kinds --arch $arch" ;;
   esac
   [ "$setup" = yes ] || bad_input "expected ./upswing package without --no-setup"

@@ -7,7 +7,6 @@ same bits.
 
 import argparse
 import dataclasses
-import datetime
 import gzip
 import hashlib
 import os
@@ -20,6 +19,7 @@ import zipfile
 from pathlib import Path
 
 import elf
+import windows
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 KINDS = ["tarball", "deb", "wheels"]
@@ -298,37 +298,20 @@ Description: controllers that swing up and balance a double pendulum
 
 
 class WindowsPackager(Packager):
-    """Makes the zip archive for Windows. Its programs bring all libraries but those of the system, of
-    MuJoCo, and Visual C++'s, which MuJoCo needs."""
-
-    LIBRARIES = re.compile(r"(?i)(mujoco|msvcrt|kernel32|user32|advapi32|shell32|api-ms-win-core-synch-[\w-]+)\.dll")
+    """Makes the zip archive for Windows."""
 
     def finish_programs(self):
-        for program in self.tree.glob("bin/*.exe"):
-            listed = output(f"{self.target.tools}objdump", "-p", program)
-            needed = re.findall(r"DLL Name: (\S+)", listed)
-            missing = [name for name in needed if not self.LIBRARIES.fullmatch(name)]
-            if missing:
-                raise Refused(f"expected {program.name} to need libraries of Windows only, got {missing[0]}")
-            for what in ("DYNAMIC_BASE", "NX_COMPAT", "HIGH_ENTROPY_VA"):
-                if what not in listed:
-                    raise Refused(f"expected a safely linked {program.name}, got one without {what}")
+        faults = list(windows.faults(sorted(self.tree.glob("bin/*.exe")), f"{self.target.tools}objdump"))
+        if faults:
+            raise Refused(f"expected programs that run on any Windows, got {len(faults)} faults; first {faults[0]}")
 
     def requirements(self):
-        return ("The archive needs 64-bit Windows 10 or 11 and the Microsoft Visual C++ Redistributable of "
-                "2022 (x64), which MuJoCo uses.")
+        return ("The archive needs 64-bit Windows 10 or 11 and the Microsoft Visual C++ Redistributable (x64), "
+                "which MuJoCo uses.")
 
     def zip(self):
-        """The archive, with the same bits for the same files."""
         path = self.out / f"{self.name}.zip"
-        time = datetime.datetime.fromtimestamp(self.epoch, datetime.timezone.utc).timetuple()[:6]
-        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-            for member in sorted(self.tree.rglob("*")):
-                if member.is_file():
-                    entry = zipfile.ZipInfo(str(Path(self.name) / member.relative_to(self.tree)), time)
-                    entry.compress_type = zipfile.ZIP_DEFLATED
-                    entry.external_attr = 0o644 << 16
-                    archive.writestr(entry, member.read_bytes())
+        windows.write_zip(self.tree, path, self.epoch)
         return [path]
 
 
@@ -391,7 +374,7 @@ def main():
     try:
         check_source(arguments.allow_changes)
         for_windows = arguments.arch == "windows"
-        kinds = ["zip"] if for_windows else arguments.kinds or KINDS
+        kinds = arguments.kinds or KINDS
         if "wheels" in kinds:
             check_wheels(kinds)
         if arguments.check:

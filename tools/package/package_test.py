@@ -16,11 +16,13 @@ import sys
 import tempfile
 import tomllib
 import unittest
+import zipfile
 from pathlib import Path
 
 ROOT = Path(os.environ.get("UPSWING_ROOT", Path(__file__).resolve().parent.parent.parent))
 sys.path.insert(0, str(ROOT / "src/cli"))
 import elf  # noqa: E402  pylint: disable=wrong-import-position
+import windows  # noqa: E402  pylint: disable=wrong-import-position
 from testing import UPSWING, read_tensors, small  # noqa: E402  pylint: disable=wrong-import-position
 
 FOLDER = Path(__file__).resolve().parent
@@ -182,6 +184,38 @@ class VersionTest(unittest.TestCase):
         self.assertEqual(found(r"^## \[([\d.]+)\]", "CHANGELOG.md"), version)
 
 
+class WindowsTest(unittest.TestCase):
+    def setUp(self):
+        self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
+
+    def faults(self, listed):
+        """The faults of a program of which objdump says this."""
+        objdump = self.folder / "objdump"
+        objdump.write_text(f"#!/bin/sh\ncat <<'END'\n{listed}\nEND\n", encoding="utf-8")
+        objdump.chmod(0o755)
+        return list(windows.faults([Path("upswing.exe")], objdump))
+
+    def test_programs_need_only_what_windows_has(self):
+        safe = "DYNAMIC_BASE NX_COMPAT HIGH_ENTROPY_VA\n\tDLL Name: KERNEL32.dll\n\tDLL Name: mujoco.dll"
+        self.assertEqual(self.faults(safe), [])
+        self.assertEqual(self.faults(f"{safe}\n\tDLL Name: zlib1.dll"), ["upswing.exe needs zlib1.dll"])
+        self.assertEqual(self.faults(safe.replace("NX_COMPAT ", "")), ["upswing.exe lacks NX_COMPAT"])
+
+    def test_the_same_files_give_the_same_archive(self):
+        tree = self.folder / "tree"
+        tree.mkdir()
+        for name in ("b", "a"):
+            (tree / name).write_text(name, encoding="utf-8")
+        archives = []
+        for time in (0, 1_000_000_000):
+            os.utime(tree / "a", (time, time))
+            archives.append(self.folder / f"{time}.zip")
+            windows.write_zip(tree, archives[-1], 1_700_000_000)
+        self.assertEqual(*(path.read_bytes() for path in archives))
+        with zipfile.ZipFile(archives[0]) as archive:
+            self.assertEqual(archive.namelist(), ["tree/a", "tree/b"])
+
+
 class PinsTest(unittest.TestCase):
     def test_actions_are_pinned_by_hash(self):
         for path in (ROOT / ".github/workflows").glob("*.yml"):
@@ -191,7 +225,9 @@ class PinsTest(unittest.TestCase):
 
 class LauncherTest(unittest.TestCase):
     def test_bad_arguments(self):
-        for words, message in ((["zip"], 'expected tarball, deb or wheels, got "zip"'),
+        for words, message in ((["zip"], 'expected tarball, deb, wheels or windows, got "zip"'),
+                               (["windows", "deb"], "expected windows without another kind"),
+                               (["windows", "--arch", "arm64"], "expected windows without another kind"),
                                (["--arch", "riscv"], 'expected x86-64 or arm64, got "riscv"'),
                                (["--out"], "--out: expected a value, got none"),
                                (["--fast"], "unknown flag --fast")):
