@@ -46,16 +46,22 @@ def licence_text(component):
     return None
 
 
-def components():
-    return tomllib.loads((Path(__file__).parent / "components.toml").read_text(
+def components(system):
+    """The components of the packages for `system`: linux or windows, where our programs bring all libraries."""
+    listed = tomllib.loads((Path(__file__).parent / "components.toml").read_text(
         encoding="utf-8"))["component"]
+    own = [component for component in listed if component.get("system", system) == system]
+    if system == "windows":
+        own = [component | {"part": re.sub(r"lib/upswing/\S+( \(.*\))?", "the programs", component["part"])}
+               for component in own]
+    return own
 
 
-def notice():
+def notice(system):
     """The text of NOTICE."""
     parts = ["Upswing\nCopyright The Upswing developers. Apache License 2.0, see LICENSE.\n\n"
              "The packages of Upswing contain these third-party works:\n"]
-    for component in components():
+    for component in components(system):
         version = version_of(component)
         head = " ".join(filter(None, [component["name"], version]))
         text = licence_text(component) or "The file LICENSE has the text of the Apache License 2.0.\n"
@@ -64,7 +70,7 @@ def notice():
     return "\n".join(parts)
 
 
-def sbom(version, epoch):
+def sbom(version, epoch, system):
     """The software bill of materials, CycloneDX 1.6 in JSON. `epoch`: its time, in seconds."""
     licences = LicenseFactory()
     bom = Bom(serial_number=uuid5(NAMESPACE_URL, f"upswing-{version}-{epoch}"))
@@ -72,7 +78,7 @@ def sbom(version, epoch):
     program = Component(name="upswing", version=version, type=ComponentType.APPLICATION,
                         bom_ref="upswing", licenses=[licences.make_from_string("Apache-2.0")])
     bom.metadata.component = program
-    for component in components():
+    for component in components(system):
         url = PackageURL.from_string(component["package"])
         # fonts have no version
         url = PackageURL(url.type, url.namespace, url.name, version_of(component))

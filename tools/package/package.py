@@ -118,10 +118,10 @@ class Packager:
         self.epoch = int(output("git", "-C", ROOT, "log", "-1", "--format=%ct"))
         self.environment = {"DPKG_DEB_COMPRESSOR_TYPE": "xz"} | os.environ | {
             "SOURCE_DATE_EPOCH": str(self.epoch)}
-        system = "windows" if target.preset == "windows" else "linux"
-        self.name = f"upswing-{self.version}-{system}-{target.machine}"
+        self.system = "windows" if target.preset == "windows" else "linux"
+        self.name = f"upswing-{self.version}-{self.system}-{target.machine}"
         self.venvs = arguments.work
-        self.work = arguments.work / (system if system == "windows" else target.machine)
+        self.work = arguments.work / (self.system if self.system == "windows" else target.machine)
         self.tree = self.work / self.name
 
     def make_tree(self):
@@ -134,8 +134,8 @@ class Packager:
         documents = self.tree / "share/doc/upswing"
         shutil.copytree(self.docs, documents / "html",
                         ignore=shutil.ignore_patterns(".buildinfo*", "_sources"))
-        (documents / "NOTICE").write_text(notices.notice(), encoding="utf-8")
-        (documents / "sbom.cdx.json").write_text(notices.sbom(self.version, self.epoch),
+        (documents / "NOTICE").write_text(notices.notice(self.system), encoding="utf-8")
+        (documents / "sbom.cdx.json").write_text(notices.sbom(self.version, self.epoch, self.system),
                                                  encoding="utf-8")
         normalise(self.tree, self.epoch)
 
