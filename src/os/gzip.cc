@@ -49,6 +49,9 @@ std::string Gzip(std::string_view text) {
                    Z_DEFAULT_STRATEGY) != Z_OK) {
     throw Failure("zlib does not work");
   }
+  gz_header header{};
+  header.os = 3;  // Unix, on Windows too: the same text gives the same bytes
+  deflateSetHeader(&stream, &header);
   std::string bytes(deflateBound(&stream, text.size()), '\0');
   stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(text.data()));
   stream.avail_in = static_cast<uInt>(text.size());

@@ -25,6 +25,13 @@ TEST(Gzip, InflatesCompressedText) {
   }
 }
 
+TEST(Gzip, NamesNoTimeAndOneSystem) {
+  // RFC 1952: seconds in bytes 4 to 7, the system in byte 9.
+  const std::string bytes = Gzip("time,pos1\n0,1\n");
+  EXPECT_EQ(bytes.substr(4, 4), std::string(4, '\0'));
+  EXPECT_EQ(bytes[9], 3);
+}
+
 TEST(Gzip, RefusesEveryShorterFile) {
   const std::string bytes = Gzip("time,pos1\n0,1\n");
   for (size_t size = 0; size < bytes.size(); ++size) {
