@@ -8,7 +8,6 @@
 #include "control/tvlqr.h"
 #include "extras/deploy/c_header.h"
 #include "extras/deploy/c_text.h"
-#include "pendulum/equations.h"
 
 namespace upswing::deploy {
 namespace {
@@ -116,23 +115,11 @@ std::vector<float> StepsFrom(const std::vector<float>& states, const std::vector
 
 /// Adds the tables with which extras/deploy/c/catch.c simulates.
 void AddCatch(const LoadedPolicy& loaded, const LqrCatch& upright, CParts& parts) {
-  const Plant& plant = loaded.plant;
-  if (plant.coulomb1 != 0 || plant.coulomb2 != 0) {
-    throw BadInput(Concat(loaded.name,
-                          ": expected a plant without dry friction (coulomb1 and coulomb2 ",
-                          "0), which the C code does not model"));
-  }
-  const Manipulator m = ManipulatorOf(plant);
-  // In the order of the entries that extras/deploy/c/equations.c names.
-  parts.constants.push_back({"plant", "of the equations of motion",
-                             Floats(std::array{m.J1, m.J2, m.b, m.G1, m.G2, m.d1, m.d2, m.a})});
+  AddEquations(loaded.plant, loaded.design_plant().physics_steps(), parts);
   parts.constants.push_back(
       {"upright_cost", "of a deviation from upright", Floats(Triangle(upright.lqr().P))});
   parts.constants.push_back({"region", "of attraction", Floats(std::array{upright.region()})});
   parts.macros.emplace_back("LOOK_AHEAD", Concat(upright.steps(), " /* control periods */"));
-  const int steps = loaded.design_plant().physics_steps();
-  parts.macros.emplace_back("PHYSICS_STEPS", Concat(steps, " /* of a simulated period */"));
-  parts.macros.emplace_back("ACTUATED_JOINT", Concat(plant.actuated_joint));
 }
 
 void AddGain(const Lqr& lqr, CParts& parts) {
@@ -240,7 +227,7 @@ const CController& CControllerCalled(const std::string& name) {
 /// Adds the description of a controller to the header: its file, origin, limits and plant.
 void DescribeController(const LoadedPolicy& loaded, const Plant& plant, const char* file,
                         CParts& parts) {
-  parts.task = PendulumTask(plant.actuated_joint, loaded.scale(), 0);
+  parts.task = PendulumTask(loaded);
   parts.task.file = file;
   parts.origin =
       Concat("It is ", CommentText(loaded.name), ": ", CommentText(loaded.policy->description()));

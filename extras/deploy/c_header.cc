@@ -1,10 +1,12 @@
 #include "extras/deploy/c_header.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 
 #include "base/text.h"
 #include "extras/deploy/c_text.h"
+#include "pendulum/equations.h"
 
 namespace upswing::deploy {
 namespace {
@@ -136,6 +138,19 @@ std::string HeadComment(const CParts& parts, const CHeader& header) {
 }
 
 }  // namespace
+
+void AddEquations(const Plant& plant, int physics_steps, CParts& parts) {
+  const Manipulator m = ManipulatorOf(plant);
+  // In the order of the entries that extras/deploy/c/equations.c names.
+  parts.constants.push_back(
+      {"plant", "of the equations of motion",
+       Floats(std::array{m.J1, m.J2, m.b, m.G1, m.G2, m.d1, m.d2, m.a, m.f1, m.f2})});
+  parts.macros.emplace_back("PHYSICS_STEPS", Concat(physics_steps, " /* of a simulated period */"));
+  parts.macros.emplace_back("ACTUATED_JOINT", Concat(plant.actuated_joint));
+  if (plant.has_dry_friction()) {
+    parts.macros.emplace_back("FRICTION_SLOPE", CLiteral(kFrictionSlope) + " /* s/rad */");
+  }
+}
 
 void WriteHeader(const CParts& parts, CHeader& header) {
   for (const CArray& array : parts.constants) header.constant_bytes += 4 * array.values.size();

@@ -48,11 +48,16 @@ struct CParts {
 /// results. S state variables, O outputs of the network.
 struct CSamples {
   std::vector<float> states, outputs, torques;       // (N × S), (N × O), (N)
+  std::vector<float> identified;                     // (N × kIdentifiedSize), if the policy has it
   float output_tolerance = 0, torque_tolerance = 0;  // for other rounding
 };
 
 /// Draws the samples, the same in every call. `layers` are the layers of the header's network.
 CSamples DrawSamples(const ExportedPolicy& policy, const std::vector<LayerView>& layers);
+
+/// Adds the table and macros with which extras/deploy/c/equations.c simulates a plant, with
+/// `physics_steps` in a control period.
+void AddEquations(const Plant& plant, int physics_steps, CParts& parts);
 
 /// Names of the controllers that have C code.
 std::vector<std::string> ControllersInC();

@@ -17,6 +17,10 @@ namespace {
 constexpr size_t kMostParameters = 2'000'000;  // about 23 MB of header
 constexpr size_t kLongestPrefix = 32;
 constexpr int kBlockRows = 8;  // see linear in extras/deploy/c/network.c
+// Of an identified number of the self-test; they are of size 1, and rounding changes them by 1e-4.
+constexpr double kIdentifiedTolerance = 1e-3;
+// Numbers in the arrays of an update of the estimates, with those of a Runge-Kutta step.
+constexpr size_t kIdentifiedArrays = 56;
 
 /// The weights (out × in) in the order of the function linear in extras/deploy/c/network.c: blocks
 /// of rows, each column by column, then the remaining rows.
@@ -85,11 +89,28 @@ std::vector<float> EnergyConstants(const Plant& plant) {
 
 /// Adds the constants and macros that the double pendulum's header needs.
 void AddPlant(const LoadedPolicy& loaded, CParts& parts) {
-  static_assert(kMemorySize == 3);  // extras/deploy/c/pendulum.c has the same
+  static_assert(kMemorySize == 3);  // extras/deploy/c/observe.c has the same
   const Plant& plant = loaded.plant;
   parts.plant_use = "by which it computes energy and height";
   parts.plant = plant;
   parts.constants = {{"energy", "of the observed energy and height", EnergyConstants(plant)}};
+  if (!loaded.identifies()) return;
+  static_assert(kConstants == 7 && kIdentifiedSize == 13);  // as in identification.c
+  parts.plant_use =
+      "from which its identification starts, and by which it computes energy and "
+      "height";
+  const Identifier filter(plant, loaded.control_period(), 1);
+  AddEquations(plant, filter.physics_steps(), parts);
+  parts.constants.push_back(
+      {"prior", "covariance of the relative constants at the start", Floats(filter.prior())});
+  const auto add = [&](const char* name, double value, const char* comment) {
+    parts.macros.emplace_back(name, CLiteral(static_cast<float>(value)) + comment);
+  };
+  parts.macros.emplace_back("IDENTIFIED_SIZE", Concat(kIdentifiedSize, " /* of the plant */"));
+  add("IDENTIFIED_SCALE", kConstantScale, " /* divides deviations of constants */");
+  add("IDENTIFIED_NOISE", filter.noise(), " /* rad/s, of a change of velocity */");
+  add("IDENTIFIED_TOLERANCE", kIdentifiedTolerance, " /* of the self-test */");
+  add("MOTOR_LIMIT", plant.torque_limit, " /* N m, with which it returns from a fall */");
 }
 
 /// Adds the layers' arrays and the list of layers.
@@ -147,13 +168,20 @@ NetworkSizes SizesOf(const ExportedPolicy& policy, const std::vector<LayerView>&
 CHeader EmptyHeader(const ExportedPolicy& policy, const NetworkSizes& sizes,
                     const std::string& prefix) {
   constexpr size_t kFloat = 4;  // bytes
-  const int memory = policy.loaded->memory();
+  const LoadedPolicy& loaded = *policy.loaded;
+  const int memory = loaded.memory();
+  size_t state = 1;                                // the last torque
+  if (memory > 0 || loaded.identifies()) ++state;  // whether it runs
+  if (memory > 0) state += static_cast<size_t>(2 + kMemorySize * memory);
+  if (loaded.identifies()) state += kConstants + kConstants * (kConstants + 1) / 2 + 4;
+  if (loaded.seeks_any_pose()) state += kGoalSize;
+  const auto network = static_cast<size_t>(sizes.outputs + 2 * sizes.widest);
   CHeader header;
   header.prefix = prefix;
-  header.state_bytes = kFloat;  // the last torque
-  if (memory > 0) header.state_bytes += kFloat * static_cast<size_t>(3 + kMemorySize * memory);
-  header.stack_bytes =
-      kFloat * static_cast<size_t>(policy.obs_size() + sizes.outputs + 2 * sizes.widest);
+  header.state_bytes = kFloat * state;
+  // The arrays of identification are gone when the network computes.
+  header.stack_bytes = kFloat * (static_cast<size_t>(policy.obs_size()) +
+                                 std::max(network, loaded.identifies() ? kIdentifiedArrays : 0));
   header.multiply_adds = sizes.multiply_adds;
   return header;
 }
@@ -163,6 +191,11 @@ std::string WorkOf(const ExportedPolicy& policy, const NetworkSizes& sizes) {
   std::string work = Concat(sizes.multiply_adds, " multiply-adds");
   if (!policy.is_foreign()) {
     work += Concat(", ", policy.task.state.size(), " sines and cosines");
+  }
+  if (policy.loaded->identifies()) {
+    const Identifier filter(policy.loaded->plant, policy.loaded->control_period(), 1);
+    work += Concat(", ", 4 * filter.physics_steps(),
+                   " derivatives of the motion, two updates of seven constants");
   }
   if (sizes.tanhs > 0) work += Concat(", ", sizes.tanhs, " of tanh");
   return work + '.';
@@ -215,26 +248,36 @@ void AddObservationScales(const LoadedPolicy& loaded, CParts& parts) {
   };
   add("MAX_VELOCITY1", observation.max_velocity[0], " /* rad/s, divides w1 */");
   add("MAX_VELOCITY2", observation.max_velocity[1], " /* rad/s, divides w2 */");
+  if (loaded.seeks_any_pose()) {
+    const int at = kObservationSize + (loaded.identifies() ? kIdentifiedSize : 0);
+    parts.macros.emplace_back("GOAL_SIZE", Concat(kGoalSize, " /* one number for each link */"));
+    parts.macros.emplace_back("GOAL_AT", Concat(at, " /* place in the observation */"));
+  }
+  if (observation.memory || loaded.identifies()) parts.macros.emplace_back("HAS_PAST", "1");
   if (!observation.memory) return;
   const int memory = loaded.memory();
   add("MEMORY_VELOCITY", observation.memory->velocity, " /* rad/s, divides changes */");
   add("MEMORY_TORQUE", observation.memory->torque, " /* N m, divides torques */");
   parts.macros.emplace_back("MEMORY_SIZE",
                             Concat(kMemorySize * memory, " /* for ", memory, " past steps */"));
+  parts.macros.emplace_back("MEMORY_AT", Concat(loaded.policy->obs_size() - kMemorySize * memory,
+                                                " /* place in the observation */"));
 }
 
 void AddMacros(const ExportedPolicy& policy, const NetworkSizes& sizes, const CSamples& samples,
                CParts& parts) {
-  parts.macros = {{"OBSERVATION_SIZE", Concat(policy.obs_size(), ' ', ObservationComment(policy))},
-                  {"OUTPUT_SIZE", Concat(sizes.outputs, " /* of the network */")},
-                  {"MULTIPLY_ADDS", Concat(sizes.multiply_adds, "L /* of a call */")},
-                  {"LAYERS", Concat(sizes.layers)},
-                  {"WIDEST_LAYER", Concat(sizes.widest)},
-                  {"RULE", RuleLiteral(policy)},
-                  {"STATE_SIZE", Concat(policy.state_size())},
-                  {"SAMPLES", Concat(samples.torques.size())},
-                  {"OUTPUT_TOLERANCE", CLiteral(samples.output_tolerance)},
-                  {"TORQUE_TOLERANCE", CLiteral(samples.torque_tolerance)}};
+  const std::vector<std::pair<std::string, std::string>> macros{
+      {"OBSERVATION_SIZE", Concat(policy.obs_size(), ' ', ObservationComment(policy))},
+      {"OUTPUT_SIZE", Concat(sizes.outputs, " /* of the network */")},
+      {"MULTIPLY_ADDS", Concat(sizes.multiply_adds, "L /* of a call */")},
+      {"LAYERS", Concat(sizes.layers)},
+      {"WIDEST_LAYER", Concat(sizes.widest)},
+      {"RULE", RuleLiteral(policy)},
+      {"STATE_SIZE", Concat(policy.state_size())},
+      {"SAMPLES", Concat(samples.torques.size())},
+      {"OUTPUT_TOLERANCE", CLiteral(samples.output_tolerance)},
+      {"TORQUE_TOLERANCE", CLiteral(samples.torque_tolerance)}};
+  parts.macros.insert(parts.macros.begin(), macros.begin(), macros.end());
   if (!policy.is_foreign()) AddObservationScales(*policy.loaded, parts);
 }
 
@@ -254,6 +297,9 @@ CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
   parts.samples = {{"sample_states", "", samples.states},
                    {"sample_outputs", "", samples.outputs},
                    {"sample_torques", policy.is_foreign() ? "" : "N m", samples.torques}};
+  if (!samples.identified.empty()) {
+    parts.samples.push_back({"sample_identified", "of the plant", samples.identified});
+  }
   CHeader header = EmptyHeader(policy, sizes, prefix);
   WriteHeader(parts, header);
   return header;

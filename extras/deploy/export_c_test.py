@@ -5,58 +5,19 @@ finite.
 """
 
 import array
-import functools
 import json
 import math
 import random
 import re
 import shutil
 import subprocess
-import sys
 import unittest
-from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "src/cli"))
-from testing import ROOT, UPSWING, ProgramTest, probe, read_csv, read_tensors, small, write_tensors  # noqa: E402
+from c_testing import (AGENTS, COMPILERS, COUNT, EXAMPLE, HAS_CORTEX_M4, NO_CORTEX_M4, SANITIZE, HeaderTest,
+                       compile_c, random_states, rows_of, run_on_cortex_m4)
+from testing import ROOT, UPSWING, ProgramTest, probe, read_csv, read_tensors, small, write_tensors
 
-AGENTS = ROOT / "web/public/agents"
 ACTORS = sorted((ROOT / "web/tests/actors").glob("*.safetensors"))
-EXAMPLE = ROOT / "examples/c"
-COUNT = 2000
-STRICT = ["-pedantic", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion", "-Wshadow"]
-SANITIZE = ["-fsanitize=undefined,address", "-fno-sanitize-recover=all"]
-# The installed compilers: (command, language options).
-COMPILERS = [(compiler, standard)
-             for compiler, standard in (("gcc", "-std=c99"), ("clang", "-std=c99"),
-                                        ("clang-14", "-std=c99"), ("g++", "-std=c++98"),
-                                        ("g++", "-std=c++20"))
-             if shutil.which(compiler)]
-
-# Reads rows of float: whether an episode begins, the state, the torque that acted after it. Writes
-# status, torque and outputs of each.
-DRIVER = r"""
-#include "policy.h"
-#include <stdio.h>
-
-int main(void)
-{
-  float in[6];
-  policy_state state;
-  policy_init(&state);
-  while (fread(in, sizeof(in), 1, stdin) == 1) {
-    float out[2 + POLICY_OUTPUT_SIZE], observation[POLICY_OBSERVATION_SIZE];
-    policy_state copy;
-    if (in[0] > 0.0f) policy_init(&state);
-    copy = state;
-    out[0] = (float)policy_control(&state, in[1], in[2], in[3], in[4], &out[1]);
-    policy_observe(&copy, in[1], in[2], in[3], in[4], observation);
-    policy_outputs(observation, out + 2);
-    fwrite(out, sizeof(out), 1, stdout);
-    if (in[0] >= 0.0f) state.torque = in[5];
-  }
-  return policy_selftest() == POLICY_OK ? 0 : 1;
-}
-"""
 
 # Reads states of one episode and writes the torques of a controller.
 CONTROLLER_DRIVER = r"""
@@ -79,84 +40,7 @@ int main(void)
 """
 
 
-def compile_c(folder, source, *options, compiler="gcc", standard="-std=c99"):
-    """Compiles a file of the folder. Returns the compiler's messages."""
-    language = ["-x", "c++"] if compiler == "g++" else []
-    return subprocess.run([compiler, standard, *STRICT, *options, *language, source, "-x", "none",
-                           "-o", "program", "-lm"], cwd=folder, check=False,
-                          stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                          stderr=subprocess.STDOUT, encoding="utf-8")
-
-
-def rows_of(numbers, count):
-    """An array split into `count` rows."""
-    width = len(numbers) // count
-    return [numbers[i * width:(i + 1) * width] for i in range(count)]
-
-
-@functools.cache
-def random_states():
-    """Random states, rounded to float: angles of several turns, then velocities."""
-    rng = random.Random(0)
-    bounds = [3 * 3.14] * 2 + [8] * 2
-    return array.array("f", (rng.uniform(-bound, bound) for _ in range(COUNT) for bound in bounds))
-
-
-class HeaderTest(ProgramTest):
-    def build(self, policy, *options):
-        """Exports policy.h and compiles the driver with it."""
-        self.succeed("export", policy, "--c", "policy.h")
-        self.compile_driver(*options)
-
-    def compile_driver(self, *options, **language):
-        self.write("driver.c", DRIVER)
-        self.compile("driver.c", "-O1", *options, **language)
-
-    def compile(self, *arguments, **more):
-        done = compile_c(self.folder, *arguments, **more)
-        self.assertEqual((done.returncode, done.stdout), (0, ""))
-
-    def drive(self, states, begins=None, torques=None, code=0):
-        """(status, torque, outputs) of each state."""
-        count = len(states) // 4
-        numbers = array.array("f")
-        for i, row in enumerate(rows_of(states, count)):
-            numbers.append(1 if begins is None else begins[i])
-            numbers.extend(row)
-            numbers.append(0 if torques is None else torques[i])
-        done = subprocess.run([self.folder / "program"], check=False, input=numbers.tobytes(),
-                              stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-        self.assertEqual((done.returncode, done.stderr), (code, b""))
-        return [(row[0], row[1], row[2:])
-                for row in rows_of(array.array("f", done.stdout), count)]
-
-    def assert_same(self, got, torques):
-        """Asserts equal torques, except where two outputs are practically equal."""
-        limit = float(re.search(r"POLICY_TORQUE_LIMIT (\S+)f", self.header())[1])
-        scale = max(abs(x) for _, _, outputs in got for x in outputs)
-        others = 0
-        for (status, torque, outputs), expected in zip(got, torques, strict=True):
-            self.assertEqual(status, 0)
-            self.assertLessEqual(abs(torque), limit)
-            if abs(torque - expected) <= 1e-4 * limit:
-                continue
-            others += 1
-            best = sorted(outputs)[-2:]
-            self.assertEqual(len(best), 2, (torque, expected))
-            self.assertLessEqual(best[1] - best[0], 1e-4 * scale, (torque, expected))
-        self.assertLessEqual(others, len(got) // 1000)
-        self.assertGreater(len({torque for _, torque, _ in got}), 1)
-
-    def header(self):
-        return (self.folder / "policy.h").read_text(encoding="ascii")
-
-    def check(self, policy, *options):
-        """Asserts equal torques in COUNT random states, each the beginning of an episode."""
-        self.build(policy, *options)
-        states = random_states()
-        expected = rows_of(probe(policy, "states", states), COUNT)
-        self.assert_same(self.drive(states), [row[0] for row in expected])
-
+class HeadersTest(HeaderTest):
     def test_agents_of_the_page(self):
         self.assertEqual(COMPILERS[0], ("gcc", "-std=c99"))
         self.assertIn(("g++", "-std=c++20"), COMPILERS)
@@ -330,12 +214,6 @@ class HeaderTest(ProgramTest):
         self.compile("null.c", "-O1")
         self.assertEqual(subprocess.run([self.folder / "program"], check=False).returncode, 0)
 
-    def self_test(self):
-        """The exit code of a program that runs the header's self-test."""
-        self.write("test.c", '#include "policy.h"\nint main(void) { return (int)policy_selftest(); }')
-        self.compile("test.c")
-        return subprocess.run([self.folder / "program"], check=False).returncode
-
     def test_self_test_finds_any_changed_number(self):
         self.succeed(*small(hidden="8,8", head=4, mirror=False, reward_centering=0, tau=0.02))
         self.succeed("export", "run", "--c", "policy.h")
@@ -490,7 +368,7 @@ class HeaderTest(ProgramTest):
 def block_of_documentation(section):
     """The lines that a section of docs/howto/export.md asks you to type."""
     text = (ROOT / "docs/howto/export.md").read_text(encoding="utf-8").split(f"### {section}\n")[1]
-    blocks = re.findall(r"^```sh\n(.*?)^```", text.split("\n### ")[0], re.MULTILINE | re.DOTALL)
+    blocks = re.findall(r"^```sh\n(.*?)^```", re.split(r"\n###? ", text)[0], re.MULTILINE | re.DOTALL)
     return "".join(blocks)
 
 
@@ -517,8 +395,7 @@ class DocumentedTest(ProgramTest):
         said = self.type(rest)
         self.assertRegex(said, r"upright from \d\.\d\d s to the end\n$")
 
-    @unittest.skipUnless(shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm"),
-                         "no gcc-arm-none-eabi and qemu-system-arm here")
+    @unittest.skipUnless(HAS_CORTEX_M4, NO_CORTEX_M4)
     def test_on_a_cortex_m4(self):
         self.succeed("export", AGENTS / "fast.safetensors", "--c", "policy.h")
         said = self.type(block_of_documentation("On a Cortex-M4"))
@@ -607,28 +484,9 @@ class SwingUpTest(ProgramTest):
         self.assertEqual(self.run_example(1)[0], 2)
 
 
-@unittest.skipUnless(shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm"),
-                     "no gcc-arm-none-eabi and qemu-system-arm here")
+@unittest.skipUnless(HAS_CORTEX_M4, NO_CORTEX_M4)
 class CortexM4Test(ProgramTest):
     """Tests of examples/c on a Cortex-M4 in QEMU, with its own arithmetic and newlib's math."""
-
-    PROCESSOR = ["-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"]
-
-    def run_there(self, source, *qemu, optimize="-O2"):
-        """Builds a program for the Cortex-M4 and runs it."""
-        folder = EXAMPLE / "cortex_m4"
-        done = subprocess.run(
-            ["arm-none-eabi-gcc", "-std=c99", optimize, *STRICT, *self.PROCESSOR, "-I.", source,
-             folder / "startup.c", "--specs=rdimon.specs", "-T", folder / "mps2_an386.ld",
-             "-Wl,--gc-sections", "-o", "program.elf", "-lm"], cwd=self.folder, check=False,
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8")
-        if "rdimon.specs" in done.stdout:
-            self.skipTest("no libnewlib-arm-none-eabi here")
-        self.assertEqual((done.returncode, done.stdout), (0, ""))
-        return subprocess.run(
-            ["qemu-system-arm", "-M", "mps2-an386", "-semihosting", "-nographic", *qemu, "-kernel",
-             "program.elf"], cwd=self.folder, check=False, stdin=subprocess.DEVNULL, timeout=300,
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, encoding="utf-8")
 
     def test_self_test_and_work(self):
         # (agent, most instructions per multiply-add): load, multiply, add, and loops
@@ -636,7 +494,7 @@ class CortexM4Test(ProgramTest):
             for optimize in ("-O2", "-Os"):
                 with self.subTest(f"{agent} {optimize}"):
                     self.succeed("export", AGENTS / f"{agent}.safetensors", "--c", "policy.h")
-                    done = self.run_there(EXAMPLE / "cortex_m4/count.c", "-icount", "shift=8",
+                    done = run_on_cortex_m4(self.folder, EXAMPLE / "cortex_m4/count.c", "-icount", "shift=8",
                                           optimize=optimize)
                     self.assertEqual(done.returncode, 0, done)
                     header = (self.folder / "policy.h").read_text(encoding="ascii")
@@ -649,7 +507,7 @@ class CortexM4Test(ProgramTest):
 
     def test_it_swings_up(self):
         self.succeed("export", AGENTS / "fast.safetensors", "--c", "policy.h")
-        done = self.run_there(EXAMPLE / "swing_up.c")
+        done = run_on_cortex_m4(self.folder, EXAMPLE / "swing_up.c")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("upright from", done.stderr)
 
@@ -660,7 +518,7 @@ class CortexM4Test(ProgramTest):
         number = re.search(r"-?\d+\.\d+", header[begin:])
         begin += number.start()
         self.write("policy.h", header[:begin] + "0.5" + header[begin + len(number[0]):])
-        done = self.run_there(EXAMPLE / "cortex_m4/count.c", "-icount", "shift=8")
+        done = run_on_cortex_m4(self.folder, EXAMPLE / "cortex_m4/count.c", "-icount", "shift=8")
         self.assertEqual((done.returncode, done.stdout), (1, "damaged\n"))
 
 

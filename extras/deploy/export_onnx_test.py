@@ -119,10 +119,11 @@ class OnnxTest(ProgramTest):
         return self.assert_near(got["torque"], torque[:, np.newaxis])
 
     def test_agents_of_the_page(self):
-        for name in ("fast", "dqn", "d3qn-randomized"):
+        for name in ("fast", "dqn", "d3qn-randomized", "d3qn-adaptive"):
             with self.subTest(name):
                 self.check_q_network(AGENTS / f"{name}.safetensors")
-        self.check_actor(AGENTS / "sac.safetensors", "squashed-gaussian")
+        for name in ("sac", "any-pose"):
+            self.check_actor(AGENTS / f"{name}.safetensors", "squashed-gaussian")
         self.check_actor(AGENTS / "ppo.safetensors", "clipped-gaussian")
 
     def test_q_networks_of_other_kinds(self):
@@ -158,6 +159,27 @@ class OnnxTest(ProgramTest):
         self.assertIn("rad/s", observation[2]["meaning"])
         self.assertEqual(observation[-1]["name"], "torque, 4 steps ago")
         self.assertEqual(model.producer_name, "upswing")
+
+    def test_goal_and_identification_are_inputs(self):
+        """Metadata describe each of them, in the order of the observation."""
+        self.succeed(*small(any_pose=True, identify=True, memory=1, out="all"))
+        goal = ["goal of link 1", "goal of link 2"]
+        identified = ["J1", "J2", "b", "G1", "G2", "d1", "d2", "delta", "tanh(0.1 / delta)",
+                      "identified energy", "faster fall", "slower fall", "torque against the falls"]
+        memory = ["change of w1, 1 step ago", "change of w2, 1 step ago", "torque, 1 step ago"]
+        for policy, inputs in ((AGENTS / "any-pose.safetensors", goal),
+                               (AGENTS / "d3qn-adaptive.safetensors", identified),
+                               ("all", identified + goal + memory)):
+            with self.subTest(policy):
+                self.succeed("export", policy, "--onnx", "policy.onnx")
+                model = onnx.load(self.folder / "policy.onnx")
+                about = {entry.key: entry.value for entry in model.metadata_props}
+                observation = json.loads(about["observation"])
+                self.assertEqual([entry["name"] for entry in observation[8:]], inputs)
+                self.assertEqual(len({entry["meaning"] for entry in observation[8:]}),
+                                 len(inputs) - (goal[0] in inputs))
+                ((_, size),) = shapes(model.graph.input).values()
+                self.assertEqual(size, len(observation))
 
     def test_the_documentation(self):
         """The page's Python code runs, and the page names every output and every metadatum."""

@@ -13,8 +13,31 @@
 namespace upswing::deploy {
 namespace {
 
-/// The inputs of the double pendulum's observation (Observe of pendulum/task.h).
-std::vector<NamedInput> PendulumInputs(const Scale& scale, int memory) {
+/// The meanings of the inputs that identification adds, in the order of their names in
+/// ObservationInfo::identified.
+std::vector<std::string> IdentifiedMeanings() {
+  const auto constant = [](const char* what) {
+    return Concat("identified ", what, ", share above nominal over ", kConstantScale);
+  };
+  return {constant("inertia about joint 1, link 2 as a point"),
+          constant("inertia of link 2 about joint 2"),
+          constant("coupling: mass 2, length 1, centre 2"),
+          constant("gravity about joint 1, link 2 as a point"),
+          constant("gravity on link 2 about joint 2"),
+          constant("damping of joint 1"),
+          constant("damping of joint 2"),
+          "distance of the identified plant from those that the motor cannot hold",
+          "steep near 0, where the motor cannot hold the plant",
+          "energy of the identified plant: 0 hanging at rest, 1 upright",
+          "z / (1 + size of z) of the faster fall, which the motor can stop for z within +-1",
+          "z / (1 + size of z) of the slower fall",
+          "that stops both falls, over the motor's limit, within +-1"};
+}
+
+/// The inputs of the double pendulum's observation (ObservationBuilder of pendulum/observation.h).
+std::vector<NamedInput> PendulumInputs(const LoadedPolicy& loaded) {
+  const Scale scale = loaded.scale();
+  const ObservationInfo& observation = *loaded.policy->info().observation;
   const auto over = [](double scale, const char* unit) {
     return Concat(" over ", FormatNumber(scale), ' ', unit);
   };
@@ -27,7 +50,16 @@ std::vector<NamedInput> PendulumInputs(const Scale& scale, int memory) {
       {"w2", "velocity of q2" + over(kMaxVelocity2 * scale.velocity(), "rad/s")},
       {"energy", "mechanical energy: 0 hanging at rest, 1 upright at rest"},
       {"height", "height of the tip over the pivot, over the length of both links"}};
-  for (int step = 1; step <= memory; ++step) {
+  if (observation.identified) {
+    const std::vector<std::string> meanings = IdentifiedMeanings();
+    for (size_t i = 0; i < meanings.size(); ++i) {
+      inputs.push_back({observation.identified->names[i], meanings[i]});
+    }
+  }
+  for (const std::string& goal : observation.goal) {
+    inputs.push_back({goal, "1 if the link is to point up, -1 if down"});
+  }
+  for (int step = 1; step <= loaded.memory(); ++step) {
     const std::string past = Concat(step, step == 1 ? " step ago" : " steps ago");
     inputs.push_back(
         {"change of w1, " + past,
@@ -59,15 +91,17 @@ double LargestSize(std::span<const double> values) {
   return largest;
 }
 
-ExportedTask PendulumTask(double actuated_joint, const Scale& scale, int memory) {
-  return {"pendulum.c",
-          "swings up and balances a double pendulum with one motor",
-          Concat("at joint ", actuated_joint),
+ExportedTask PendulumTask(const LoadedPolicy& loaded) {
+  return {loaded.identifies() ? "adaptive.c" : "pendulum.c",
+          loaded.seeks_any_pose()
+              ? "brings a double pendulum with one motor to any of its poses of rest"
+              : "swings up and balances a double pendulum with one motor",
+          Concat("at joint ", loaded.plant.actuated_joint),
           {{"q1", "rad    angle of link 1, 0 hanging"},
            {"q2", "rad    angle of link 2 relative to link 1, 0 in line with it"},
            {"w1", "rad/s  velocity of q1"},
            {"w2", "rad/s  velocity of q2"}},
-          PendulumInputs(scale, memory)};
+          PendulumInputs(loaded)};
 }
 
 std::vector<LayerView> ExportedPolicy::ActingLayers() const {
@@ -77,18 +111,10 @@ std::vector<LayerView> ExportedPolicy::ActingLayers() const {
 }
 
 ExportedPolicy ViewForExport(const LoadedPolicy& loaded) {
-  for (const auto& [has, what] : {std::pair(loaded.identifies(), "identification of the plant"),
-                                  std::pair(loaded.seeks_any_pose(), "a choice of its goal")}) {
-    if (!has) continue;
-    throw BadInput(Concat(loaded.path, ": expected a policy without ", what,
-                          ", which exports do not contain, got one with it"));
-  }
   const std::string where = loaded.path;
   ExportedPolicy exported;
   exported.loaded = &loaded;
-  exported.task = loaded.is_foreign()
-                      ? ForeignTaskOf(loaded)
-                      : PendulumTask(loaded.plant.actuated_joint, loaded.scale(), loaded.memory());
+  exported.task = loaded.is_foreign() ? ForeignTaskOf(loaded) : PendulumTask(loaded);
   exported.policy = dynamic_cast<const NetworkPolicy*>(loaded.policy.get());
   if (exported.policy == nullptr) {
     throw BadInput(Concat(loaded.name, ": expected a learned policy, got ",

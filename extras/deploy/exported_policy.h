@@ -31,9 +31,8 @@ struct ExportedTask {
   std::vector<NamedInput> observation;  // (D)
 };
 
-/// The double pendulum with a motor at this joint and observations in units of `scale` with
-/// `memory` past steps.
-ExportedTask PendulumTask(double actuated_joint, const Scale& scale, int memory);
+/// The double pendulum as the policy observes it.
+ExportedTask PendulumTask(const LoadedPolicy& loaded);
 
 struct ExportedPolicy {
   const LoadedPolicy* loaded = nullptr;

@@ -53,6 +53,11 @@ class Identifier {
   /// Writes the numbers that identification adds to the observation of a state (kIdentifiedSize).
   void Observe(int env, const PendulumState& s, std::span<float> numbers) const;
 
+  /// What the filter starts from, for a copy of it in another language.
+  int physics_steps() const { return physics_steps_; }  // in a control period
+  double noise() const { return noise_; }               // of a measured change of velocity, rad/s
+  std::span<const double> prior() const { return prior_; }  // covariance; upper triangle by rows
+
   void State(const Archive& archive);
 
  private:

@@ -48,7 +48,7 @@ static inline policy_status policy_selftest(void) {
       float d[4];
       int i;
       policy_deviation(x[0], x[1], x[2], x[3], d);
-      policy_advance(d, policy_sample_torques[sample]);
+      policy_advance(policy_plant, d, policy_sample_torques[sample]);
       for (i = 0; i < 4; i++) {
         d[i] -= policy_sample_steps[4 * sample + i];
         if (!(fabsf(d[i]) <= 1e-4f)) return POLICY_DAMAGED;

@@ -1,12 +1,20 @@
-/* A network, from observation to torque. A file of this folder that includes it observes a task. */
-#include "numbers.c"
+/* A network, from observation to torque. A file of this folder that includes it, after numbers.c,
+ * observes a task. */
 
 typedef struct {
-  float torque; /* N m, the last one; if another one acted, a policy with memory wants it here */
+  float torque; /* N m, the last one; if another one acted, write it here */
+#ifdef POLICY_GOAL_SIZE
+  int down1, down2; /* the goal: whether each link is to point down; policy_goal sets it */
+#endif
+#ifdef POLICY_HAS_PAST
+  int running; /* whether there was a call before */
+#endif
 #ifdef POLICY_MEMORY_SIZE
   float w1, w2;                     /* rad/s, of the last call */
-  int running;                      /* whether there was one */
   float memory[POLICY_MEMORY_SIZE]; /* what the steps before it did, the latest first */
+#endif
+#ifdef POLICY_IDENTIFIED_SIZE
+  policy_identifier identifier; /* the plant */
 #endif
 } policy_state;
 
@@ -120,17 +128,34 @@ static inline policy_status policy_control_observation(const float *observation,
   return POLICY_OK;
 }
 
-/* Forgets all: for the beginning, and after any pause. */
-static inline void policy_init(policy_state *state) {
+/* Forgets the motion, but keeps the goal. */
+static inline void policy_forget(policy_state *state) {
 #ifdef POLICY_MEMORY_SIZE
   int i;
-#endif
-  if (!state) return;
-  state->torque = 0.0f;
-#ifdef POLICY_MEMORY_SIZE
   state->w1 = 0.0f;
   state->w2 = 0.0f;
-  state->running = 0;
   for (i = 0; i < POLICY_MEMORY_SIZE; i++) state->memory[i] = 0.0f;
+#endif
+#ifdef POLICY_HAS_PAST
+  state->running = 0;
+#endif
+  state->torque = 0.0f;
+}
+
+#ifdef POLICY_GOAL_SIZE
+/* Chooses the pose to reach, at any time: for each link, whether it is to point up. */
+static inline void policy_goal(policy_state *state, int up1, int up2) {
+  if (!state) return;
+  state->down1 = !up1;
+  state->down2 = !up2;
+}
+#endif
+
+/* Forgets all: for the beginning, and after any pause. */
+static inline void policy_init(policy_state *state) {
+  if (!state) return;
+  policy_forget(state);
+#ifdef POLICY_GOAL_SIZE
+  policy_goal(state, 1, 1);
 #endif
 }

@@ -6,12 +6,11 @@ static inline policy_status policy_selftest(void) {
   if (policy_checksum_of_all() != POLICY_CHECKSUM) return POLICY_DAMAGED;
   policy_init(&state);
   for (sample = 0; sample < POLICY_SAMPLES; sample++) {
-    const float *x = policy_sample_states + POLICY_STATE_SIZE * sample;
     const float *expected = policy_sample_outputs + POLICY_OUTPUT_SIZE * sample;
     float observation[POLICY_OBSERVATION_SIZE], outputs[POLICY_OUTPUT_SIZE];
     float error;
     int i;
-    policy_observe_sample(&state, x, observation);
+    if (!policy_observe_sample(&state, sample, observation)) return POLICY_DAMAGED;
     policy_outputs(observation, outputs);
     if (!policy_all_finite(outputs, POLICY_OUTPUT_SIZE)) return POLICY_DAMAGED;
     for (i = 0; i < POLICY_OUTPUT_SIZE; i++) {

@@ -1,5 +1,6 @@
 /* Begins the export of a controller. */
 #include "numbers.c"
+#include "deviation.c"
 
 typedef struct {
   float torque; /* N m, the last one */
@@ -13,14 +14,6 @@ static inline float policy_limited(float torque) {
   if (torque > POLICY_TORQUE_LIMIT) return POLICY_TORQUE_LIMIT;
   if (torque < -POLICY_TORQUE_LIMIT) return -POLICY_TORQUE_LIMIT;
   return torque;
-}
-
-/* d (4): deviation from upright at rest, the angles from -pi to pi. */
-static inline void policy_deviation(float q1, float q2, float w1, float w2, float *d) {
-  d[0] = atan2f(-sinf(q1), -cosf(q1));
-  d[1] = atan2f(sinf(q2), cosf(q2));
-  d[2] = w1;
-  d[3] = w2;
 }
 
 /* The linear-quadratic regulator: -K d. */

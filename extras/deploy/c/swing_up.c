@@ -9,7 +9,7 @@ static inline float policy_law(const float *d) {
   const float kp = policy_law_gains[POLICY_KP], kd = policy_law_gains[POLICY_KD],
               ke = policy_law_gains[POLICY_KE];
   const float w1 = d[2], w2 = d[3];
-  const policy_equations e = policy_equations_at(d);
+  const policy_equations e = policy_equations_at(policy_plant, d);
   /* Above that of rest upright. */
   const float energy = 0.5f * (e.m11 * w1 * w1 + 2.0f * e.m12 * w1 * w2 + e.m22 * w2 * w2) -
                        policy_plant[POLICY_G1] * (1.0f - cosf(d[0])) -

@@ -5,10 +5,7 @@
 static inline void policy_off_plan(const float *d, int step, float sign, float *off) {
   int i;
   for (i = 0; i < 4; i++) off[i] = d[i] - sign * policy_plan[4 * step + i];
-  for (i = 0; i < 2; i++) {
-    if (off[i] > 3.1415927f) off[i] -= 6.2831853f;
-    if (off[i] < -3.1415927f) off[i] += 6.2831853f;
-  }
+  for (i = 0; i < 2; i++) off[i] = policy_wrapped(off[i]);
 }
 
 static inline float policy_cost_of_place(const float *d, int step, float sign) {
