@@ -185,7 +185,7 @@ void AddPlan(const LoadedPolicy& loaded, const ControllerConfig& config, CParts&
 struct CController {
   const char* name;
   const char* file;       // of extras/deploy/c
-  int state_bytes;        // of its struct
+  size_t state_bytes;     // of its struct; 0: `add` tells
   bool simulates = true;  // whether it looks ahead near upright
   /// Adds its constants, and its work at each decision.
   void (*add)(const LoadedPolicy& loaded, const ControllerConfig& config, CParts& parts);
@@ -196,6 +196,7 @@ constexpr CController kControllersInC[] = {
     {.name = "energy", .file = "swing_up.c", .state_bytes = 4, .add = AddEnergyShaping},
     {.name = "pfl", .file = "swing_up.c", .state_bytes = 4, .add = AddPartialFeedback},
     {.name = "tvlqr", .file = "tvlqr.c", .state_bytes = 12, .add = AddPlan},
+    {.name = "mpc", .file = "mpc.c", .state_bytes = 0, .add = AddPredictive},
 };
 
 /// Why a controller has no C code.
@@ -205,9 +206,6 @@ struct WithoutC {
 };
 
 constexpr WithoutC kWithoutC[] = {
-    {"mpc",
-     "a controller that optimises a trajectory at each decision; tvlqr follows one that is planned "
-     "once"},
     {"hybrid", "two of them; export the policy that swings up, and lqr, each by itself"},
 };
 
@@ -261,13 +259,13 @@ CHeader ControllerHeaderOf(const LoadedPolicy& loaded, const std::string& prefix
   const ControllerConfig config = ConfigOf(loaded);
   CParts parts;
   DescribeController(loaded, config.plant, controller.file, parts);
+  parts.state_bytes = controller.state_bytes;
+  // The deviation; a simulating controller also copies it, and needs five arrays for a step.
+  parts.stack_bytes = 4 * sizeof(float) * (controller.simulates ? 7 : 1);
   controller.add(loaded, config, parts);
-  AddSelfTest(loaded, config.plant, controller.simulates, parts);
+  if (parts.samples.empty()) AddSelfTest(loaded, config.plant, controller.simulates, parts);
   CHeader header;
   header.prefix = prefix;
-  header.state_bytes = controller.state_bytes;
-  // The deviation; a simulating controller also copies it, and needs five arrays for a step.
-  header.stack_bytes = 4 * sizeof(float) * (controller.simulates ? 7 : 1);
   WriteHeader(parts, header);
   return header;
 }

@@ -113,23 +113,32 @@ std::string HeadComment(const CParts& parts, const CHeader& header) {
     apply = "act";
     inputs = ForeignInputs(parts, caps);
   }
+  size_t sample_bytes = 0;
+  for (const CArray& array : parts.samples) sample_bytes += 4 * array.values.size();
+  const std::string choice =
+      parts.has_goal
+          ? Concat(" *   ", name, "_goal(&state, 1, 0);   at any time: the pose to reach, 1 for a ",
+                   "link that is to point up, else 0\n")
+          : "";
   const std::string comment = Concat(
       "/* A policy that ", goal, ", as one C99 header.\n *\n",
       Paragraph(Concat(parts.origin, ". Written by Upswing ", UPSWING_VERSION, '.')),
       "\n *\n *   static ", name, "_state state;\n *   float torque;\n *   if (", name,
       "_selftest() != ", caps, "_OK) stop();\n *   ", name,
-      "_init(&state);   before the first step, and after any pause\n *   for (;;) {   every ", when,
-      "\n *     ", name, "_control(&state, ", input, ", &torque);\n *     ", apply,
-      "(torque);\n *   }\n *\n", inputs, PlantParagraph(parts),
+      "_init(&state);   before the first step, and after any pause\n", choice,
+      " *   for (;;) {   every ", when, "\n *     ", name, "_control(&state, ", input,
+      ", &torque);\n *     ", apply, "(torque);\n *   }\n *\n", inputs, PlantParagraph(parts),
       R"c( * The status reports null pointers and numbers that are not finite: the torque is then 0, and the
  * memory is cleared, as after )c",
-      name, "_init.\n *\n",
-      Paragraph(Concat("Flash: ", header.constant_bytes,
-                       " bytes of constants, 1 to 3 KB of code, and up to 1 KB of samples where "
-                       "the self test is used; on AVR constants and samples lie in RAM, too. RAM: ",
+      name, "_init", parts.has_goal ? "; the goal stays" : "", ".\n *\n",
+      parts.note.empty() ? "" : Replaced(Paragraph(parts.note), "policy_", name + "_") + "\n *\n",
+      Paragraph(Concat("Flash: ", header.constant_bytes, " bytes of constants, ", parts.code,
+                       " of code, and ", sample_bytes,
+                       " bytes of samples where the self test is "
+                       "used; on AVR constants and samples lie in RAM, too. RAM: ",
                        header.state_bytes, " bytes of state. Stack of a call: arrays of ",
                        header.stack_bytes,
-                       " bytes, and up to 170 bytes of frames besides those of "
+                       " bytes, and up to 200 bytes of frames besides those of "
                        "the math library. Work of a call: ",
                        parts.work)),
       "\n *\n * All arithmetic is in float. Nothing is allocated, and nothing is static but "
@@ -153,6 +162,8 @@ void AddEquations(const Plant& plant, int physics_steps, CParts& parts) {
 }
 
 void WriteHeader(const CParts& parts, CHeader& header) {
+  header.state_bytes = parts.state_bytes;
+  header.stack_bytes = parts.stack_bytes;
   for (const CArray& array : parts.constants) header.constant_bytes += 4 * array.values.size();
   const std::string& name = header.prefix;
   const std::string caps = UpperCase(name);

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "agents/controllers.h"
 #include "extras/deploy/export.h"
 #include "extras/deploy/exported_policy.h"
 
@@ -30,18 +31,23 @@ std::vector<float> Floats(const auto& numbers) { return {numbers.begin(), number
 
 /// The parts of a C header. Names of macros and arrays lack the prefix.
 struct CParts {
-  ExportedTask task;      // its state gives the arguments of the control function
-  std::string origin;     // origin of the policy
-  double limit = 0;       // N m
-  double period = 0;      // s
-  Plant plant;            // of the training, or the design plant
-  std::string plant_use;  // what the policy takes from the plant; empty: nothing
-  std::string work;       // work of a call
+  ExportedTask task;               // its state gives the arguments of the control function
+  std::string origin;              // origin of the policy
+  double limit = 0;                // N m
+  double period = 0;               // s
+  Plant plant;                     // of the training, or the design plant
+  std::string plant_use;           // what the policy takes from the plant; empty: nothing
+  std::string work;                // work of a call
+  std::string note = {};           // what else a user needs to know; empty: nothing
+  std::string code = "1 to 3 KB";  // size in flash
+  bool has_goal = false;           // whether the goal is chosen at run time
   /// Name, and value with a comment.
   std::vector<std::pair<std::string, std::string>> macros;
   std::vector<CArray> constants;  // covered by the checksum
   std::string layers;             // definition of the table of layers, if there is one
   std::vector<CArray> samples;    // for the self-test
+  size_t state_bytes = 0;         // of the struct
+  size_t stack_bytes = 0;         // of the arrays of a call
 };
 
 /// N samples for a C header's self-test: states one control period apart, with the policy's
@@ -62,11 +68,14 @@ void AddEquations(const Plant& plant, int physics_steps, CParts& parts);
 /// Names of the controllers that have C code.
 std::vector<std::string> ControllersInC();
 
+/// Adds the tables, macros and samples of the controller mpc.
+void AddPredictive(const LoadedPolicy& loaded, const ControllerConfig& config, CParts& parts);
+
 /// The C header of a controller with C code. CHeaderOf checks the prefix. Throws BadInput for other
 /// policies.
 CHeader ControllerHeaderOf(const LoadedPolicy& loaded, const std::string& prefix);
 
-/// Writes `text` and the number of constants. `header` already has the sizes in RAM and the prefix.
+/// Writes the text and the sizes of `header`, which already has the prefix.
 void WriteHeader(const CParts& parts, CHeader& header);
 
 }  // namespace upswing::deploy

@@ -19,8 +19,8 @@ constexpr size_t kLongestPrefix = 32;
 constexpr int kBlockRows = 8;  // see linear in extras/deploy/c/network.c
 // Of an identified number of the self-test; they are of size 1, and rounding changes them by 1e-4.
 constexpr double kIdentifiedTolerance = 1e-3;
-// Numbers in the arrays of an update of the estimates, with those of a Runge-Kutta step.
-constexpr size_t kIdentifiedArrays = 56;
+// Numbers in the arrays of an update of the estimates. A compiler keeps them in the caller's frame.
+constexpr size_t kIdentifiedArrays = 100;
 
 /// The weights (out × in) in the order of the function linear in extras/deploy/c/network.c: blocks
 /// of rows, each column by column, then the remaining rows.
@@ -164,9 +164,8 @@ NetworkSizes SizesOf(const ExportedPolicy& policy, const std::vector<LayerView>&
   return sizes;
 }
 
-/// The header before WriteHeader: its prefix, and the sizes in RAM.
-CHeader EmptyHeader(const ExportedPolicy& policy, const NetworkSizes& sizes,
-                    const std::string& prefix) {
+/// Adds the sizes in RAM.
+void AddSizes(const ExportedPolicy& policy, const NetworkSizes& sizes, CParts& parts) {
   constexpr size_t kFloat = 4;  // bytes
   const LoadedPolicy& loaded = *policy.loaded;
   const int memory = loaded.memory();
@@ -175,15 +174,10 @@ CHeader EmptyHeader(const ExportedPolicy& policy, const NetworkSizes& sizes,
   if (memory > 0) state += static_cast<size_t>(2 + kMemorySize * memory);
   if (loaded.identifies()) state += kConstants + kConstants * (kConstants + 1) / 2 + 4;
   if (loaded.seeks_any_pose()) state += kGoalSize;
-  const auto network = static_cast<size_t>(sizes.outputs + 2 * sizes.widest);
-  CHeader header;
-  header.prefix = prefix;
-  header.state_bytes = kFloat * state;
-  // The arrays of identification are gone when the network computes.
-  header.stack_bytes = kFloat * (static_cast<size_t>(policy.obs_size()) +
-                                 std::max(network, loaded.identifies() ? kIdentifiedArrays : 0));
-  header.multiply_adds = sizes.multiply_adds;
-  return header;
+  parts.state_bytes = kFloat * state;
+  parts.stack_bytes =
+      kFloat * (static_cast<size_t>(policy.obs_size() + sizes.outputs + 2 * sizes.widest) +
+                (loaded.identifies() ? kIdentifiedArrays : 0));
 }
 
 /// The work of a call, as text that ends a sentence.
@@ -210,6 +204,12 @@ void AddDescription(const ExportedPolicy& policy, const NetworkSizes& sizes, CPa
   parts.limit = policy.limit;
   parts.period = *learned.info().control_period;
   parts.work = WorkOf(policy, sizes);
+  parts.has_goal = policy.loaded->seeks_any_pose();
+  if (!policy.loaded->identifies()) return;
+  parts.code = "4 to 7 KB";
+  parts.note =
+      "Identification needs the torque that acted. If it is not the one that policy_control "
+      "returned, write it to state.torque before the next call.";
 }
 
 /// Adds the tables with which extras/deploy/c/network.c computes.
@@ -300,7 +300,10 @@ CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
   if (!samples.identified.empty()) {
     parts.samples.push_back({"sample_identified", "of the plant", samples.identified});
   }
-  CHeader header = EmptyHeader(policy, sizes, prefix);
+  AddSizes(policy, sizes, parts);
+  CHeader header;
+  header.prefix = prefix;
+  header.multiply_adds = sizes.multiply_adds;
   WriteHeader(parts, header);
   return header;
 }

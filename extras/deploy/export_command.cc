@@ -56,7 +56,7 @@ int ExportC(const ExportArguments& a) {
              header.prefix);
   fmt::print("  flash       {} bytes of constants\n", FormatCount(header.constant_bytes));
   fmt::print(
-      "  RAM         {} bytes of state; stack of a call: {} bytes of arrays, and up to 170 more\n",
+      "  RAM         {} bytes of state; stack of a call: {} bytes of arrays, and up to 200 more\n",
       FormatCount(header.state_bytes), FormatCount(header.stack_bytes));
   const std::string period = FormatNumber(*loaded.policy->info().control_period);
   if (header.multiply_adds > 0) {

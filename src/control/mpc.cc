@@ -44,6 +44,13 @@ std::unique_ptr<Policy::Memory> MpcPolicy::Start(int num_envs) const {
   return std::make_unique<Plans>(num_envs, plant());
 }
 
+std::unique_ptr<Policy::Memory> MpcPolicy::StartFrom(
+    const Trajectory& plan, const std::vector<Eigen::RowVector4d>& K) const {
+  auto plans = std::make_unique<Plans>(1, plant());
+  plans->plans[0] = {plan, K};
+  return plans;
+}
+
 Trajectory MpcPolicy::FirstPlan(TrajectoryOptimizer& optimizer, const StateVector& x,
                                 size_t T) const {
   const auto guesses = static_cast<int>(config_.guesses);

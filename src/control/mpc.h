@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "control/lqr.h"
 #include "control/settings.h"
@@ -18,6 +19,10 @@ class MpcPolicy : public PendulumController {
 
   std::string description() const override;
   std::unique_ptr<Memory> Start(int num_envs) const override;
+  /// Begins one environment with a plan (T) and feedback (T) about it, as if a decision had made
+  /// them.
+  std::unique_ptr<Memory> StartFrom(const Trajectory& plan,
+                                    const std::vector<Eigen::RowVector4d>& K) const;
 
  private:
   struct Plans;

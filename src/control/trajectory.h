@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <limits>
 #include <span>
 #include <vector>
@@ -43,6 +44,8 @@ class QuadraticCost {
   CostExpansion ExpandRunning(const StateVector& x, double u) const;
   /// Expands the final cost, which depends only on the state.
   CostExpansion ExpandFinal(const StateVector& x) const;
+  /// The largest angles of a goal, with full turns, of each joint (rad).
+  std::array<double, 2> largest_uprights() const { return {largest_upright1_, largest_upright2_}; }
 
  private:
   StateVector Deviation(const StateVector& x) const;
@@ -50,7 +53,7 @@ class QuadraticCost {
   Eigen::Matrix4d Q_;
   double R_;
   Eigen::Matrix4d P_;
-  double largest_upright1_, largest_upright2_;  // largest angles of a goal, rad
+  double largest_upright1_, largest_upright2_;  // rad
 };
 
 /// Finds locally best torques within the plant's limit. It keeps its buffers, so one object serves

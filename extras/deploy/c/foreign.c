@@ -2,7 +2,8 @@
 #include "numbers.c"
 #include "network.c"
 
-/* Writes the observation of a sample. Returns whether it is the program's: here it is the sample. */
+/* Writes the observation of a sample. Returns whether it is the program's: here it is the sample.
+ */
 static inline int policy_observe_sample(policy_state *state, int sample, float *observation) {
   int i;
   for (i = 0; i < POLICY_STATE_SIZE; i++) {

@@ -7,3 +7,4 @@ static inline float policy_choose(policy_state *state, const float *d) {
 }
 
 #include "controller.c"
+#include "controller_test.c"

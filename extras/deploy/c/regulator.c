@@ -8,6 +8,17 @@ typedef struct {
   int step;   /* of the plan; -1: not begun */
   float sign; /* -1: on the plan's mirror image */
 #endif
+#ifdef POLICY_HORIZON
+  int planned;                       /* whether there is a plan, from the last call */
+  float cost;                        /* of the plan */
+  float x[POLICY_HORIZON + 1][4];    /* its deviations from upright; angles count full turns */
+  float u[POLICY_HORIZON];           /* its torques, N m */
+  float feedback[POLICY_HORIZON][4]; /* N m/rad, N m s/rad */
+  float change[POLICY_HORIZON];      /* of the torques, by an iteration, N m */
+#if POLICY_GUESSES > 1
+  float best[POLICY_HORIZON]; /* torques of the cheapest first plan, N m */
+#endif
+#endif
 } policy_state;
 
 static inline float policy_limited(float torque) {

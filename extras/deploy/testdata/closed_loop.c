@@ -12,6 +12,11 @@
 
 #define STEPS 1000 /* of 0.02 s */
 #define PI 3.14159265358979323846
+#ifdef POLICY_ACTUATED_JOINT
+#define JOINT POLICY_ACTUATED_JOINT
+#else
+#define JOINT 1
+#endif
 
 enum { J1, J2, B, A, G1, G2, D1, D2, Q1, Q2, W1, W2, UP1, UP2, WIDTH };
 
@@ -19,8 +24,9 @@ static void rate_of(const double *p, const double *s, double torque, double *rat
 {
   const double bc = p[B] * cos(s[1]), bs = p[B] * sin(s[1]), g2 = p[G2] * sin(s[0] + s[1]);
   const double m11 = p[J1] + p[J2] + 2 * bc, m12 = p[J2] + bc, m22 = p[J2] + p[A];
-  const double r1 = torque + bs * (2 * s[2] + s[3]) * s[3] - p[G1] * sin(s[0]) - g2 - p[D1] * s[2];
-  const double r2 = -bs * s[2] * s[2] - g2 - p[D2] * s[3];
+  const double r1 = torque * (JOINT == 1) + bs * (2 * s[2] + s[3]) * s[3] - p[G1] * sin(s[0]) - g2 -
+                    p[D1] * s[2];
+  const double r2 = torque * (JOINT == 2) - bs * s[2] * s[2] - g2 - p[D2] * s[3];
   const double det = m11 * m22 - m12 * m12;
   rate[0] = s[2];
   rate[1] = s[3];
