@@ -139,7 +139,9 @@ class HeadersTest(HeaderTest):
         for name, options, begins in (("lqr", ["--lqr-torque", 2], ["3.12,0,0,0"]),
                                       ("energy", [], ["0,0,0,0"]), ("pfl", [], ["0.5,0.3,0,1"]),
                                       ("tvlqr", [], ["0,0,0,0", "-1,2,0,0"]),
-                                      ("tvlqr", ["--made-for", "actuated_joint=2"], ["0,0,0,0"])):
+                                      ("tvlqr", ["--made-for", "actuated_joint=2"], ["0,0,0,0"]),
+                                      ("tvlqr", ["--made-for", "coulomb1=2e-4", "--made-for",
+                                                 "coulomb2=2e-4"], ["0,0,0,0"])):
             self.succeed("export", name, *options, "--c", "policy.h")
             self.write("driver.c", driver)
             self.compile("driver.c", "-O1", "-Wconversion", *SANITIZE)
@@ -323,7 +325,7 @@ class HeadersTest(HeaderTest):
         self.assertEqual(4 * sum(sizes), constants)
         self.write("size.c", '#include "policy.h"\n#include <stdio.h>\nint main(void) '
                              '{ printf("%d", (int)sizeof(policy_state)); return 0; }')
-        for name, state in (("fast", 4), ("d3qn-randomized", 4 + 8 + 4 + 48)):
+        for name, state in (("fast", 4), ("d3qn-randomized", 4 + 8 + 4 + 48), ("any-pose", 12)):
             printed = self.succeed("export", AGENTS / f"{name}.safetensors", "--c", "policy.h")
             self.compile("size.c")
             size = subprocess.run([self.folder / "program"], check=True, stdout=subprocess.PIPE)
@@ -422,10 +424,13 @@ class DocumentedTest(ProgramTest):
 
     def test_every_name_is_explained(self):
         text = (ROOT / "docs/howto/export.md").read_text(encoding="utf-8")
-        self.succeed("export", AGENTS / "fast.safetensors", "--c", "policy.h")
-        header = (self.folder / "policy.h").read_text(encoding="ascii")
-        for name in re.findall(r"^#define (POLICY_\w+) ", header, re.MULTILINE):
-            self.assertIn(f"`{name}`", text)
+        agents = [[AGENTS / f"{name}.safetensors"]
+                  for name in ("fast", "d3qn-randomized", "any-pose", "d3qn-adaptive")]
+        for policy in [*agents, ["mpc", "--mpc-angle-range", 4, "--mpc-velocity", 9]]:
+            self.succeed("export", *policy, "--c", "policy.h")
+            header = (self.folder / "policy.h").read_text(encoding="ascii")
+            for name in re.findall(r"^#define (POLICY_\w+) ", header, re.MULTILINE):
+                self.assertIn(f"`{name}`", text)
 
 
 class SwingUpTest(ProgramTest):
