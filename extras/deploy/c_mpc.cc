@@ -1,4 +1,5 @@
 // The controller mpc for extras/deploy/c/mpc.c.
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -15,15 +16,16 @@
 namespace upswing::deploy {
 namespace {
 
-constexpr int kPlanSamples = 4;   // each costs as much as about three calls
-constexpr int kPlanDraws = 1000;  // of a sample
-constexpr double kPlanTorqueShare =
-    2e-3;                                // tolerance of a sample's torque, as a share of the limit
-constexpr double kPlanCostShare = 1e-3;  // tolerance of a sample's costs
-constexpr double kPlanNearby = 1e-5;     // rad, rad/s: more than the rounding of float
-constexpr double kPlanSmaller = 64;      // the states near upright are samples over this
-constexpr int kFirstIterations = 100;    // of the first plan, as in control/mpc.cc
-const StateVector kPlanRange(3.14, 3.14, 4, 4);  // ± range of samples, rad, rad/s
+constexpr int kPlanSamples = 4;            // each costs as much as about two calls
+constexpr int kPlanDraws = 1000;           // of a sample
+constexpr double kPlanTorqueShare = 5e-3;  // tolerance of a torque, as a share of the limit
+constexpr double kPlanCostShare = 1e-2;    // tolerance of a cost, as a share of it
+constexpr double kSmooth = 0.25;           // share of the tolerances that a change near by may use
+constexpr double kPlanNearby = 1e-4;       // rad, natural velocity: what rounding adds up to
+constexpr int kPlanNeighbours = 24;        // states near by that are tried
+constexpr double kPlanRange = 1.5;         // of samples about hanging, rad, natural velocity
+constexpr double kCalmest = 0.1;           // least share of this range
+constexpr double kDrawsUntilCalm = 20;     // until this share
 
 int HorizonOf(const ControllerConfig& config) {
   return static_cast<int>(std::lround(config.mpc.seconds / config.plant.control_period));
@@ -33,8 +35,8 @@ int HorizonOf(const ControllerConfig& config) {
 /// next state of that plan, and the cost of the regulator from near upright.
 struct SampleResult {
   StateVector next;                    // deviation from upright
-  double improved_cost, held_cost;     //
   std::array<double, 2> torques = {};  // N·m, of the plan and of the call
+  double cost = 0;                     // of the plan
 };
 
 /// Computes samples of one controller.
@@ -56,7 +58,7 @@ class Sampler {
     Trajectory plan =
         optimizer_.Follow(cost_, FromUpright(deviation), std::vector<double>(steps_, 0.0));
     optimizer_.Improve(cost_, 0, 1, plan);
-    result.improved_cost = plan.cost;
+    result.cost = plan.cost;
     result.torques[0] = plan.u[0];
     result.next = UprightDeviation(plan.x[1]);
     const auto seen = Observe(loaded_.plant, StateOf(plan.x[1]), loaded_.scale());
@@ -65,31 +67,47 @@ class Sampler {
         dynamic_cast<const MpcPolicy&>(*loaded_.policy).StartFrom(plan, optimizer_.gains());
     loaded_.policy->Act({obs.data(), 1, static_cast<int>(obs.size())}, {&result.torques[1], 1, 1},
                         *memory);
-    const Trajectory upright{std::vector<StateVector>(steps_ + 1, FromUpright({0, 0, 0, 0})),
-                             std::vector<double>(steps_, 0.0), 0};
-    const std::vector<Eigen::RowVector4d> K(steps_, -lqr_.K);
-    const StateVector near = deviation / kPlanSmaller;
-    result.held_cost = optimizer_.Follow(cost_, FromUpright(near), upright, K).cost;
     return result;
   }
 
-  /// Whether rounding the state leaves the results as they are, within half of the tolerances.
-  bool IsSmooth(const StateVector& x, const SampleResult& here) {
-    for (int k = 0; k < 4; ++k) {
-      for (const double step : {-kPlanNearby, kPlanNearby}) {
-        const SampleResult there = ResultAt(x + step * StateVector::Unit(k));
-        for (size_t i = 0; i < here.torques.size(); ++i) {
-          const double change = std::abs(there.torques[i] - here.torques[i]);
-          if (change > kPlanTorqueShare / 2 * loaded_.plant.torque_limit) return false;
-        }
-        const double change = std::abs(there.improved_cost - here.improved_cost);
-        if (change > kPlanCostShare / 2 * here.improved_cost) return false;
+  /// The cost of the regulator from a deviation.
+  double HeldCost(const StateVector& deviation) {
+    const Trajectory upright{std::vector<StateVector>(steps_ + 1, FromUpright({0, 0, 0, 0})),
+                             std::vector<double>(steps_, 0.0), 0};
+    const std::vector<Eigen::RowVector4d> K(steps_, -lqr_.K);
+    return optimizer_.Follow(cost_, FromUpright(deviation), upright, K).cost;
+  }
+
+  /// Whether what rounding adds up to leaves the results well within the tolerances: no step size
+  /// of the optimiser's search wins narrowly.
+  bool IsSmooth(const StateVector& x, const SampleResult& here, Rng& rng) {
+    for (int i = 0; i < kPlanNeighbours; ++i) {
+      const SampleResult there = ResultAt(x + Offset(kPlanNearby, rng));
+      for (size_t k = 0; k < here.torques.size(); ++k) {
+        const double change = std::abs(there.torques[k] - here.torques[k]);
+        if (change > kSmooth * kPlanTorqueShare * loaded_.plant.torque_limit) return false;
       }
+      const double change = std::abs(there.cost - here.cost);
+      if (change > kSmooth * kPlanCostShare * here.cost) return false;
     }
     return true;
   }
 
+  /// Draws a state of floats around hanging. Later draws are calmer, as a plan is smooth there.
+  StateVector DrawState(Rng& rng, int draw) const {
+    const double share = std::max(kCalmest, 1 - draw / kDrawsUntilCalm);
+    return Offset(share * kPlanRange, rng).cast<float>().cast<double>();
+  }
+
  private:
+  /// A random difference of states: up to `range` in rad, and in natural velocity.
+  StateVector Offset(double range, Rng& rng) const {
+    const double velocity = range * TaskScaleOf(loaded_.plant).velocity();
+    StateVector x;
+    for (int k = 0; k < 4; ++k) x[k] = rng.Uniform(-1, 1) * (k < 2 ? range : velocity);
+    return x;
+  }
+
   const LoadedPolicy& loaded_;
   Lqr lqr_;
   QuadraticCost cost_;
@@ -97,40 +115,52 @@ class Sampler {
   size_t steps_;
 };
 
-/// A random state of floats.
-StateVector DrawPlanState(Rng& rng) {
-  StateVector x;
-  for (int k = 0; k < 4; ++k) x[k] = static_cast<float>(rng.Uniform(-1, 1) * kPlanRange[k]);
-  return x;
+/// Draws a state whose results rounding hardly changes.
+StateVector DrawSmoothState(const LoadedPolicy& loaded, Sampler& sampler, Rng& rng) {
+  for (int draw = 0; draw < kPlanDraws; ++draw) {
+    const StateVector x = sampler.DrawState(rng, draw);
+    if (sampler.IsSmooth(x, sampler.ResultAt(x), rng)) return x;
+  }
+  throw BadInput(Concat(loaded.name, ": found no states for the header's self-test where the ",
+                        "plan is smooth enough"));
+}
+
+/// The share, a power of 2, of the samples' deviations from which the regulator uses at most half
+/// of the motor's torque.
+double HeldShare(const std::vector<StateVector>& samples, const Lqr& lqr, double limit) {
+  double share = 1;
+  for (const StateVector& x : samples) {
+    while (share * std::abs(lqr.Torque(UprightDeviation(x))) > limit / 2) share /= 2;
+  }
+  return share;
 }
 
 void AddPlanSamples(const LoadedPolicy& loaded, Sampler& sampler, CParts& parts) {
   Rng rng(0, "samples of the C header of mpc");
-  std::vector<double> states, next, costs, torques;
+  std::vector<StateVector> samples;
   for (int i = 0; i < kPlanSamples; ++i) {
-    StateVector x = DrawPlanState(rng);
-    SampleResult result = sampler.ResultAt(x);
-    for (int draw = 1; !sampler.IsSmooth(x, result); ++draw) {
-      if (draw == kPlanDraws) {
-        throw BadInput(Concat(loaded.name, ": found no states for the header's self-test where ",
-                              "the plan is smooth enough"));
-      }
-      x = DrawPlanState(rng);
-      result = sampler.ResultAt(x);
-    }
+    samples.push_back(DrawSmoothState(loaded, sampler, rng));
+  }
+  const double share = HeldShare(samples, sampler.lqr(), loaded.plant.torque_limit);
+  std::vector<double> states, next, costs, torques;
+  for (const StateVector& x : samples) {
+    const SampleResult result = sampler.ResultAt(x);
     states.insert(states.end(), x.begin(), x.end());
     next.insert(next.end(), result.next.begin(), result.next.end());
-    costs.insert(costs.end(), {result.improved_cost, result.held_cost});
+    costs.insert(costs.end(), {result.cost, sampler.HeldCost(share * UprightDeviation(x))});
     torques.insert(torques.end(), result.torques.begin(), result.torques.end());
   }
   parts.samples = {{"sample_states", "q1, q2, w1, w2", Floats(states)},
                    {"sample_next", "deviations a control period later", Floats(next)},
                    {"sample_costs", "of a plan, of the regulator", Floats(costs)},
                    {"sample_torques", "N m: of the plan, of a call", Floats(torques)}};
+  const auto add = [&](const char* name, double value, const char* comment) {
+    parts.macros.emplace_back(name, CLiteral(static_cast<float>(value)) + comment);
+  };
   parts.macros.emplace_back("SAMPLES", Concat(kPlanSamples));
-  parts.macros.emplace_back(
-      "TORQUE_TOLERANCE",
-      CLiteral(static_cast<float>(kPlanTorqueShare * loaded.plant.torque_limit)));
+  add("TORQUE_TOLERANCE", kPlanTorqueShare * loaded.plant.torque_limit, " /* N m */");
+  add("COST_TOLERANCE", kPlanCostShare, " /* as a share */");
+  add("HELD_SHARE", share, " /* of a sample, from which the regulator holds */");
 }
 
 /// Adds the settings that mpc has for real machines, if they are on.
@@ -169,8 +199,8 @@ void AddPredictive(const LoadedPolicy& loaded, const ControllerConfig& config, C
        Floats(std::array{scale.time * scale.time, 1 / (scale.torque * scale.torque)})});
   parts.macros.emplace_back("HORIZON", Concat(horizon, " /* control periods */"));
   parts.macros.emplace_back("ITERATIONS", Concat(config.mpc.iterations, " /* of a call */"));
-  parts.macros.emplace_back("FIRST_ITERATIONS",
-                            Concat(kFirstIterations, " /* at most, of the first call */"));
+  parts.macros.emplace_back(
+      "FIRST_ITERATIONS", Concat(MpcPolicy::kFirstIterations, " /* at most, of the first call */"));
   parts.macros.emplace_back("GUESSES", Concat(guesses, " /* of the first plan */"));
   AddMachineSettings(config.mpc, sampler.cost(), parts);
   AddPlanSamples(loaded, sampler, parts);
@@ -182,14 +212,15 @@ void AddPredictive(const LoadedPolicy& loaded, const ControllerConfig& config, C
   parts.code = "4 to 8 KB";
   parts.note = Concat(
       "The first call after policy_init makes a plan, and takes as long as up to ",
-      kFirstIterations * (guesses > 1 ? guesses + 1 : 1) / static_cast<int>(config.mpc.iterations),
+      MpcPolicy::kFirstIterations * (guesses > 1 ? guesses + 1 : 1) /
+          static_cast<int>(config.mpc.iterations),
       " calls: make it before the motion, and set its torque a period before the next call. The "
       "self-test takes as long as about 8 calls, and has a state on its stack.");
   const auto derivatives = static_cast<size_t>(4 * config.plant.physics_steps()) * T;
   parts.work = Concat(
       config.mpc.iterations, " iterations, each of ", derivatives,
       " derivatives with their own derivatives and up to ", 17 * derivatives,
-      " without; the first call after policy_init takes up to ", kFirstIterations,
+      " without; the first call after policy_init takes up to ", MpcPolicy::kFirstIterations,
       guesses > 1 ? Concat(" iterations for each of ", guesses, " guesses.") : " iterations.");
 }
 

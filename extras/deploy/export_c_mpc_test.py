@@ -107,6 +107,15 @@ class MpcTest(HeaderTest):
                 self.write("policy.h", whole.replace(right, wrong))
                 self.assertEqual(self.self_test(), 3)
 
+    def test_self_test_on_other_plants(self):
+        for plant in ("mass1=8 mass2=11 length1=0.8 length2=1.1 gravity=3.1 torque_limit=29 actuated_joint=2",
+                      "mass1=0.1 mass2=0.19 length1=1 length2=2.7 gravity=8 damping=0.01 torque_limit=1.6",
+                      "mass1=5.9 mass2=2.1 length1=0.17 length2=0.09 damping=0.003 torque_limit=4.2"):
+            with self.subTest(plant):
+                flags = [f"--made-for={change}" for change in plant.split()]
+                self.succeed("export", "mpc", *flags, "--c", "policy.h")
+                self.assertEqual(self.self_test(), 0)
+
     def test_numbers_that_are_not_finite(self):
         """The plan is then forgotten, and the next call is like the first."""
         self.succeed("export", "mpc", "--mpc-seconds", 0.5, "--c", "policy.h")

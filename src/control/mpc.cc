@@ -10,8 +10,6 @@
 namespace upswing {
 namespace {
 
-/// Iterations for the first plan of an episode, which has no previous plan.
-constexpr int kFirstIterations = 100;
 constexpr double kTolerance = 1e-6;  // relative gain of an iteration
 
 }  // namespace

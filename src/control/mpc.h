@@ -14,6 +14,9 @@ namespace upswing {
 /// and stabilization of complex behaviors through online trajectory optimization" (IROS 2012).
 class MpcPolicy : public PendulumController {
  public:
+  /// Most iterations for the first plan of an episode, which has no previous plan.
+  static constexpr int kFirstIterations = 100;
+
   /// Throws as SolveLqr does.
   MpcPolicy(LqrConfig lqr, MpcConfig config, const DesignPlant& plant);
 
