@@ -364,7 +364,67 @@ class LauncherTest(ProgramTest):
         done = self.launch("tr\x1bian", "--agent", "fast")
         self.assertEqual((done.returncode, done.stdout), (2, ""))
         self.assertIn("upswing: expected a command, one of train, eval, ", done.stderr)
-        self.assertTrue(done.stderr.endswith('; got "trian"\n'), done.stderr)
+        self.assertTrue(done.stderr.endswith('; got "trian" (did you mean train?)\n'), done.stderr)
+        for word, meant in (("Tranin", "train"), ("evl", "eval"), ("rnu", "run"), ("machin", "machine"),
+                            ("fak", "fake"), ("comapre", "compare")):
+            self.assert_one_line(self.launch(word), 2, f'; got "{word}" (did you mean {meant}?)')
+        for word in ("launch", "zzz", "7", "x" * 10000):
+            done = self.launch(word)
+            self.assert_one_line(done, 2, f'; got "{word}"')
+            self.assertNotIn("did you mean", done.stderr)
+
+    def stub(self, name, script):
+        """Puts a program first on the PATH of self.stubbed()."""
+        path = self.folder / "stubs" / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(f"#!/bin/sh\n{script}\n")
+        path.chmod(0o755)
+
+    def stubbed(self, *arguments):
+        """Launches with the programs of stub()."""
+        path = f"{self.folder / 'stubs'}:{os.environ['PATH']}"
+        return self.launch(*arguments, env=os.environ | {"PATH": path})
+
+    def make_build(self, place, *folders):
+        """Build folders as CMake and Python make them in the repository `place`."""
+        for folder in folders:
+            path = self.folder / folder
+            path.mkdir(parents=True, exist_ok=True)
+            if "venv" in folder:
+                (path / "pyvenv.cfg").write_text(f"command = /usr/bin/python3 -m venv {place}/{folder}\n")
+            else:
+                (path / "CMakeCache.txt").write_text(f"CMAKE_CACHEFILE_DIR:INTERNAL={place}/{folder}\n")
+
+    def test_what_was_built_in_another_folder_is_built_again(self):
+        here = self.folder.resolve()
+        program = self.folder / "build/release/bin/upswing"
+        # All packages are installed; CMake makes a program, and Ninja then has nothing to do.
+        self.stub("dpkg-query", "for name; do printf '/%s:all=installed/' \"$name\"; done")
+        self.stub("ninja", "echo 'ninja: no work to do.'")
+        self.stub("cmake", f"mkdir -p {program.parent} && touch build/release/build.ninja && "
+                           f"echo '#!/bin/sh\necho new' >{program} && chmod +x {program}")
+        made = ("build/release", "build/debug", "build/pip/cp312", "build/python-venv", "build/package/venv")
+        kept = self.folder / "build/deps/mujoco/lib"
+        kept.mkdir(parents=True)
+        with self.subTest("built here, also seen through a link"):
+            (self.folder / "link").symlink_to(self.folder)
+            for place in (here, here / "link"):
+                self.make_build(place, *made)
+                done = self.stubbed("info")
+                self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "ran: info\n", ""), done)
+        for place in ("/no/such/place", f"{here}/other", f"/old{here}"):
+            with self.subTest(place=place):
+                self.make_build(place, *made)
+                program.write_text("#!/bin/sh\necho old\n")
+                done = self.stubbed("info")
+                self.assertEqual((done.returncode, done.stdout), (0, "new\n"), done)
+                lines = [line for line in done.stderr.splitlines() if "another folder" in line]
+                self.assertEqual(len(lines), 1, done.stderr)
+                for word in (place, *made):
+                    self.assertIn(word, lines[0])
+                self.assertEqual([name for name in made[1:] if (self.folder / name).exists()], [])
+                self.assertTrue(kept.exists())
+                self.assertEqual(self.stubbed("info").stderr, "")
 
     def test_no_setup_in_the_wrong_place_or_misspelt(self):
         for words in (["info", "--no-setup"], ["info", "--nosetup"], ["test", "-R", "x",
