@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "agents/training.h"
 #include "base/error.h"
 #include "base/text.h"
 #include "nn/network_policy.h"
@@ -105,7 +106,16 @@ Plant TrainingPlant(const PolicyInfo& info, const std::string& where) {
 
 }  // namespace
 
+void ExpectNoCheckpoint(const Tensors& file) {
+  const auto format = file.metadata.find("format");
+  if (format == file.metadata.end() || format->second != kCheckpointFormat) return;
+  throw BadInput(Concat(file.where(),
+                        ": expected a policy, got the checkpoint of a training, from which `train "
+                        "--resume` continues; the policy is policy.safetensors in the run folder"));
+}
+
 LoadedPolicy ReadPolicy(const Tensors& file) {
+  ExpectNoCheckpoint(file);
   const std::string& where = file.where();
   if (const auto model = file.metadata.find("model");
       model != file.metadata.end() && !model->second.empty()) {

@@ -44,6 +44,9 @@ struct LoadedPolicy {
   const char* origin() const { return path.empty() ? "design" : "training"; }
 };
 
+/// Throws BadInput if the file is a checkpoint.
+void ExpectNoCheckpoint(const Tensors& file);
+
 /// The policy in a file. Throws BadInput also for a task that this program lacks: other
 /// observations, or a model that a 0.5.0 training had from an MJCF file.
 LoadedPolicy ReadPolicy(const Tensors& file);

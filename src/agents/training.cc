@@ -12,8 +12,6 @@
 namespace upswing {
 namespace {
 
-constexpr std::string_view kCheckpointFormat = "upswing-checkpoint-1";
-
 /// Returns the settings if there is enough memory for the training. Throws BadInput otherwise.
 Config Checked(Config config, const Host& host) {
   CheckMemory(config, host.memory);

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "agents/config.h"
 #include "base/tensors.h"
@@ -9,6 +10,9 @@
 #include "rl/train/trainer.h"
 
 namespace upswing {
+
+/// Metadata "format" of a checkpoint.
+inline constexpr std::string_view kCheckpointFormat = "upswing-checkpoint-1";
 
 /// Whether evaluations run in the closed form and MuJoCo confirms the evaluations that solve the
 /// task.

@@ -173,8 +173,22 @@ std::string SimilarIn(const std::vector<std::string_view>& cells, const std::str
 }
 
 /// A text as a cell: Printable, which keeps the row on one line, and in quotes if necessary.
+/// A text that a spreadsheet takes for no formula, also where it separates cells by semicolons: a '
+/// stands before =, +, - and @.
+std::string NoFormula(const std::string& text) {
+  std::string safe;
+  bool begins = true;  // a cell; blanks before its text do not count
+  for (const char c : text) {
+    if (begins && std::string_view("=+-@").find(c) != std::string_view::npos) safe += '\'';
+    begins = c == ';' || (begins && c == ' ');
+    safe += c;
+  }
+  return safe;
+}
+
 std::string CellOf(std::string_view given) {
   std::string text = Printable(given);
+  if (!ParseNumber(text)) text = NoFormula(text);
   if (text.find_first_of(",\"") == text.npos) return text;
   return Concat("\"", Replaced(text, "\"", "\"\""), "\"");
 }

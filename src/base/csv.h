@@ -37,8 +37,9 @@ std::vector<std::string> CsvNames(std::string_view text, const std::string& wher
 /// Builder of a CSV text. The cell names of the first row become the first line of the text.
 class CsvTable {
  public:
-  /// Adds a cell to the row. Names and texts are made Printable and put in quotes if necessary. An
-  /// empty text stands for an unknown number.
+  /// Adds a cell to the row. Names and texts are made Printable and put in quotes if necessary. A
+  /// text that a spreadsheet would take for a formula begins with a '. An empty text stands for an
+  /// unknown number.
   void Add(std::string_view name, std::string_view text);
   void Add(std::string_view name, double number) { Add(name, FormatNumber(number)); }
   void Add(std::string_view name, std::integral auto number) { Add(name, Concat(number)); }

@@ -95,6 +95,21 @@ void CheckCovered(const std::map<std::string, SafetensorsEntry>& entries, size_t
   if (end != data_size) throw BadInput(Concat("expected ", end, " bytes of data, got ", data_size));
 }
 
+/// What a file is that begins with these bytes: a text, a pickle or an archive; empty if it is
+/// unknown.
+std::string OtherFormat(std::span<const std::byte> first_bytes) {
+  const std::string_view text(reinterpret_cast<const char*>(first_bytes.data()),
+                              first_bytes.size());
+  if (text.starts_with("PK\x03\x04")) return "a zip archive, which PyTorch and others write";
+  if (text.starts_with("\x1f\x8b")) return "a gzip file";
+  if (text.starts_with("\x80") && text[1] > 1 && text[1] < 6) return "a pickle of Python";
+  const auto is_text = [](unsigned char c) {
+    return c >= ' ' || c == '\t' || c == '\r' || c == '\n';
+  };
+  if (!std::ranges::all_of(text, is_text)) return "";
+  return Concat("a text that begins with \"", Printable(text), "\"");
+}
+
 /// The text of a header, padded to whole words. Throws Failure if it is too long to load again or
 /// is not UTF-8.
 std::string HeaderText(const json& header) {
@@ -141,7 +156,9 @@ uint64_t ReadSafetensorsLength(std::span<const std::byte> first_bytes, uint64_t 
     throw BadInput(Concat("expected at least 8 bytes, got ", file_size));
   std::memcpy(&length, first_bytes.data(), sizeof(length));
   if (length > kMaxHeader) {
-    throw BadInput(Concat("header length: expected at most ", kMaxHeader, ", got ", length));
+    const std::string other = OtherFormat(first_bytes);
+    throw BadInput(Concat("header length: expected at most ", kMaxHeader, ", got ",
+                          other.empty() ? Concat(length) : other));
   }
   if (length > file_size - sizeof(length)) {
     throw BadInput(Concat("header: expected ", length, " bytes after the first ", sizeof(length),

@@ -34,16 +34,16 @@ void PrintGrades(const std::vector<Grade>& grades, const GradeConfig& config) {
   const auto share = [](const Evaluation& e) {
     return e.episodes == 0 ? "" : fmt::format("{:.1f}%", 100 * e.success_rate());
   };
-  size_t rank = 0;
   for (const Grade& grade : grades) {
     if (!grade.refused.empty()) {
       fmt::print("      {}  refused: {}\n", Printable(grade.name), OneLine(grade.refused));
       continue;
     }
     const Evaluation& e = grade.nominal;
-    fmt::print(kRow, ++rank, Shortened(Printable(grade.name), 24), share(e),
+    fmt::print(kRow, grade.rank, Shortened(Printable(grade.name), 24), share(e),
                fmt::format("{:.2f}", e.reward_sum.mean), share(grade.random),
                fmt::format("{:.2f}", e.torque_variation.mean), fmt::format("{:.2f}", e.work.mean));
+    if (!grade.note.empty()) fmt::print("      {}\n", Printable(grade.note));
   }
 }
 
@@ -96,11 +96,13 @@ void AddGrade(CommandLine& line) {
       "All policies have the same start states and the same random plants. They are sorted\n"
       "by success on the nominal plant, then by return. Δτ is smoothness, the change of the\n"
       "torque per second: less is smoother. Energy is what the motor puts in and takes out\n"
-      "in an episode. `eval` explains success and return, and has more figures.\n\n"
+      "in an episode. `eval` explains success and return, and has more figures.\n"
+      "Entries with the same success and return share a rank. A line names a copy of another\n"
+      "entry's file, and the plant of a training if it is another one.\n\n"
       "The same files give the same table on every machine. Therefore physics is the closed\n"
       "form, and kernels use no fused multiply-adds: figures may differ from those of `eval`\n"
       "in the last digits.\n\n"
-      "A link, another file, a policy of another task, and a file above 8 MiB are\n"
+      "A link, another file, a checkpoint, a policy of another task, and a file above 8 MiB are\n"
       "refused, each with a line. Exit code: 0 if all are graded, 1 if some are refused,\n"
       "2 for bad usage.\n");
   line.Examples(

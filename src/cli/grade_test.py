@@ -12,12 +12,12 @@ import shutil
 import socket
 import unittest
 
-from testing import ROOT, ProgramTest, read_tensors, run, write_tensors
+from testing import ROOT, ProgramTest, read_tensors, run, small, write_tensors
 
 AGENTS = ROOT / "web/public/agents"
 QUICK = ("--episodes", 4, "--plants", 4)
 # Hash of table.csv for the policies of ONE_OF_EACH, on every machine.
-PINNED = "23e6d7068a7de565"
+PINNED = "2c2063e700f5db8c"
 # Levels, clipped and squashed Gaussians, and an identified plant.
 ONE_OF_EACH = ("fast", "ppo", "sac", "d3qn-adaptive")
 
@@ -77,6 +77,37 @@ class GradeTest(ProgramTest):
         self.assertEqual({row["name"] for row in self.data()["rows"]},
                          {"anna", "anna.safetensors", "bob"})
         self.assertRegex(printed, r"(?m)^ +\d  anna\.safetensors +\d")
+
+    def test_copies_share_a_rank_and_are_named(self):
+        self.hand_in("fast", "alice.safetensors")
+        self.hand_in("fast", "bob/policy.safetensors")
+        self.hand_in("d3qn-at-0", "zoe.safetensors")
+        # The same network under another name: other bytes, the same figures.
+        metadata, tensors = read_tensors(AGENTS / "fast.safetensors")
+        write_tensors(self.folder_of_class / "carol.safetensors", metadata | {"agent": "mine"}, tensors)
+        printed = self.succeed("grade", "class", *QUICK, "--out", "out")
+        self.assertEqual([(row["name"], row["rank"], row["note"]) for row in self.rows()],
+                         [("alice", "1", ""), ("bob", "1", "the same file as alice"),
+                          ("carol", "1", "the same figures as alice"), ("zoe", "4", "")])
+        self.assertRegex(printed, r"(?m)^ +1  bob .*\n +the same file as alice\n +1  carol .*\n +the same figures")
+        self.assertRegex(printed, r"(?m)^ +4  zoe ")
+        self.assertEqual([(row["rank"], row.get("note", "")) for row in self.data()["rows"]],
+                         [(int(row["rank"]), row["note"]) for row in self.rows()])
+
+    def test_the_plant_of_another_training_is_named(self):
+        metadata, tensors = read_tensors(AGENTS / "fast.safetensors")
+        plant = json.loads(metadata["plant"])
+        for name, changes in (("one", {"mass2": 1.25}),
+                              ("five", {"mass1": 0.5, "mass2": 0.6, "length1": 0.7, "length2": 0.8, "gravity": 3.7})):
+            write_tensors(self.folder_of_class / f"{name}.safetensors",
+                          metadata | {"plant": json.dumps(plant | changes)}, tensors)
+        printed = self.succeed("grade", "class", *QUICK, "--out", "out")
+        notes = {row["name"]: row["note"] for row in self.rows()}
+        self.assertIn("trained on another plant: mass2 1.25 kg (here 1)", notes["one"])
+        self.assertIn("trained on another plant: mass1 0.5 kg (here 1), ", notes["five"])
+        self.assertIn("and 1 more", notes["five"])
+        for note in notes.values():
+            self.assertIn(f"\n      {note}\n", printed)
 
     def test_no_output_inside_the_class_folder(self):
         self.hand_in("fast", "anna.safetensors")
@@ -138,12 +169,25 @@ class GradeTest(ProgramTest):
             server.bind(str(folder / "socket.safetensors"))
         with open(folder / "huge.safetensors", "wb") as file:
             file.truncate(1 << 40)
+        (folder / "readme.safetensors").write_text("# My policy\nIt swings up.\n")
+        (folder / "long.safetensors").write_text("# My policy\n" * (1 << 20))
+        (folder / "torch.safetensors").write_bytes(b"PK\3\4" + bytes(100))
+        self.succeed(*small(steps=400, out="run"))
+        checkpoint = (self.folder / "run/checkpoint.safetensors").read_bytes()
+        (folder / "checkpoint.safetensors").write_bytes(checkpoint)
+        self.succeed(*small(steps=400, out="large", hidden="640,640"))
+        large = (self.folder / "large/checkpoint.safetensors").read_bytes()
+        self.assertGreater(len(large), 8 << 20)
+        (folder / "large.safetensors").write_bytes(large)
         metadata, tensors = read_tensors(AGENTS / "fast.safetensors")
         kind, (rows, columns), data = tensors["feature.0.weight"]
         tensors["feature.0.weight"] = (kind, [columns, rows], data)
         write_tensors(folder / "shape.safetensors", metadata, tensors)
         expected = {
-            "pickled.pkl": "another file", "renamed": "safetensors file",
+            "pickled.pkl": "another file", "renamed": "got a pickle of Python",
+            "readme": 'got a text that begins with "# My pol"', "long": "got a text that begins with",
+            "torch": "got a zip archive", "checkpoint": "got the checkpoint of a training",
+            "large": "got the checkpoint of a training",
             "pipe": "no regular file", "link": "a link", "to-itself": "a link",
             "linked-folder": "a link", "folder": "a folder without it", "linked-inside": "a link",
             "socket": "no regular file", "huge": "expected at most 8388608 bytes",
@@ -171,16 +215,21 @@ class GradeTest(ProgramTest):
 
     def test_names_do_no_harm(self):
         names = ["<img src=x onerror=alert(1)>", "\x1b[31mred", "=1+1", "a\nb", "</script>", "ä,\"b",
-                 "\udcff"]
+                 "\udcff", "@SUM(1)", "+1+1", "-1+1", " =1", "x;=1+1", "-7"]
         for name in names:
             self.hand_in("d3qn-at-0", f"{name}.safetensors".replace("/", "⁄"))
             self.hand_in("d3qn-at-0", f"{name.replace('/', '')}2/policy.safetensors")
         printed = self.succeed("grade", "class", "--episodes", 1, "--plants", 0, "--out", "out")
         self.assertNotIn("\x1b", printed)
-        self.assertEqual(len(printed.splitlines()), 2 + 2 * len(names))
+        self.assertEqual(len(re.findall(r"(?m)^ +1  ", printed)), 2 * len(names))
         rows = self.rows()
         self.assertEqual(len(rows), 2 * len(names))
-        self.assertIn("'=1+1", {row["name"] for row in rows})
+        self.assertLessEqual({"'=1+1", "'@SUM(1)", "'+1+1", "'-1+1", " '=1", "x;'=1+1", "-7"},
+                             {row["name"] for row in rows})
+        # No cell is a formula for a spreadsheet that separates by commas, nor for one with semicolons.
+        for row in (self.folder / "out/table.csv").read_text(encoding="utf-8").splitlines():
+            for cell in re.split("[,;]", row):
+                self.assertRegex(cell, r'^"*(?![ "]*[=+@]|[ "]*-(?!\d+"*$))')
         page = (self.folder / "out/index.html").read_text(encoding="utf-8")
         self.assertEqual([page.count(text) for text in ("<img", "\x1b", "</script>")], [0, 0, 2])
         self.assertEqual(len(self.data()["rows"]), 2 * len(names))

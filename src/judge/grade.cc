@@ -5,11 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <tuple>
 
 #include "agents/arguments.h"
-#include "base/csv.h"
 #include "base/error.h"
 #include "base/simd.h"
 #include "base/text.h"
@@ -74,13 +72,35 @@ fs::path PolicyFile(const fs::path& entry) {
   throw BadInput(Concat("expected NAME.safetensors or NAME/policy.safetensors, got ", got));
 }
 
+/// Throws BadInput for a file of more than kMostBytes, which may be a checkpoint.
+void CheckSize(const fs::path& file) {
+  const auto size = fs::file_size(file);
+  if (size <= kMostBytes) return;
+  constexpr uint64_t kHeaderOnly = uint64_t{1} << 32;  // a larger file is no checkpoint
+  if (size < kHeaderOnly) ExpectNoCheckpoint(LoadPartOfTensors(file, "a prefix of no tensor"));
+  throw BadInput(Concat("expected at most ", kMostBytes, " bytes, got ", size));
+}
+
 LoadedPolicy PolicyOfEntry(const fs::path& file) {
-  if (fs::file_size(file) > kMostBytes) {
-    throw BadInput(Concat("expected at most ", kMostBytes, " bytes, got ", fs::file_size(file)));
-  }
+  CheckSize(file);
   LoadedPolicy loaded = ReadPolicy(LoadTensors(file, kMostBytes));
   ExpectPendulum(loaded);
-  return ForOtherSize(loaded, Plant()).value_or(loaded);
+  return loaded;
+}
+
+/// How the plant of a training differs from the built-in one; empty if it does not.
+std::string NoteOfPlant(const Plant& plant) {
+  constexpr size_t kMost = 4;  // differences in the line
+  std::vector<std::string> texts;
+  for (const auto& [option, here] : Differences(OptionsOf(plant), OptionsOf(Plant()))) {
+    texts.push_back(fmt::format("{} {:.4g} {} (here {:.4g})", option.name, option.number(),
+                                option.unit, here->number()));
+  }
+  if (texts.empty()) return "";
+  const size_t more = texts.size() - std::min(texts.size(), kMost);
+  texts.resize(texts.size() - more);
+  return Concat("trained on another plant: ", Join(texts, ", "),
+                more > 0 ? Concat(" and ", more, " more") : "");
 }
 
 /// Environments of the built-in plant with the policy's observations, in the closed form: sines and
@@ -123,7 +143,9 @@ void GradeEntry(const fs::path& folder, const GradeConfig& config, ThreadPool& p
                 const Progress& progress, Grade& grade) {
   const fs::path file = PolicyFile(folder / grade.file);
   grade.file = file.lexically_relative(folder).generic_string();
-  const LoadedPolicy loaded = PolicyOfEntry(file);
+  const LoadedPolicy own = PolicyOfEntry(file);
+  grade.note = NoteOfPlant(own.plant);
+  const LoadedPolicy loaded = ForOtherSize(own, Plant()).value_or(own);
   const GridPolicy policy(*loaded.policy);
   const PendulumEnvConfig nominal = EnvironmentsFor(loaded, config, 0, pool);
   grade.nominal = Judge(policy, nominal, config.episodes, progress);
@@ -150,7 +172,10 @@ std::vector<Grade> EntriesOf(const fs::path& folder) {
     const fs::path file = entry.path().filename();
     if (file.string().starts_with('.')) continue;
     const bool is_policy = file.extension() == ".safetensors";
-    grades.push_back({(is_policy ? file.stem() : file).string(), file.string(), "", {}, {}, {}});
+    Grade grade;
+    grade.name = (is_policy ? file.stem() : file).string();
+    grade.file = file.string();
+    grades.push_back(std::move(grade));
     if (grades.size() > kMostEntries) break;
   }
   if (error) throw PathError("cannot read", folder, error.value());
@@ -163,30 +188,47 @@ std::vector<Grade> EntriesOf(const fs::path& folder) {
   return grades;
 }
 
-/// A text that a spreadsheet takes for no formula.
-std::string NoFormula(const std::string& text) {
-  return text.find_first_of("=+-@") == 0 ? "'" + text : text;
+/// What decides the rank of a graded entry, the best first.
+std::pair<int64_t, double> OrderOf(const Grade& grade) {
+  return {-grade.nominal.successes, -grade.nominal.reward_sum.mean};
 }
 
-std::string Decimals(double x) { return fmt::format("{:.2f}", x); }
+/// Whether two graded entries have the same figures.
+bool SameFigures(const Grade& a, const Grade& b) {
+  const auto figures = [](const Grade& grade) {
+    const Evaluation& e = grade.nominal;
+    return std::tuple(OrderOf(grade), e.torque_variation.mean, e.work.mean, grade.random.successes,
+                      grade.random.reward_sum.mean);
+  };
+  return figures(a) == figures(b);
+}
 
-/// Adds the figures of a grade as texts: `add(name, text)`.
-template <typename Add>
-void AddFigures(const Grade& grade, const Add& add) {
-  const Evaluation& e = grade.nominal;
-  add("episodes", Concat(e.episodes));
-  add("successes", Concat(e.successes));
-  add("return", Decimals(e.reward_sum.mean));
-  add("plants", Concat(grade.random.episodes));
-  add("plant_successes", Concat(grade.random.successes));
-  add("torque_variation", Decimals(e.torque_variation.mean));
-  add("energy_used", Decimals(e.work.mean));
+/// Adds the first entry with the same figures to the notes of the others: with the same file, or
+/// with another one.
+void NameCopies(const fs::path& folder, std::vector<Grade>& grades) {
+  const auto content = [&](const Grade& grade) {
+    return ReadOwnBytes(folder / grade.file, kMostBytes);
+  };
+  for (auto grade = grades.begin(); grade != grades.end() && grade->refused.empty(); ++grade) {
+    const auto first = std::find_if(grades.begin(), grade,
+                                    [&](const Grade& other) { return SameFigures(other, *grade); });
+    if (first == grade) continue;
+    const bool same = content(*first) == content(*grade);
+    const std::string copy =
+        Concat(same ? "the same file as " : "the same figures as ", first->name);
+    grade->note = grade->note.empty() ? copy : Concat(copy, "; ", grade->note);
+  }
+}
+
+/// Ranks graded entries that are sorted. As in sports, two first ones are followed by a third.
+void SetRanks(std::vector<Grade>& grades) {
+  for (size_t i = 0; i < grades.size() && grades[i].refused.empty(); ++i) {
+    const bool tie = i > 0 && OrderOf(grades[i]) == OrderOf(grades[i - 1]);
+    grades[i].rank = tie ? grades[i - 1].rank : static_cast<int>(i) + 1;
+  }
 }
 
 }  // namespace
-
-// Defined by CMake from judge/grade_page.html.
-std::string_view GradePageTemplate();
 
 void GradeConfig::Describe(Options& o) {
   o.Add(&episodes, "episodes", {1, 10000}, "", "number of episodes on the nominal plant");
@@ -214,48 +256,11 @@ std::vector<Grade> GradeFolder(const fs::path& folder, const GradeConfig& config
     progress(done += each, total);
   }
   std::ranges::stable_sort(grades, {}, [](const Grade& grade) {
-    return std::tuple(!grade.refused.empty(), -grade.nominal.successes,
-                      -grade.nominal.reward_sum.mean);
+    return std::tuple(!grade.refused.empty(), OrderOf(grade));
   });
+  SetRanks(grades);
+  NameCopies(folder, grades);
   return grades;
-}
-
-std::string GradesCsv(const std::vector<Grade>& grades) {
-  CsvTable csv;
-  for (size_t i = 0; i < grades.size(); ++i) {
-    const bool known = grades[i].refused.empty();
-    csv.Add("rank", known ? Concat(i + 1) : "");
-    csv.Add("name", NoFormula(grades[i].name));
-    csv.Add("file", NoFormula(grades[i].file));
-    AddFigures(grades[i], [&](std::string_view name, const std::string& text) {
-      csv.Add(name, known ? text : "");
-    });
-    csv.Add("refused", NoFormula(OneLine(grades[i].refused)));
-    csv.EndRow();
-  }
-  return csv.text();
-}
-
-std::string GradesPage(const std::vector<Grade>& grades, const GradeConfig& config) {
-  nlohmann::ordered_json page;
-  page["seed"] = config.seed;
-  page["rows"] = nlohmann::ordered_json::array();
-  for (const Grade& grade : grades) {
-    nlohmann::ordered_json row;
-    row["name"] = Printable(grade.name);
-    if (!grade.refused.empty()) row["refused"] = OneLine(grade.refused);
-    AddFigures(grade, [&](const char* name, const std::string& text) { row[name] = text; });
-    // Every second state, in thousandths of a radian.
-    auto& motion = row["motion"] = nlohmann::ordered_json::array();
-    for (size_t k = 0; k < grade.motion.size(); k += 2) {
-      motion.push_back(std::lround(1000 * grade.motion[k].q1));
-      motion.push_back(std::lround(1000 * grade.motion[k].q2));
-    }
-    page["rows"].push_back(std::move(row));
-  }
-  // In ASCII and without "<", the document cannot end the script element that holds it.
-  const std::string json = Replaced(page.dump(-1, ' ', true), "<", "\\u003c");
-  return Replaced(std::string(GradePageTemplate()), "@DATA@", json);
 }
 
 }  // namespace upswing

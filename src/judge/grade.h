@@ -29,14 +29,17 @@ struct Grade {
   std::string name;     // of the student or team: the entry, without .safetensors if that is unique
   std::string file;     // path of the policy within the folder
   std::string refused;  // why there is no grade; empty: there is one
+  std::string note;     // the plant of the training, an entry with the same file; may be empty
+  int rank = 0;         // from 1; entries with the same figures share it
   Evaluation nominal, random;
   std::vector<PendulumState> motion;  // states of the first nominal episode, one per control step
 };
 
 /// Grades FOLDER/NAME.safetensors and FOLDER/NAME/policy.safetensors, best first: by successes,
-/// then by return. Other entries, broken files and links are refused and come last. Entries whose
-/// names begin with a dot are ignored. Switches the kernels to the portable path. `progress` counts
-/// episodes. Throws BadInput if the folder cannot be read, or has no or too many entries.
+/// then by return. Entries with the same successes and return share a rank. Other entries, broken
+/// files and links are refused and come last. Entries whose names begin with a dot are ignored.
+/// Switches the kernels to the portable path. `progress` counts episodes. Throws BadInput if the
+/// folder cannot be read, or has no or too many entries.
 std::vector<Grade> GradeFolder(const std::filesystem::path& folder, const GradeConfig& config,
                                ThreadPool& pool, const Progress& progress);
 
