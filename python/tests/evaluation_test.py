@@ -206,7 +206,7 @@ class Maps(unittest.TestCase):
             before = os.getcwd()
             os.chdir(folder)
             try:
-                upswing.map("lqr", "q1=170:190:3", "q2=-10:10:3")
+                upswing.map("lqr", "q1=170deg:190deg:3", "q2=-10deg:10deg:3")
             finally:
                 os.chdir(before)
             self.assertEqual(os.listdir(folder), [])

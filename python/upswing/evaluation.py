@@ -204,7 +204,7 @@ def map(  # pylint: disable=redefined-builtin
         progress: function that gets the finished share (0 to 1) from time to time
         **settings: values of quantities on neither axis, such as gravity=9.7
 
-    >>> result = upswing.map("runs/d3qn-seed1", x="q1=-180:180:73", y="q2=-180:180:73")
+    >>> result = upswing.map("runs/d3qn-seed1", x="q1=-180deg:180deg:73", y="q2=-180deg:180deg:73")
     """
     arguments: dict[str, Any] = {"seed": seed, "threads": threads}
     if physics is not None:

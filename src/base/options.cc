@@ -43,13 +43,20 @@ std::string RangeText(Range range) {
   return "";
 }
 
+/// A range with its unit, such as ` in [0, 1] kg`.
+std::string RangeText(Range range, const std::string& unit) {
+  const std::string text = RangeText(range);
+  return text.empty() || unit.empty() ? text : Concat(text, " ", unit);
+}
+
 /// What a number must be, such as `a multiple of 0.02 in [0, 1]` or `1 or 2`.
-std::string NumberText(Range range, double step) {
+std::string NumberText(Range range, double step, const std::string& unit) {
   if (step == 1 && range.high == range.low + 1) {
     return Concat(FormatNumber(range.low), " or ", FormatNumber(range.high));
   }
-  if (step == 1) return "an integer" + RangeText(range);
-  return Concat(step == 0 ? "a number" : "a multiple of " + FormatNumber(step), RangeText(range));
+  if (step == 1) return "an integer" + RangeText(range, unit);
+  return Concat(step == 0 ? "a number" : "a multiple of " + FormatNumber(step),
+                RangeText(range, unit));
 }
 
 /// `0 to 1` or `0 to 1 in steps of 0.02`; empty if all numbers are allowed.
@@ -86,6 +93,17 @@ std::string NearestText(std::string_view text, Range range, double step) {
   };
   const double below = std::floor(*value / step);
   return Concat("; the nearest are ", multiple(below), " and ", multiple(below + 1));
+}
+
+/// A text with a blank in place of each line break and the blanks around it.
+std::string OnOneLine(std::string_view text) {
+  std::string line;
+  for (const std::string_view piece : Split(text, '\n')) {
+    const std::string_view words = Trim(piece);
+    if (!line.empty() && !words.empty()) line += ' ';
+    line += words;
+  }
+  return line;
 }
 
 /// Parses a list such as "64,64" or "[64, 64]"; nothing if an item is not an integer or is out of
@@ -146,19 +164,19 @@ std::string Option::about_with_default() const {
 }
 
 std::string Option::expected() const {
-  return std::visit(Overloaded{
-                        [](const bool*) -> std::string { return "true or false"; },
-                        [&](const int64_t*) { return Concat("an integer", RangeText(range)); },
-                        [&](const double*) { return NumberText(range, step); },
-                        [&](const std::string*) -> std::string {
-                          return choices.empty() ? "a text"
-                                                 : Concat("one of ", Join(choices, ", "));
-                        },
-                        [&](const std::vector<int64_t>*) {
-                          return Concat("a list of integers", RangeText(range));
-                        },
-                    },
-                    target);
+  return std::visit(
+      Overloaded{
+          [](const bool*) -> std::string { return "true or false"; },
+          [&](const int64_t*) { return Concat("an integer", RangeText(range, unit)); },
+          [&](const double*) { return NumberText(range, step, unit); },
+          [&](const std::string*) -> std::string {
+            return choices.empty() ? "a text" : Concat("one of ", Join(choices, ", "));
+          },
+          [&](const std::vector<int64_t>*) {
+            return Concat("a list of integers", RangeText(range));
+          },
+      },
+      target);
 }
 
 void Option::Set(std::string_view text, const std::string& where) const {
@@ -185,6 +203,10 @@ void Option::Set(std::string_view text, const std::string& where) const {
                        return true;
                      },
                      [&](std::string* value) {
+                       if (wraps) {
+                         *value = OnOneLine(text);
+                         return true;
+                       }
                        if (text.find_first_of("\n\r") != std::string_view::npos) return false;
                        if (!choices.empty() && std::ranges::find(choices, text) == choices.end()) {
                          return false;

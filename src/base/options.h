@@ -49,6 +49,7 @@ struct Option {
   Decides decides = Decides::kTraining;
   std::vector<std::string> choices = {};  // allowed values of a text; empty: any
   double step = 0;                        // a number must be a multiple of it; 0: any number
+  bool wraps = false;                     // a text whose line breaks are blanks
   std::string usual = {};  // default in words, shown in place of the value; may be empty
   // Keeps the copy alive that `target` points into; null: the caller keeps the struct.
   std::shared_ptr<const void> owner = {};
@@ -70,8 +71,8 @@ struct Option {
   std::string about() const;
   /// Help line with the current value as the default: `… [s] (0.02 to 10; default 4)`.
   std::string about_with_default() const;
-  /// Description of the allowed values, such as `a number in [0, 1]` or `a multiple of 0.02 in [0,
-  /// 1]`.
+  /// Description of the allowed values, such as `a number in [0, 1] kg` or `a multiple of 0.02 in
+  /// [0, 1] s`.
   std::string expected() const;
   /// Parses and checks `text`, then sets the value. Throws BadInput, whose message begins with
   /// `where` (such as `--gamma` or `FILE:3: gamma`).

@@ -87,7 +87,7 @@ class Lqr(ProgramTest):
                         f'expected 1 or 2, got "{joint}"')
 
     def test_map_of_where_it_catches(self):
-        result = json.loads(self.succeed("map", "lqr", "--x", "q1=150:210:61", "--y", "q2=-30:30:61",
+        result = json.loads(self.succeed("map", "lqr", "--x", "q1=150deg:210deg:61", "--y", "q2=-30deg:30deg:61",
                                          "--json", "--out", "map"))
         caught = result["success_rate"]
         at = lambda q1, q2: caught[q2 + 30][q1 - 150]  # a cell is a degree
@@ -101,7 +101,7 @@ class Lqr(ProgramTest):
 
     def test_map_over_plants_names_the_design_plant(self):
         result = json.loads(self.succeed(
-            "map", "lqr", "--x", "mass2=-40%:+40%:3", "--y", "damping2=0.1:0.3:3", "--set", "q1=178",
+            "map", "lqr", "--x", "mass2=-40%:+40%:3", "--y", "damping2=0.1:0.3:3", "--set", "q1=178deg",
             "--set", "mass1=1.1", "--json", "--out", "map"))
         self.assertEqual(result["changes"], "mass1 1.1 kg (design: 1), q1 178 °")
         self.assertEqual(result["success_rate"][1][1], 1)

@@ -102,7 +102,7 @@ void AddMap(CommandLine& line) {
   a.Describe(own);
   line.Arguments(own);
   AddPlant(line, a.trial.plant);
-  AddSet(line, a.set, "value of a quantity on neither axis, such as q1=178");
+  AddSet(line, a.set, "value of a quantity on neither axis, such as q1=178deg");
   AddPlantFlags(line, a.trial.plant_flags);
   AddPhysics(line, a.trial.physics);
   AddUnknownPlant(line, a.trial.unknown_plant);
@@ -120,7 +120,9 @@ void AddMap(CommandLine& line) {
       "  sensors  sensor_noise [rad, rad/s], sensor_latency [s], encoder_counts,\n"
       "           velocity_window [s], velocity_filter [s]\n"
       "  motor    delay [s], in control periods of 0.02 s, one cell each\n"
-      "  start    q1, q2 [°], w1, w2 [rad/s]; 0 if not given: hanging, at rest\n\n"
+      "  start    q1, q2, w1, w2, in rad and rad/s or with a unit, such as 178deg or 90deg/s,\n"
+      "           as in --start of `simulate`; 0 if not given: hanging, at rest. map.csv and\n"
+      "           figures have angles in degrees\n\n"
       "A percentage is relative to the training's value: +10% is 1.1 times it. Episodes are\n"
       "those of eval; with a start, every episode starts exactly there. Observed energy and\n"
       "height are scaled by the cell's plant, which reveals the plant to the policy. With\n"
@@ -132,8 +134,8 @@ void AddMap(CommandLine& line) {
       "  ./upswing map runs/d3qn-seed1\n"
       "  ./upswing map runs/d3qn-seed1 --x mass=0.8:1.2 --y damping=0:0.4:21\n"
       "  ./upswing map runs/d3qn-seed1 --x sensor_noise=0:0.1 --y delay=0:0.1:6\n"
-      "  ./upswing map runs/d3qn-seed1 --x q1=-180:180:73 --y q2=-180:180:73\n"
-      "  ./upswing map lqr --x q1=150:210:121 --y q2=-30:30:121\n"
+      "  ./upswing map runs/d3qn-seed1 --x q1=-180deg:180deg:73 --y q2=-180deg:180deg:73\n"
+      "  ./upswing map lqr --x q1=150deg:210deg:121 --y q2=-30deg:30deg:121\n"
       "  ./upswing map runs/d3qn-seed1 mpc tvlqr --episodes 1 --out runs/maps\n");
 }
 

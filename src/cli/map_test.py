@@ -76,7 +76,7 @@ class MapTest(ProgramTest):
 
     def test_flags_change_the_plant_as_set_does(self):
         def cells(out, *changes):
-            self.succeed("map", "lqr", "--x", "mass2=-10%:+10%:2", "--y", "q1=178:179:2", "--episodes", 1,
+            self.succeed("map", "lqr", "--x", "mass2=-10%:+10%:2", "--y", "q1=178deg:179deg:2", "--episodes", 1,
                          "--out", out, *changes)
             return (self.folder / out / "map.csv").read_text(encoding="utf-8")
         by_flags = cells("a", "--mass1", 1.2, "--torque-limit", 0.05)
@@ -99,7 +99,7 @@ class MapTest(ProgramTest):
                             one["swing_up_seconds"])
 
     def test_from_given_starts(self):
-        result = self.map("--x", "q1=-180:180:9", "--y", "q2=-20:20:3", "--set", "w1=0.1")
+        result = self.map("--x", "q1=-180deg:180deg:9", "--y", "q2=-20deg:20deg:3", "--set", "w1=0.1")
         self.assertEqual(result["episodes_per_cell"], 1)
         for rate, seconds in zip(sum(result["success_rate"], []),
                                  sum(result["swing_up_seconds"], [])):
@@ -165,7 +165,7 @@ class MapTest(ProgramTest):
         self.assertNotIn(">as in training<", text)
         self.assertNotEqual(changed["swing_up_seconds"], usual["swing_up_seconds"])
         # With one exact start, nothing is random.
-        _, text = self.figure("--set", "q1=20", out="start")
+        _, text = self.figure("--set", "q1=20deg", out="start")
         self.assertIn("q1 20 °", text)
         self.assertNotIn("interval", text)
 
@@ -209,11 +209,29 @@ class MapTest(ProgramTest):
                 ("delay=-50%:50%", "delay", "percentage of a training value of 0"),
                 ("delay=0:0.05", "delay", "a multiple of 0.02", "the nearest are 0.04 and 0.06"),
                 ("delay=0:0.1:5", "--x delay", '"0.025"', "the nearest are 0.02 and 0.04"),
-                ("q1=-400:0", "q1", "in [-360, 360]")):
+                ("q1=-400deg:0", "q1", "in [-360, 360] °")):
             with self.subTest(axis=axis):
                 self.refuse(["map", self.policy, "--x", axis], *words)
         self.refuse(["map", self.policy, "--x", "mass=1:2", "--y", "mass2=1:2"], "two different",
                     "both set mass2")
+
+    def test_angles_are_those_of_simulate(self):
+        # The same text means the same start in both.
+        for text, degrees in (("20deg", 20), ("20°", 20), ("0.5", math.degrees(0.5)), ("0.5rad", math.degrees(0.5))):
+            with self.subTest(text=text):
+                out = f"map-{text}"
+                result = self.map("--x", f"q1={text}:4:3", "--y", "w2=-90deg/s:2:2", "--set", f"q2={text}", out=out)
+                self.assertAlmostEqual(result["x"]["values"][0], degrees)
+                self.assertAlmostEqual(result["x"]["values"][-1], math.degrees(4))
+                self.assertAlmostEqual(result["y"]["values"][0], -math.pi / 2)
+                self.assertEqual(result["y"]["values"][-1], 2)
+                first = next(csv.DictReader(self.succeed("simulate", "--start", f"{text},0,0,0").splitlines()))
+                self.assertAlmostEqual(float(first["q1"]), math.radians(degrees))
+        meant = "expected an angle in rad within ±4π, or one with its unit, got"
+        for words in (["--x", "q1=-180:180:9"], ["--y", "q2=0:13"], ["--set", "q1=178"]):
+            with self.subTest(words=words):
+                self.refuse(["map", self.policy, *words], f"{words[0]} {words[1][:2]}: {meant}", "did you mean")
+        self.refuse(["simulate", "--start", "180,0,0,0"], f"--start: {meant} 180 (did you mean 180deg?")
 
     def test_other_bad_input(self):
         self.refuse(["map"], "policy")

@@ -13,6 +13,7 @@
 #include "os/file.h"
 #include "os/streams.h"
 #include "pendulum/control_period.h"
+#include "pendulum/start_text.h"
 #include "report/figure.h"
 #include "runs/find_policy.h"
 #include "runs/run_folder.h"
@@ -114,6 +115,7 @@ int RunPlot(const PlotArguments& a) {
   }
   fmt::print("{}\n", Printable(loaded.name));
   fmt::print("  plant      {}, physics {}\n", EpisodeText(rollout), a.trial.physics);
+  fmt::print("  start      {}\n", StateText(rollout.rows.front().state));
   const double since = UprightSince(rollout.rows);
   const char* place = config.env.any_pose ? "at goal" : "upright";
   std::string when = "not at the end";
@@ -155,7 +157,7 @@ void AddPlot(CommandLine& line) {
       "another policy file; the next figures into plot-2.\n");
   line.Examples(
       "  ./upswing plot runs/d3qn-seed1\n"
-      "  ./upswing plot runs/d3qn-seed1 --start 3.0,0,0,0 --seconds 5 --out caught\n"
+      "  ./upswing plot runs/d3qn-seed1 --start 170deg,0,0,0 --seconds 5 --out caught\n"
       "  ./upswing plot runs/d3qn-seed1 --set mass2=1.3\n"
       "  ./upswing plot mpc --phase --seconds 4\n"
       "  ./upswing plot runs/d3qn-seed1 --randomize 0.25 --episode 17\n");

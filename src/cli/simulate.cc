@@ -16,6 +16,7 @@
 #include "judge/rollout.h"
 #include "os/streams.h"
 #include "pendulum/control_period.h"
+#include "pendulum/start_text.h"
 #include "runs/find_policy.h"
 
 namespace upswing {
@@ -110,6 +111,7 @@ int RunSimulate(const SimulateArguments& a) {
     fmt::print("  schedule   {}\n", PeriodText(a, config.schedule.size(), period));
   }
   fmt::print("  plant      {}\n", EpisodeText(rollout));
+  fmt::print("  start      {}\n", StateText(rollout.rows.front().state));
   fmt::print("  torque     {}\n", TorqueText(rollout));
   fmt::print("  reward     {}\n", RewardText(rollout));
   if (loaded && a.trial.is_of_eval()) {
@@ -145,8 +147,8 @@ void AddSimulate(CommandLine& line) {
       "`machine check` and `machine identify` read this file as a log.\n");
   line.Examples(
       "  ./upswing simulate runs/d3qn-seed1 --csv rollout.csv\n"
-      "  ./upswing simulate --torque torques.csv --start 0.1,-0.05,0,0 --seconds 10\n"
-      "  ./upswing simulate --start 3.0,0,0,0 --set damping=0      no motor: it falls\n"
+      "  ./upswing simulate --torque torques.csv --start 0.1,-5deg,0,0 --seconds 10\n"
+      "  ./upswing simulate --start 170deg,0,0,0 --damping 0       no motor: it falls\n"
       "  ./upswing eval runs/d3qn-seed1 --randomize 0.25 --episodes-csv episodes.csv\n"
       "  ./upswing simulate runs/d3qn-seed1 --randomize 0.25 --episode 17 --csv e.csv\n");
 }

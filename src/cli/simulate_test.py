@@ -184,6 +184,22 @@ class SimulateTest(ProgramTest):
                 self.assertLessEqual(len(text), len(repr(float(text))), text)
                 self.assertTrue(math.isfinite(float(text)), text)
 
+    def test_a_start_may_have_units_and_is_shown(self):
+        rows = self.simulate("--start", "180deg,-5°,90deg/s,0.5rad/s", "--seconds", 0)
+        expected = (math.pi, math.radians(-5), math.pi / 2, 0.5)
+        for name, value in zip(STATE, expected):
+            self.assertAlmostEqual(rows[0][name], value, msg=name)
+        shown = "q1 3.1416, q2 -0.0873 rad (180°, -5°), w1 1.5708, w2 0.5 rad/s"
+        for command in (["simulate", "--csv", "a.csv"], ["plot", "lqr"]):
+            text = self.succeed(*command, "--start", "180deg,-5°,90deg/s,0.5rad/s", "--seconds", 1)
+            self.assertIn(f"\n  start      {shown}\n", text)
+        # Without --start, and of an episode of eval.
+        self.assertIn("  start      q1 0, q2 0 rad (0°, 0°), w1 0, w2 0 rad/s\n",
+                      self.succeed("simulate", "--csv", "b.csv", "--seconds", 1))
+        text = self.succeed("simulate", "lqr", "--csv", "c.csv", "--episode", 3)
+        q1 = float(parse((self.folder / "c.csv").read_text(encoding="utf-8"))[0]["q1"])
+        self.assertIn(f"  start      q1 {round(q1, 4):g}, ", text)
+
     def test_any_row_is_a_start_of_the_same_trajectory(self):
         # The comparison is exact only if the CSV has every digit.
         rows = parse(self.succeed("simulate", "--start", "2,-0.05,0,0", "--seconds", 4))

@@ -20,6 +20,7 @@
 #include "os/file.h"
 #include "os/streams.h"
 #include "pendulum/observation.h"
+#include "pendulum/start_text.h"
 
 namespace upswing {
 
@@ -206,6 +207,10 @@ int RunView(const ViewArguments& a) {
     DescribeRecording(a, making->path(), show.period(), job);
   }
 
+  if (!a.trial.start.empty()) {
+    fmt::print("start {}\n", StateText(ParseState(a.trial.start, "--start")));
+    std::fflush(stdout);
+  }
   InstallSignalHandlers("");
   PythonChild drawer("view", ViewProgram(),
                      job.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
@@ -268,10 +273,10 @@ void AddView(CommandLine& line) {
       "Python draws, with MuJoCo's viewer: `python3`, or the one that UPSWING_PYTHON names.\n");
   line.Examples(
       "  ./upswing view runs/d3qn-seed1\n"
-      "  ./upswing view runs/d3qn-seed1 lqr --start 3.1,0,0,0\n"
+      "  ./upswing view runs/d3qn-seed1 lqr --start 178deg,0,0,0\n"
       "  ./upswing view runs/d3qn-seed1 --set mass2=1.3 --delay 0.02\n"
       "  ./upswing view runs/d3qn-seed1 --record swing-up.mp4 --seconds 5 --speed 0.5\n"
-      "  ./upswing view --start 3,0,0,0                     no motor: it falls\n");
+      "  ./upswing view --start 170deg,0,0,0                no motor: it falls\n");
 }
 
 }  // namespace upswing

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/text.h"
+#include "pendulum/start_text.h"
 #include "rl/train/evaluate.h"
 
 namespace upswing {
@@ -31,8 +32,17 @@ std::optional<double> CommonValue(const std::vector<const Option*>& members) {
   return first;
 }
 
+/// The value of a start angle or velocity, in the unit of its setting; nothing for another setting.
+std::optional<double> StartValue(std::string_view name, std::string_view text,
+                                 const std::string& where) {
+  if (name == "q1" || name == "q2") return ParseDegrees(text, where);
+  if (name == "w1" || name == "w2") return ParseVelocity(text, where);
+  return std::nullopt;
+}
+
 /// An end of an axis: a number, or a percentage relative to the training's value.
 double ParseEnd(std::string_view text, const MapAxis& axis, const std::string& where) {
+  if (const auto value = StartValue(axis.name, text, where)) return *value;
   const bool percent = text.ends_with('%');
   if (percent) text.remove_suffix(1);
   const auto number = ParseNumber(text);
@@ -114,6 +124,18 @@ std::string MapAxis::label() const { return unit.empty() ? name : Concat(name, "
 
 bool MapAxis::Sets(const std::string& setting) const {
   return std::ranges::find(settings, setting) != settings.end();
+}
+
+std::vector<std::string> InUnitsOfMap(std::vector<std::string> changes, const std::string& flag) {
+  for (std::string& change : changes) {
+    const std::string_view text = change;
+    const size_t equals = text.find('=');
+    if (equals == std::string_view::npos) continue;  // ApplyChanges reports it
+    const std::string name(Trim(text.substr(0, equals)));
+    const auto value = StartValue(name, text.substr(equals + 1), Concat(flag, " ", name));
+    if (value) change = Concat(name, "=", FormatNumber(*value));
+  }
+  return changes;
 }
 
 MapAxis ParseMapAxis(const std::string& text, const MapPoint& training, const std::string& where) {

@@ -40,9 +40,13 @@ struct MapAxis {
   bool Sets(const std::string& setting) const;
 };
 
-/// Parses NAME=FROM:TO[:CELLS]. CELLS defaults to 31, or to one cell per step for a setting with
-/// steps. Both ends may be percentages relative to the value in `training`. Throws BadInput with a
-/// message that begins with `where`.
+/// Changes of a MapPoint, NAME=VALUE, with start angles in degrees and start velocities in rad/s as
+/// its settings have them. Their VALUE may have a unit (pendulum/start_text.h). Throws BadInput.
+std::vector<std::string> InUnitsOfMap(std::vector<std::string> changes, const std::string& flag);
+
+/// Parses NAME=FROM:TO[:CELLS]. Start angles and velocities may have a unit. CELLS defaults to 31,
+/// or to one cell per step for a setting with steps. Both ends may be percentages relative to the
+/// value in `training`. Throws BadInput with a message that begins with `where`.
 MapAxis ParseMapAxis(const std::string& text, const MapPoint& training, const std::string& where);
 
 /// The definition of a map.

@@ -109,7 +109,7 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
     const std::string where = FlagOf(flag.name);
     for (const Option* option : options.Find(flag.name, where)) expect_no_axis(*option, where);
   }
-  for (const Option* option : ApplyChanges(options, a.set)) {
+  for (const Option* option : ApplyChanges(options, InUnitsOfMap(a.set, "--set"))) {
     config.start_given |= option->section == "start";
     expect_no_axis(*option, Concat("--set ", option->name));
   }

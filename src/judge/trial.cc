@@ -7,6 +7,7 @@
 #include "base/text.h"
 #include "mujoco/engines.h"
 #include "os/file.h"
+#include "pendulum/start_text.h"
 #include "runs/plant_file.h"
 #include "runs/run_folder.h"
 
@@ -22,20 +23,6 @@ fs::path DefaultOut(const LoadedPolicy& loaded, const std::string& name) {
   const std::string stem = has_file ? file.stem().string() : loaded.policy->kind();
   const bool of_run = has_file && fs::exists(run / RunFolder::kConfig);
   return FreePath(of_run ? run / name : fs::path("runs") / Concat(name, "-", stem));
-}
-
-/// Parses the value of --start, q1,q2,w1,w2 (rad, rad/s). Throws BadInput.
-PendulumState ParseStart(const std::string& text) {
-  const std::vector<std::string_view> pieces = Split(text, ',');
-  std::vector<double> numbers;
-  for (const std::string_view piece : pieces) {
-    const auto number = ParseNumber(piece);
-    if (number && std::isfinite(*number)) numbers.push_back(*number);
-  }
-  if (pieces.size() != 4 || numbers.size() != 4) {
-    throw BadInput(Concat("--start: expected 4 numbers q1,q2,w1,w2, got \"", text, "\""));
-  }
-  return {numbers[0], numbers[1], numbers[2], numbers[3]};
 }
 
 }  // namespace
@@ -149,7 +136,7 @@ RolloutConfig TrialEpisode(const TrialArguments& a, const LoadedPolicy* loaded) 
   config.env = TrialEnvironments(a, loaded, a.is_of_eval());
   config.env.first_index = static_cast<uint64_t>(std::max<int64_t>(0, a.episode));
   if (!a.start.empty()) {
-    config.start = ParseStart(a.start);
+    config.start = ParseState(a.start, "--start");
   } else if (!a.is_of_eval()) {
     config.start = PendulumState();
   }

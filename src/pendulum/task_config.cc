@@ -25,6 +25,7 @@ void RewardConfig::Describe(Options& o) {
                       "reward of the training as an expression, such as \"E + h + 5*inverted\", in "
                       "place of the built-in reward and its weights");
   own.usual = "the built-in reward";
+  own.wraps = true;
 }
 
 }  // namespace upswing

@@ -646,7 +646,7 @@ def measure(program):
         out = Path(folder)
         run("map", *(agents / f"{name}.safetensors" for name in ("d3qn", "d3qn-adaptive")), "--x", "mass1=-40%:+40%:21",
             "--y", "mass2=-40%:+40%:21", "--episodes", 5, "--out", out / "maps")
-        run("map", "lqr", "--x", "q1=150:210:121", "--y", "q2=-30:30:121", "--out", out / "lqr")
+        run("map", "lqr", "--x", "q1=150deg:210deg:121", "--y", "q2=-30deg:30deg:121", "--out", out / "lqr")
         keep_maps(out / "maps", write)
         keep_lqr(out / "lqr", write)
         run("machine", "learn", "--link", "realaigym-twin", "--encoder-counts", 16384, "--out", out / "learn")

@@ -385,7 +385,7 @@ def control_decision(lab):
 def lqr_catch(lab):
     rows = []
     for k, flags in enumerate(([], ["--made-for", "torque_limit=10"])):
-        chart = lab.json("map", "lqr", *flags, "--x", "q1=150:210:121", "--y", "q2=-30:30:121",
+        chart = lab.json("map", "lqr", *flags, "--x", "q1=150deg:210deg:121", "--y", "q2=-30deg:30deg:121",
                          "--out", lab.folder / f"lqr{k}")
         rows.append([f"`{' '.join(flags)}`" if flags else "none", percent(chart["mean_success_rate"])])
     return ["flags", "caught at once"], rows

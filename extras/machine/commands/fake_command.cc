@@ -14,6 +14,8 @@
 #include "extras/machine/drive/link.h"
 #include "extras/machine/drive/real_time.h"
 #include "extras/machine/drive/supervisor.h"
+#include "pendulum/start_text.h"
+#include "runs/plant_file.h"
 
 namespace upswing::machine {
 namespace {
@@ -42,8 +44,6 @@ void ParseStuck(const std::string& text, MachineFaults& faults) {
 }
 
 int RunFake(const FakeArguments& a) {
-  if (a.twin.empty()) throw BadInput("fake: expected the file of a twin, got none");
-  if (a.link.empty()) throw BadInput("fake: expected --link udp:PORT or --link pty, got none");
   FakeConfig config = a.config;
   if (!a.stuck.empty()) ParseStuck(a.stuck, config.machine);
   const auto seed = static_cast<uint64_t>(a.seed);
@@ -58,6 +58,7 @@ int RunFake(const FakeArguments& a) {
   EnterRealTime();  // as far as it is permitted: firmware answers at once
   InstallSignalHandlers("");
   fmt::print("listening on {}\n", channel.name());
+  fmt::print("start {}\n", StateText(ParsePendulumStart(a.start)));
   std::fflush(stdout);
   const auto report = [&](double seconds) {
     if (a.quiet) return;
@@ -82,13 +83,17 @@ int RunFake(const FakeArguments& a) {
 
 void AddFake(CommandLine& line) {
   FakeArguments& a = line.Runs(RunFake);
-  line.Text("twin", a.twin, "TWIN", "file of the twin to play");
+  line.Text("twin", a.twin, "TWIN",
+            Concat("twin to play: a file or a shipped plant (",
+                   Join(NamesOf(EmbeddedPlants()), ", "), ")"));
+  line.Require("twin");
   line.Text("--link", a.link, "LINK",
             "udp:PORT on this computer (0: any free port), udp:HOST:PORT, or pty: a "
             "pseudo-terminal, whose path is printed");
-  line.Text(
-      "--start", a.start, "STATE",
-      "state at the beginning, or q1,q2,w1,w2 [rad, rad/s] (hanging, upright; default hanging)");
+  line.Require("--link");
+  line.Text("--start", a.start, "STATE",
+            "state at the beginning, or q1,q2,w1,w2 in rad and rad/s or with units such as 180deg "
+            "(hanging, upright; default hanging)");
   line.Text("--stuck", a.stuck, "JOINT@SECONDS", "encoder that sticks from a time on");
   line.Arguments(OptionsOf(a.config));
   AddSeed(line, a.seed, "the line's faults and of --draw");

@@ -1,12 +1,14 @@
 #include "extras/machine/drive/supervisor.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
 
 #include "base/error.h"
 #include "base/text.h"
+#include "pendulum/start_text.h"
 
 namespace upswing::machine {
 namespace {
@@ -451,16 +453,13 @@ Joints Supervisor::Torque(const Joints& controller, const CycleFacts& facts) {
 PendulumState ParsePendulumStart(const std::string& text, const std::string& where) {
   if (text == "hanging") return {};
   if (text == "upright") return {std::numbers::pi, 0, 0, 0};
-  std::vector<double> numbers;
-  for (const std::string_view piece : Split(text, ',')) {
-    const auto number = ParseNumber(piece);
-    if (number && Within(*number, kLargestStart)) numbers.push_back(*number);
+  if (std::ranges::count(text, ',') == 3) {
+    const PendulumState s = ParseState(text, where);
+    const std::array numbers{s.q1, s.q2, s.w1, s.w2};
+    if (std::ranges::all_of(numbers, [](double x) { return Within(x, kLargestStart); })) return s;
   }
-  if (numbers.size() != 4 || std::ranges::count(text, ',') != 3) {
-    throw BadInput(Concat(where, ": expected hanging, upright or four numbers q1,q2,w1,w2 within ±",
-                          kLargestStart, ", got \"", Printable(text), "\""));
-  }
-  return {numbers[0], numbers[1], numbers[2], numbers[3]};
+  throw BadInput(Concat(where, ": expected hanging, upright or four numbers q1,q2,w1,w2 within ±",
+                        kLargestStart, " rad and rad/s, got \"", Printable(text), "\""));
 }
 
 }  // namespace upswing::machine
