@@ -17,6 +17,8 @@
 #include "extras/machine/drive/policy_controller.h"
 #include "extras/machine/drive/real_time.h"
 #include "os/streams.h"
+#include "pendulum/start_text.h"
+#include "runs/plant_file.h"
 
 namespace upswing::machine {
 namespace {
@@ -50,7 +52,7 @@ struct RunArguments {
   std::vector<FlagValue> sized;  // the given ones of SizedSettings
   int64_t seed = 1;
   double hz = 500, seconds = 10, compensation = 0;
-  bool differences = false, draw = false;
+  bool differences = false, draw = false, force = false;
 };
 
 std::unique_ptr<MachineLink> g_link;  // global for signal handlers, which may come until the end
@@ -145,6 +147,9 @@ void PrintLimits(const Limits& limits, const Twin& machine) {
 void PrintDriver(const RunArguments& a, const LoadedPolicy& policy) {
   fmt::print("{} on {}, {} Hz, {}\n", Printable(policy.name), Printable(a.link), a.hz,
              NameOf(RobotOf(policy)));
+  if (a.start != "hanging" && a.start != "upright") {
+    fmt::print("  start    {}\n", StateText(ParsePendulumStart(a.start)));
+  }
   const std::string change = ChangeOfSize(policy);
   if (!change.empty()) fmt::print("  {}\n", change);
   const double cycles = CyclesIn(policy.control_period(), std::llround(a.hz));
@@ -216,9 +221,21 @@ void WarnOfRate(const Twin& twin, double hz) {
              -1e3 * twin.actuator.delay, 1 / twin.loop.period);
 }
 
+/// Says how the plant that a policy was made for differs from the twin. Throws BadInput if motors
+/// of a machine would turn without consent.
+void CompareWithTwin(const RunArguments& a, const LoadedPolicy& policy, const Twin& twin,
+                     bool simulated) {
+  const std::string other = DifferencesFromTwin(policy, twin);
+  if (other.empty()) return;
+  const bool drives = !simulated && SettingsFor(a, twin).limits.torque > 0;
+  if (drives && !a.force) {
+    throw BadInput(Concat(other, "; train one with --plant ", a.twin,
+                          ", or give --force if this policy shall drive the machine"));
+  }
+  fmt::print(stderr, "warning: {}\n", other);
+}
+
 int RunRun(const RunArguments& a) {
-  if (a.policy.name.empty()) throw BadInput("run: expected a policy or a controller, got none");
-  if (a.link.empty()) throw BadInput("run: expected --link, got none");
   ParseRobot(a.robot);  // throws
   const LinkAddress address = ParseLink(a.link, /*listens=*/false);
   CheckBaud(address, std::llround(a.hz));
@@ -242,8 +259,7 @@ int RunRun(const RunArguments& a) {
     throw BadInput("--compensation: expected --twin with it, got none");
   const MachinePolicy policy = GetMachinePolicy(a.policy, a.robot, twin, std::llround(a.hz));
   (void)CyclesIn(policy->control_period(), std::llround(a.hz));  // throws
-  const std::string other = twin ? DifferencesFromTwin(*policy, *twin) : "";
-  if (!other.empty()) fmt::print(stderr, "warning: {}\n", other);
+  if (twin) CompareWithTwin(a, *policy, *twin, in_process);
   return Drive(a, policy, twin, address);
 }
 
@@ -252,22 +268,26 @@ int RunRun(const RunArguments& a) {
 void AddRun(CommandLine& line) {
   RunArguments& a = line.Runs(RunRun);
   AddPolicy(line, a.policy);
+  line.Require("policy");
   Options period;
   DescribeControlPeriod(period, &a.policy.control_period);
   line.Arguments(period);
-  line.Text("--link", a.link, "LINK",
-            "machine: a twin (file or shipped plant), udp:HOST:PORT or serial:DEVICE[:BAUD] "
-            "(default 921600 bit/s)");
+  line.Text(
+      "--link", a.link, "LINK",
+      Concat("machine: udp:HOST:PORT, serial:DEVICE[:BAUD] (default 921600 bit/s), or the file "
+             "of a twin or a shipped plant (",
+             Join(NamesOf(EmbeddedPlants()), ", "), "), which is simulated"));
+  line.Require("--link");
   line.Text("--twin", a.twin, "FILE",
             "twin of the machine at a UDP or serial link, for the estimate of its state");
   line.Text("--robot", a.robot, "ROBOT",
             "motor of a controller's design (pendubot, acrobot; default the policy's own)");
   line.Text("--log", a.log, "FILE",
             "new CSV file to write, a row per reading; `machine check` reads it");
-  line.Text(
-      "--start", a.start, "STATE",
-      "state in which the controller takes over, or q1,q2,w1,w2 [rad, rad/s] (hanging, upright; "
-      "default hanging)");
+  line.Text("--start", a.start, "STATE",
+            "state in which the controller takes over, or q1,q2,w1,w2 in rad and rad/s or with "
+            "units such as 180deg (hanging, upright; "
+            "default hanging)");
   Options own;
   own.Section("loop");
   own.Add(&a.hz, "hz", {100, 1000}, "1/s", "cycles per second").step = 50;
@@ -285,6 +305,9 @@ void AddRun(CommandLine& line) {
             "estimate velocities by differences of the angles, without the twin's prediction");
   line.Flag("--draw", a.draw,
             "with a twin as --link: play a machine drawn from the twin's covariance");
+  line.Flag("--force", a.force,
+            "drive a machine at a UDP or serial link with a policy that was made for another plant "
+            "than its twin");
   line.Excludes("--compensation", {"--differences"}, ", which estimates no friction");
   line.Notes(
       "The loop waits for readings (idle), then for the start state (armed). From hanging links,\n"
@@ -296,13 +319,15 @@ void AddRun(CommandLine& line) {
       "Exit code: 0 if the links are upright at the end (with --max-torque 0: in any case), or 1\n"
       "with the reason in a line.\n\n"
       "A controller is designed for the twin without dry friction. --made-for changes this\n"
-      "plant.\n"
+      "plant. A policy that was made for another plant than the twin (inertias, gravity, torque\n"
+      "limit, decisions in the natural time) gets a warning, and drives a machine only with "
+      "--force.\n"
       "Read docs/howto/real-machine.md before you switch on motors.\n");
   line.Examples(
       "  ./upswing run tvlqr --link twin.toml --compensation 0.95 --log rehearsal.csv\n"
       "  ./upswing fake twin.toml --link udp:4000        in another terminal\n"
-      "  ./upswing run runs/d3qn-seed1 --link udp:127.0.0.1:4000 --twin twin.toml\n"
-      "  ./upswing run runs/d3qn-seed1 --link serial:/dev/ttyACM0:921600 --twin twin.toml \\\n"
+      "  ./upswing run runs/twin --link udp:127.0.0.1:4000 --twin twin.toml\n"
+      "  ./upswing run runs/twin --link serial:/dev/ttyACM0:921600 --twin twin.toml \\\n"
       "    --max-torque 2 --max-velocity 10 --seconds 5 --log first.csv\n"
       "  ./upswing machine check first.csv\n");
 }

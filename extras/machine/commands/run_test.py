@@ -327,6 +327,26 @@ class Run(ProgramTest):
         self.assertEqual({row["tau_con1"] for row in rows if row["state"] < 2}, {0})
         self.assertLessEqual(max(abs(row["tau_con1"]) for row in rows), 5)
 
+    def test_a_policy_for_another_plant_needs_consent_on_a_machine(self):
+        other = "sac was made for another plant: inertia "
+        done = self.run_here("run", "sac", "--link", TWIN, "--seconds", 1)
+        self.assertEqual(done.returncode, 1, done)
+        warning, end = done.stderr.splitlines()
+        self.assertTrue(warning.startswith(f"warning: {other}"), warning)
+        self.assertRegex(warning, r"decisions in the natural time [\d.]+ \(twin [\d.]+\)")
+        self.assertIn("not upright", end)
+        fake = Fake(self, "udp:0")
+        run = ["run", "sac", "--link", fake.link, "--seconds", 0.2, *PATIENT]
+        self.refuse(run, other, f"train one with --plant {TWIN}", "give --force")
+        # Without torques nothing moves.
+        done = self.run_here(*run, "--max-torque", 0)
+        self.assertEqual(done.returncode, 0, done)
+        done = self.run_here(*run, "--force")
+        self.assertIn(f"warning: {other}", done.stderr)
+        self.assertIn("ran      0.20 s", done.stdout)
+        # A policy of this plant, and a controller, which is designed for it, need none.
+        self.swing("lqr", "--link", fake.link, "--seconds", 0.2, *PATIENT)
+
     def test_compensation_of_dry_friction(self):
         # The joint without the controller's motor shows it.
         def passive(compensation):
@@ -457,8 +477,8 @@ class Run(ProgramTest):
     def test_bad_arguments(self):
         self.write("twin.toml", TWIN.read_text(encoding="utf-8"))
         for arguments, words in (
-                (["run"], ["expected a policy"]),
-                (["run", "lqr"], ["--link"]),
+                (["run"], ["run: expected POLICY|RUN (policy.safetensors"]),
+                (["run", "lqr"], ["run: expected --link LINK (machine: udp:HOST:PORT, serial:DEVICE", "realaigym-twin"]),
                 (["run", "lqr", "--link", "udp:4000"], ["udp:HOST:PORT"]),
                 (["run", "lqr", "--link", "udp:127.0.0.1:70000"], ["1 to 65535"]),
                 (["run", "lqr", "--link", "serial:none"], ["serial:none", "No such file"]),
@@ -472,8 +492,8 @@ class Run(ProgramTest):
                 (["run", "lqr", "--link", "udp:127.0.0.1:9", "--compensation", "1"], ["--twin"]),
                 (["run", "lqr", "--link", TWIN, "--compensation", "1", "--differences"],
                  ["--compensation", "--differences"]),
-                (["fake"], ["a twin"]),
-                (["fake", "twin.toml"], ["--link"]),
+                (["fake"], ["fake: expected TWIN (twin to play", "realaigym-twin"]),
+                (["fake", "twin.toml"], ["fake: expected --link LINK (udp:PORT"]),
                 (["fake", "twin.toml", "--link", "serial:x"], ["udp:PORT"]),
                 (["fake", "twin.toml", "--link", "udp:0", "--stuck", "3@1"], ["JOINT@SECONDS"]),
                 (["fake", "twin.toml", "--link", "udp:0", "--loss", "2"], ["--loss", "[0, 1]"])):
