@@ -29,4 +29,5 @@ install(FILES LICENSE README.md CHANGELOG.md CITATION.cff DESTINATION ${CMAKE_IN
 install(DIRECTORY web/public/agents DESTINATION ${CMAKE_INSTALL_DATADIR}/upswing/page) # shipped policies
 install(DIRECTORY examples DESTINATION ${CMAKE_INSTALL_DATADIR}/upswing PATTERN "*_test.py" EXCLUDE
         PATTERN "__pycache__" EXCLUDE)
+install(DIRECTORY configs/studies DESTINATION ${CMAKE_INSTALL_DATADIR}/upswing/configs)
 install(PROGRAMS examples/slurm.sh DESTINATION ${CMAKE_INSTALL_DATADIR}/upswing/examples)

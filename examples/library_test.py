@@ -45,6 +45,7 @@ target_compile_options(dqn_on_one_page PRIVATE -O2)
 add_subdirectory(portable)
 add_subdirectory(headers)
 add_subdirectory(wants)
+add_subdirectory(mine)
 """
 PORTABLE_HEADERS = """find_package(upswing REQUIRED COMPONENTS pendulum rl control)
 add_library(portable OBJECT portable.cc)
@@ -67,6 +68,11 @@ endforeach()
 """
 
 
+# The project of the documentation: its CMakeLists.txt and its source.
+DOCUMENTED = (ROOT / "docs/howto/cpp-library.md").read_text(encoding="utf-8")
+MINE = {kind: re.search(rf"(?s)^```{kind}\n(.*?)^```", DOCUMENTED, re.MULTILINE)[1] for kind in ("cmake", "cpp")}
+
+
 class Library(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -82,6 +88,7 @@ class Library(unittest.TestCase):
                            ("portable/portable.cc", cls.all_headers(PORTABLE)),
                            ("headers/CMakeLists.txt", HEADERS),
                            ("headers/all.cc", cls.all_headers(FOLDERS)),
+                           ("mine/CMakeLists.txt", MINE["cmake"]), ("mine/mine.cc", MINE["cpp"]),
                            ("wants/CMakeLists.txt", WANTS)):
             (source / path).parent.mkdir(parents=True, exist_ok=True)
             (source / path).write_text(text, encoding="utf-8")
@@ -119,6 +126,9 @@ class Library(unittest.TestCase):
         self.assertEqual(lines[-2], "solved")
         judged = re.match(r"judged in MuJoCo: (\d+) of 100 episodes", lines[-1])
         self.assertGreaterEqual(int(judged[1]), 95)
+
+    def test_the_project_of_the_documentation(self):
+        self.assertEqual(run(self.build("mine")), "solved\n")
 
     def test_own_task(self):
         program = self.build("own_task")

@@ -232,6 +232,34 @@ class Environments(unittest.TestCase):
                 np.testing.assert_array_equal(x, y)
 
 
+class NothingToDrawWith(unittest.TestCase):
+    """Environments where the packages of upswing[view] are not installed."""
+
+    def test_the_message_says_what_to_install(self):
+        for missing, mode, call in (("OpenGL", "rgb_array", "env.render()"), ("glfw", "human", "env.step([0.0])")):
+            with self.subTest(missing=missing):
+                script = (
+                    "import sys\n"
+                    "class Missing:\n"
+                    "    def find_spec(self, name, path=None, target=None):\n"
+                    f"        if name.partition('.')[0] == {missing!r}:\n"
+                    "            raise ModuleNotFoundError(f'No module named {name!r}', name=name)\n"
+                    "sys.meta_path.insert(0, Missing())\n"
+                    "import gymnasium as gym, upswing\n"
+                    f"env = gym.make({ID!r}, render_mode={mode!r}).unwrapped\n"
+                    "try:\n"
+                    "    env.reset(seed=0)\n"
+                    f"    {call}\n"
+                    "except upswing.Failure as failure:\n"
+                    "    print(failure)\n")
+                done = subprocess.run([sys.executable, "-c", script], check=False, capture_output=True,
+                                      encoding="utf-8")
+                self.assertEqual(done.returncode, 0, done.stderr)
+                self.assertRegex(done.stdout, rf"render: cannot .*No module named '{missing}': expected its Python "
+                                              r"packages: pip install .*mujoco-core\[rendering\].* pip install "
+                                              r"'upswing\[view\]'\)\n\Z")
+
+
 class Rendering(unittest.TestCase):
     @classmethod
     def setUpClass(cls):

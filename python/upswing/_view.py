@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 PACKAGES = '"mujoco-core[rendering]==4.0.0" pillow av'
+INSTALL = f"expected its Python packages: pip install {PACKAGES} (with the wheel: pip install 'upswing[view]')"
 os.environ.setdefault("MUJOCO_GL", "egl")  # draws without a display
 try:
     import mujoco
@@ -246,6 +247,8 @@ def _new_geom(scene: mujoco.MjvScene, kind: int, at: Any, color: tuple[float, ..
 
 def _cannot_draw(error: Exception) -> CannotDraw:
     text = str(error).partition("\n")[0]
+    if isinstance(error, ModuleNotFoundError):
+        return CannotDraw(f"cannot draw: {text}: {INSTALL}")
     return CannotDraw(
         f"cannot draw without a display: {text}: expected EGL (Debian's packages libegl1 and "
         f"libgl1-mesa-dri) and the Python packages {PACKAGES}")
@@ -355,8 +358,7 @@ def _check_display() -> None:
     try:
         import glfw  # pylint: disable=import-outside-toplevel
     except ImportError as error:
-        raise CannotDraw(f"cannot open a window: {error}: expected the Python packages {PACKAGES}"
-                         ) from error
+        raise CannotDraw(f"cannot open a window: {error}: {INSTALL}") from error
     if not os.environ.get("DISPLAY") and not os.environ.get("WAYLAND_DISPLAY"):
         raise CannotDraw("cannot open a window: DISPLAY and WAYLAND_DISPLAY are not set: "
                          "expected a display; recordings and rgb_array need none")

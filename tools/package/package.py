@@ -119,7 +119,8 @@ class Packager:
         self.environment = {"DPKG_DEB_COMPRESSOR_TYPE": "xz"} | os.environ | {
             "SOURCE_DATE_EPOCH": str(self.epoch)}
         self.system = "windows" if target.preset == "windows" else "linux"
-        self.name = f"upswing-{self.version}-{self.system}-{target.machine}"
+        # Without "upswing-" at the beginning: pip takes what follows for the version of a source package.
+        self.name = f"upswing_{self.version}_{self.system}_{target.machine}"
         self.venvs = arguments.work
         self.work = arguments.work / (self.system if self.system == "windows" else target.machine)
         self.tree = self.work / self.name
@@ -255,6 +256,7 @@ Description: controllers that swing up and balance a double pendulum
                         ignore=shutil.ignore_patterns("mujoco"))
         for name in ("NOTICE", "sbom.cdx.json"):
             shutil.copy2(self.tree / "share/doc/upswing" / name, files / name)
+        shutil.copytree(self.tree / "share/doc/upswing/html", files / "share/doc/upswing/html")
         return [self.wheel(python, files) for python in find_pythons()[0]]
 
     def wheel(self, python, files):

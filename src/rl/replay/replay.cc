@@ -59,9 +59,10 @@ void Replay::Gather(RowRange rows, Minibatch& batch) const {
   }
   for (int i = rows.first; i < rows.first + rows.count; ++i) {
     const Transition t = at(batch.index[i]);
-    std::ranges::copy(t.obs, batch.obs.data() + i * obs_size_);
-    std::ranges::copy(t.next_obs, batch.next_obs.data() + i * obs_size_);
-    std::ranges::copy(t.action, batch.action.data() + i * action_size());
+    // Not std::ranges::copy: gcc 14 warns that it may copy a negative number of bytes.
+    std::copy_n(t.obs.data(), obs_size_, batch.obs.data() + i * obs_size_);
+    std::copy_n(t.next_obs.data(), obs_size_, batch.next_obs.data() + i * obs_size_);
+    std::copy_n(t.action.data(), action_size(), batch.action.data() + i * action_size());
     batch.reward[i] = static_cast<float>(t.reward);
     batch.discount[i] = static_cast<float>(t.discount);
   }
