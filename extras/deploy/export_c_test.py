@@ -347,9 +347,25 @@ class HeadersTest(HeaderTest):
         for flag in ("--c", "--onnx"):
             self.refuse(["export", "far.safetensors", flag, "x"], "far.safetensors", "float", "1e+300")
 
+    def test_only_an_export_is_replaced(self):
+        policy = AGENTS / "fast.safetensors"
+        for flag in ("--c", "--onnx"):
+            for text in ("int main(void) { return 0; }\n", ""):
+                with self.subTest(flag=flag, text=text):
+                    self.write("mine", text)
+                    self.refuse(["export", policy, flag, "mine"],
+                                f"{flag} mine: expected a new file, got one that exists; --overwrite replaces it")
+                    out = self.succeed("export", policy, flag, "mine", "--overwrite")
+                    self.assertIn(", in place of the file that was there\n", out)
+            # An export may be made again.
+            self.assertIn("in place of", self.succeed("export", AGENTS / "sac.safetensors", flag, "mine"))
+            self.assertNotIn("in place of", self.succeed("export", policy, flag, f"new{flag}"))
+        # A header is no ONNX file, nor the other way round.
+        self.refuse(["export", policy, "--c", "mine"], "--overwrite")
+
     def test_bad_usage(self):
         policy = AGENTS / "fast.safetensors"
-        self.refuse(["export"], "--page, --onnx or --c", "none")
+        self.refuse(["export"], "expected --onnx FILE, --c FILE.h or --page FOLDER", "none")
         self.refuse(["export", "--c", "x.h"], "--c", "none")
         self.refuse(["export", policy, policy, "--onnx", "x.onnx"], "--onnx", "got 2")
         self.refuse(["export", policy, "--onnx", "a", "--c", "b"], "--onnx: expected no --c")

@@ -1,7 +1,10 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/error.h"
@@ -23,6 +26,7 @@ struct ExportArguments {
   PolicyArguments controller;  // settings of a controller
   std::string page, id, onnx, c, prefix;
   int64_t checkpoints = 0;
+  bool overwrite = false;
 };
 
 /// The single policy that `flag` exports.
@@ -36,24 +40,53 @@ LoadedPolicy SinglePolicy(const ExportArguments& a, const char* flag) {
   return GetPolicy(policy);
 }
 
+/// The first words of a file, without line breaks and the stars of a C comment.
+std::string BeginOf(const std::string& path) {
+  constexpr size_t kMost = 4096;  // bytes
+  std::ifstream file(path, std::ios::binary);
+  std::string text(kMost, '\0');
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<size_t>(std::max<std::streamsize>(0, file.gcount())));
+  std::string words;
+  for (const char c : text) {
+    const bool blank = c == '\n' || c == '*' || c == ' ';
+    if (!blank || !words.ends_with(' ')) words += blank ? ' ' : c;
+  }
+  return words;
+}
+
+/// Checks an output before the work. An older export, which begins with `mark`, may be replaced;
+/// another file only with --overwrite. Returns a remark on the replaced file, or "". Throws
+/// BadInput.
+std::string CheckExport(const ExportArguments& a, const std::string& flag, const std::string& path,
+                        std::string_view mark) {
+  std::error_code error;
+  const bool exists = !IsStandardStream(path) && fs::is_regular_file(path, error);
+  const bool is_export = exists && BeginOf(path).find(mark) != std::string::npos;
+  CheckNewOutput(flag, path, a.overwrite || is_export);
+  return exists ? ", in place of the file that was there" : "";
+}
+
 int ExportOnnx(const ExportArguments& a) {
   const LoadedPolicy loaded = SinglePolicy(a, "--onnx");
+  const std::string replaced = CheckExport(a, "--onnx", a.onnx, "upswing");
   const std::string model = OnnxModelOf(loaded);
   WriteOutput(a.onnx, model);
   if (!IsStandardStream(a.onnx)) {
-    fmt::print("{} ({} KB), {}\n", Printable(a.onnx), model.size() / 1024,
-               loaded.policy->description());
+    fmt::print("{} ({} KB), {}{}\n", Printable(a.onnx), model.size() / 1024,
+               loaded.policy->description(), replaced);
   }
   return 0;
 }
 
 int ExportC(const ExportArguments& a) {
   const LoadedPolicy loaded = SinglePolicy(a, "--c");
+  const std::string replaced = CheckExport(a, "--c", a.c, "Written by Upswing");
   const CHeader header = CHeaderOf(loaded, a.prefix.empty() ? CPrefixOf(a.c, loaded) : a.prefix);
   WriteOutput(a.c, header.text);
   if (IsStandardStream(a.c)) return 0;
-  fmt::print("{} ({} KB), names begin with {}_\n", Printable(a.c), header.text.size() / 1024,
-             header.prefix);
+  fmt::print("{} ({} KB), names begin with {}_{}\n", Printable(a.c), header.text.size() / 1024,
+             header.prefix, replaced);
   fmt::print("  flash       {} bytes of constants\n", FormatCount(header.constant_bytes));
   fmt::print(
       "  RAM         {} bytes of state; stack of a call: {} bytes of arrays, and up to 200 more\n",
@@ -78,7 +111,7 @@ int ExportPage(const ExportArguments& a) {
 
 int RunExport(const ExportArguments& a) {
   if (a.page.empty() && a.onnx.empty() && a.c.empty()) {
-    throw BadInput("export: expected --page, --onnx or --c, got none");
+    throw BadInput("export: expected --onnx FILE, --c FILE.h or --page FOLDER, got none");
   }
   if (!a.prefix.empty() && a.c.empty()) throw BadInput("--prefix: expected --c with it, got none");
   if (a.checkpoints > 0 && a.page.empty()) {
@@ -111,11 +144,12 @@ void AddExport(CommandLine& line) {
       "-: standard output");
   line.Text("--prefix", a.prefix, "NAME",
             "prefix of all names in the C header (default the file name)", "a name");
+  line.Flag("--overwrite", a.overwrite, "replace a file that is no export");
   line.Text("--page", a.page, "FOLDER",
             "folder of the page's agents to write into; replaces agents with the same ID");
   line.Text("--id", a.id, "ID",
             "ID of a single policy in the page (default name of the run, or agent)", "an ID");
-  line.Excludes("--page", {"--onnx", "--c"});
+  line.Excludes("--page", {"--onnx", "--c", "--overwrite"});
   line.Excludes("--onnx", {"--c"});
   line.Excludes("--id", {"--onnx", "--c"});
   Options own;

@@ -122,9 +122,15 @@ class HelpFormatter : public CLI::Formatter {
 
   /// The flags of a group, with its name above them; empty if there are none to show.
   std::string Group(const CLI::App& app, const std::string& group) const {
-    const std::vector<const CLI::Option*> flags = app.get_options([&](const CLI::Option* option) {
+    std::vector<const CLI::Option*> flags = app.get_options([&](const CLI::Option* option) {
       return option->get_group() == group && option->nonpositional();
     });
+    // The command's own flags by name, --help first. Settings keep the order of their descriptions.
+    if (group == kOwnFlags) {
+      std::ranges::sort(flags, {}, [&](const CLI::Option* option) {
+        return std::pair(option != app.get_help_ptr(), option->get_name());
+      });
+    }
     return group.empty() || flags.empty() ? "" : make_group(group, false, flags);
   }
 };

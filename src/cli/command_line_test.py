@@ -42,6 +42,15 @@ class HelpTest(ProgramTest):
         self.assertNotIn("  --gamma", short.split("Options:")[1])
         self.assertTrue(short.endswith("\n--help also shows all settings.\n"))
 
+    def test_own_flags_are_sorted(self):
+        for command in ("train", "eval", "map", "view", "study", "grade", "run", "export", "machine identify"):
+            for flag in ("--help", "-h"):
+                with self.subTest(command=command, flag=flag):
+                    text = self.succeed(*command.split(), flag).split("\nOptions:\n")[1].split("\n\n")[0]
+                    flags = re.findall(r"(?m)^  (?:-h,)?(--[a-z-]+)", text)
+                    self.assertGreater(len(flags), 4)
+                    self.assertEqual(flags, ["--help", *sorted(flags[1:])])
+
     # The function of zsh is called as zsh's bashcompinit calls it.
     COMPLETIONS = {
         "bash": ("source <({0} completion bash); COMP_WORDS=({1} {2} '{3}'); COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1)); "
@@ -72,6 +81,11 @@ class HelpTest(ProgramTest):
                  ("upswing", "eval fast --plant", "mine", {"mine.toml", "mine-seed1"}),
                  ("upswing", "eval fast --made-for", "realaigym-", {"realaigym-c1", "realaigym-twin"}),
                  ("upswing", "run fast --link", "realaigym-", {"realaigym-c1", "realaigym-twin"}),
+                 ("upswing", "run fast --link", "ser", {"serial:"}),
+                 ("upswing", "run fast --link", "ud", {"udp:"}),
+                 ("upswing", "fake", "cloud", {"cloudpendulum"}),
+                 ("upswing", "fake x.toml --link", "p", {"pty"}),
+                 ("upswing", "machine identify --plant", "real", {"realaigym", "realaigym-c1", "realaigym-twin"}),
                  ("upswing", "run fast --robot", "", {"pendubot", "acrobot"}),
                  ("upswing", "eval hybrid --swing-up", "do", {"double-dqn"}),
                  ("upswing", "train --start-policy", "mine-", {"mine-seed1"}),

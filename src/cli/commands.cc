@@ -148,6 +148,10 @@ void AddPlant(CommandLine& line, std::string& plant) {
   });
 }
 
+void AddOverwrite(CommandLine& line, bool& overwrite) {
+  line.Flag("--overwrite", overwrite, "replace the file that is written, if it exists");
+}
+
 void AddUnknownPlant(CommandLine& line, bool& unknown_plant) {
   line.Flag("--unknown-plant", unknown_plant,
             "scale observed energy and height by the training's plant, not the episode's");
@@ -181,7 +185,9 @@ void AddTrialOptions(CommandLine& line, TrialArguments& a, const std::string& se
 
 void AddEpisodeOptions(CommandLine& line, TrialArguments& a) {
   line.Text("--start", a.start, "q1,q2,w1,w2",
-            "start state [rad, rad/s] (default 0,0,0,0: hanging)", "4 numbers q1,q2,w1,w2");
+            "start state in rad and rad/s, or with units, such as 180deg,0,0,-90deg/s (default "
+            "0,0,0,0: hanging)",
+            "4 numbers q1,q2,w1,w2");
   Options own;
   own.Add(&a.episode, "episode", {0, 999999}, "",
           "index of the episode of `eval` with the same flags")

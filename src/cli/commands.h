@@ -72,6 +72,9 @@ void WarnOfDistrust(const std::string& name, const std::string& distrust);
 /// Adds --plant, the argument of ReadPlantFile. Warns if the plant is not to be trusted.
 void AddPlant(CommandLine& line, std::string& plant);
 
+/// Adds --overwrite, which lets the command replace the file of an output.
+void AddOverwrite(CommandLine& line, bool& overwrite);
+
 /// Adds --unknown-plant: on another plant, observations are still scaled as in training.
 void AddUnknownPlant(CommandLine& line, bool& unknown_plant);
 

@@ -50,7 +50,8 @@ void AddCompare(CommandLine& line) {
       "Runs that differ only in the seed are one group. Figures are over the runs of a\n"
       "group: the interquartile mean (IQM) with a 95% bootstrap interval. A run that did\n"
       "not solve the task counts as one that needs more than its budget. Groups are\n"
-      "compared if they are evaluated on the same task. A note names each broken or\n"
+      "compared if they are evaluated on the same task, in the order of their names. Groups of\n"
+      "one name have their differences or their folder after it. A note names each broken or\n"
       "unfinished run and each folder without a run; they are left out.\n");
   line.Examples(
       "  ./upswing compare runs/d3qn-seed*               one agent over its seeds\n"

@@ -27,6 +27,9 @@ constexpr const char* kAwk = R"(
       if (last == "--agent") add(agents)
       if (about ~ /shipped polic/) add(policies)
       if (about ~ /shipped plant|plant file|twin/ && about !~ /to write/) add(plants)
+      if (about ~ /udp:[A-Z]/) add("udp:")
+      if (about ~ /serial:[A-Z]/) add("serial:")
+      if (about ~ / pty:/) add("pty")
       for (rest = about; match(rest, /\([a-z0-9-]+(, [a-z0-9-]+)+[;)]/);) {
         add(substr(rest, RSTART + 1, RLENGTH - 2))
         rest = substr(rest, RSTART + RLENGTH)

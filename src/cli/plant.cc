@@ -43,7 +43,7 @@ struct PlantArguments {
   std::vector<std::string> drop;
   double motor = 0;                      // 0: not given
   double torque_limit = 0, length2 = 0;  // N·m, m; 0: not given
-  bool convert_friction = false;
+  bool convert_friction = false, overwrite = false;
 };
 
 /// The instructions of the Python program. Throws BadInput.
@@ -113,7 +113,7 @@ void ExpectNoPart(const std::string& out, const nlohmann::json& files) {
 }
 
 int RunPlant(const PlantArguments& a) {
-  CheckWritable("--out", a.out);
+  CheckNewOutput("--out", a.out, a.overwrite);
   int code = 0;
   InstallSignalHandlers("");
   PythonChild reader("plant", PlantProgram(),
@@ -160,6 +160,7 @@ void AddPlantCommand(CommandLine& line) {
             "MJCF or URDF file of a double pendulum, with its includes and meshes in its folder");
   line.Require("model");
   line.Text("--out", a.out, "FILE", "plant file (TOML) to write; -: standard output (default -)");
+  AddOverwrite(line, a.overwrite);
   line.Repeated("--drop", a.drop, "NAME",
                 Concat("property to leave out, because a plant file cannot hold it (repeatable): ",
                        Join(kDroppable, ", ")));

@@ -75,7 +75,7 @@ class PlantCommandTest(ProgramTest):
 
     def read(self, text, *arguments, name="model.xml"):
         """The settings of the plant of a model, and the comments above them."""
-        output = self.succeed("plant", self.write(name, text), "--out", "plant.toml", *arguments,
+        output = self.succeed("plant", self.write(name, text), "--out", "plant.toml", "--overwrite", *arguments,
                               env=self.ENVIRONMENT)
         difference = float(re.search(r"by at most (\S+) rad", output)[1])
         self.assertLess(difference, 1e-6)
@@ -354,7 +354,7 @@ class Strangers(PlantCommandTest):
         for name, text in parts.items():
             self.write(name, text)
         for name in ("motor.xml", "./motor.xml", "model.xml"):
-            self.refuse(["plant", "model.xml", "--out", name], "--out: expected another file than ", "be lost",
+            self.refuse(["plant", "model.xml", "--out", name, "--overwrite"], "--out: expected another file than ", "be lost",
                         env=self.ENVIRONMENT)
         for name, text in parts.items():
             self.assertEqual((self.folder / name).read_text(encoding="utf-8"), text)

@@ -4,7 +4,7 @@
 import re
 import unittest
 
-from testing import ProgramTest, read_csv, read_tensors, small
+from testing import ROOT, ProgramTest, read_csv, read_tensors, small
 
 REWARD = "energy: E; height: h - 0.5; term3: -0.01*tau^2 - 0.001*abs(dtau) + upright"
 
@@ -41,6 +41,26 @@ class RewardTest(ProgramTest):
         self.assertIn(words, self.succeed(*small(steps=400, reward="E", energy_weight=2)))
         self.assertNotIn(words, self.succeed(*small(steps=400, energy_weight=2, out="built-in")))
         self.assertNotIn("has no effect", self.succeed(*small(steps=400, reward="E", out="own")))
+
+    def test_the_built_in_reward_can_be_pasted_with_its_line_breaks(self):
+        page = (ROOT / "docs/howto/reward.md").read_text(encoding="utf-8")
+        texts = [re.findall(r'--reward "(energy: E; height[^"]*)"', text)[-1]
+                 for text in (page, self.succeed("train", "--help"))]
+        texts.append(texts[0].replace("\n", "\r\n") + "\n")
+        same = {"steps": 2000, "physics": "mujoco", "episode_seconds": 1}
+        self.succeed(*small(**same, out="usual"))
+        expected = [row["return"] for row in read_csv(self.folder / "usual/episodes.csv")]
+        for i, text in enumerate(texts):
+            self.assertIn("\n", text)
+            self.succeed(*small(**same, reward=text, out=f"run{i}"))
+            rows = read_csv(self.folder / f"run{i}/episodes.csv")
+            self.assertEqual([row["return"] for row in rows], expected)
+            self.assertEqual(list(rows[0])[5:], ["energy", "height", "balance", "velocity", "torque"])
+        # The same from a file with a text of several lines, as TOML writes them.
+        self.write("my.toml", f'reward = """\n{texts[0]}"""\n')
+        self.succeed(*small(**same, out="file"), "--config", "my.toml")
+        self.assertEqual([row["return"] for row in read_csv(self.folder / "file/episodes.csv")], expected)
+        self.refuse(small(start_policy="a\nb"), "start-policy")
 
     def mirrors(self, run):
         """Whether the settings of a run mirror its minibatches."""

@@ -11,6 +11,7 @@
 #include "cli/signals.h"
 #include "cli/study_work.h"
 #include "cli/train_many.h"
+#include "os/command.h"
 #include "os/file.h"
 #include "os/host.h"
 #include "os/lock_check.h"
@@ -65,11 +66,19 @@ ManyRuns ReadStudy(const StudyArguments& arguments) {
     throw BadInput(
         Concat(file.string(), ": expected a line such as seeds = 10, or --seeds, got neither"));
   }
+  if (before) SayKeptSeeds(KeepFinishedSeeds(*before, plan));
   many.jobs = arguments.jobs;
   if (many.jobs == 0) many.jobs = DefaultJobs(plan.variants.front().config.train.threads);
   for (const Variant& variant : plan.variants)
     CheckMemory(variant.config, AvailableMemory(), many.jobs);
   return many;
+}
+
+/// The study file of this name, or the one that the package has under it.
+std::string FindStudy(const std::string& file) {
+  const fs::path shipped = SharePath() / file;
+  const bool is_shipped = !file.empty() && !Exists(file) && IsInstalled() && IsFile(shipped);
+  return is_shipped ? shipped.string() : file;
 }
 
 /// Compares the finished runs of a study.
@@ -194,7 +203,10 @@ void AddStudy(CommandLine& line) {
       "  ./upswing study --work runs/post          one more worker, on any host\n"
       "  ./upswing study --check-locks runs        on two hosts at the same time, before a "
       "study\n");
-  line.Check([&arguments] { CheckArguments(arguments); });
+  line.Check([&arguments] {
+    CheckArguments(arguments);
+    arguments.file = FindStudy(arguments.file);
+  });
   line.Excludes("--work", {"--out", "--seeds", "--jobs", "--keep", "--status", "--prepare"});
   line.Excludes("--check-locks",
                 {"--out", "--seeds", "--jobs", "--keep", "--status", "--prepare", "--work"});

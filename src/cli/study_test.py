@@ -176,6 +176,22 @@ class StudyTest(ProgramTest):
         self.refuse(["study", "little.toml"], "little/but/settings.toml: made with agent.gamma = 0.9",
                     "has 0.8", "choose another --out")
 
+    def test_finished_seeds_stay(self):
+        self.write("little.toml", STUDY)
+        self.succeed("study", "little.toml", "--seeds", 3)
+        tables = {name: (self.folder / "runs/little" / name).read_bytes()
+                  for name in ("summary.csv", "runs.csv", "evaluations.csv", "plan.json")}
+        output = self.succeed("study", "little.toml", "--seeds", 2)
+        self.assertIn("Finished seeds stay in the tables, too: 3\n", output)
+        for name, text in tables.items():
+            self.assertEqual((self.folder / "runs/little" / name).read_bytes(), text, name)
+        # A seed that a variant has not finished goes; its files stay.
+        (self.folder / "runs/little/but/seed3.done").unlink()
+        output = self.succeed("study", "little.toml", "--seeds", 2)
+        self.assertNotIn("stay", output)
+        self.assertIn('"[1-2]"', (self.folder / "runs/little/plan.json").read_text(encoding="utf-8"))
+        self.assertTrue((self.folder / "runs/little/but/seed3/policy.safetensors").exists())
+
     def test_a_folder_of_something_else_is_refused(self):
         self.write("little.toml", STUDY)
         self.succeed(*small(**FLAGS | {"out": "run"}))

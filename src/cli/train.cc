@@ -52,6 +52,7 @@ int RunSeeds(const TrainArguments& arguments) {
   many.what = config.agent;
   plan.folder = arguments.out.empty() ? fs::path("runs") / config.agent : fs::path(arguments.out);
   plan.seeds = ParseSeeds(arguments.seeds, "--seeds");
+  if (const auto before = PlanBefore(plan.folder)) SayKeptSeeds(KeepFinishedSeeds(*before, plan));
   many.jobs = arguments.jobs > 0 ? arguments.jobs : DefaultJobs(config.train.threads);
   many.more_steps = StepsGiven(arguments.flags);
   CheckMemory(config, AvailableMemory(), many.jobs);
@@ -145,6 +146,10 @@ void AddTrain(CommandLine& line) {
       "  ./upswing train --seeds 10              train or resume runs/d3qn/seed1 to 10\n"
       "  ./upswing train --seeds 3,5,8-12 --jobs 2 --out runs/many\n");
   line.Notes(AgentsText() +
+             "\nThe built-in reward as an expression, to change it (docs/howto/reward.md):\n"
+             "  --reward \"energy: E; height: h; balance: 5*inverted;\n"
+             "    velocity: -0.01*inverted*(w1*w1 + w2*w2);\n"
+             "    torque: -(0.01 + 0.04*inverted)*tau*tau\"\n"
              "\nSIGINT and SIGTERM write a checkpoint and end the program with exit code 130 or\n"
              "143. SIGUSR1 writes a checkpoint, and the training continues. Other exit codes:\n"
              "0: done; 1: failed; 2: bad usage or input.\n");

@@ -330,6 +330,11 @@ int TrainMany(const ManyRuns& many) {
                        " failed; first ", runs.front().name, ": ", runs.front().problem));
 }
 
+void SayKeptSeeds(const std::vector<int64_t>& seeds) {
+  if (seeds.empty()) return;
+  Say("Finished seeds stay in the tables, too: {}\n", SeedsText(seeds));
+}
+
 Comparison CompareRuns(const StudyPlan& plan) {
   CompareRequest request{.root = plan.folder, .different_tasks = true};
   for (const SeedRun& run : RunsOf(plan)) request.paths.push_back(run.path.string());

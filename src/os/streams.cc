@@ -49,6 +49,15 @@ void CheckWritable(const std::string& flag, const std::string& path) {
   system::Remove(path);
 }
 
+void CheckNewOutput(const std::string& flag, const std::string& path, bool overwrite) {
+  std::error_code error;
+  if (!overwrite && !IsStandardStream(path) && std::filesystem::is_regular_file(path, error)) {
+    throw BadInput(Concat(flag, " ", path,
+                          ": expected a new file, got one that exists; --overwrite replaces it"));
+  }
+  CheckWritable(flag, path);
+}
+
 void WriteOutput(const std::string& path, std::string_view text) {
   if (IsStandardStream(path)) {
     std::fwrite(text.data(), 1, text.size(), stdout);  // main() reports a failure

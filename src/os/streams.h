@@ -20,6 +20,9 @@ std::string ReadInput(const std::string& path);
 /// Standard output is always writable.
 void CheckWritable(const std::string& flag, const std::string& path);
 
+/// Throws as CheckWritable does, and if a file is there that the user does not `overwrite`.
+void CheckNewOutput(const std::string& flag, const std::string& path, bool overwrite);
+
 /// Writes a file as WriteNamedFile does, or writes to standard output.
 void WriteOutput(const std::string& path, std::string_view text);
 

@@ -19,7 +19,7 @@ struct CompareRequest {
 
 /// Figures of groups of runs and of pairs of groups.
 struct Comparison {
-  std::vector<RunGroup> groups;    // in the order of discovery
+  std::vector<RunGroup> groups;    // in the order of their names
   std::vector<PairSummary> pairs;  // each group with each earlier one
   // Of each task: the settings that differ between tasks. CompareRequest::different_tasks: only
   // one.

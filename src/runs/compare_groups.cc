@@ -53,8 +53,19 @@ std::string Differences(
   return Join(parts, ", ");
 }
 
+/// The folder of the only run of a group, or the one that holds all of them; empty if they are in
+/// several.
+std::string FolderOf(const RunGroup& group) {
+  const auto& runs = group.runs;
+  if (runs.size() == 1) return runs.front().path.string();
+  const auto parent = runs.front().path.parent_path();
+  const auto inside = [&](const RunRecord& run) { return run.path.parent_path() == parent; };
+  return std::ranges::all_of(runs, inside) ? parent.string() : "";
+}
+
 /// Sets how each group (with these `settings`) differs from the others. Groups with the same name
-/// get a second name: their differences from each other, or a number if there are many.
+/// get a second name: their differences from each other; if those are long, their folder; if
+/// another one has the same folder, a number.
 void TellGroupsApart(std::vector<RunGroup>& groups, const std::vector<Options>& settings) {
   std::vector<const Options*> all;
   std::map<std::string, std::vector<const Options*>> namesakes;
@@ -62,7 +73,8 @@ void TellGroupsApart(std::vector<RunGroup>& groups, const std::vector<Options>& 
     all.push_back(&settings[i]);
     namesakes[groups[i].label].push_back(&settings[i]);
   }
-  std::map<std::string, int> count;
+  std::map<std::string, int> count, in_folder;
+  for (const RunGroup& group : groups) ++in_folder[FolderOf(group)];
   for (size_t i = 0; i < groups.size(); ++i) {
     std::string& label = groups[i].label;
     groups[i].differences = Differences(settings[i], all);
@@ -70,8 +82,14 @@ void TellGroupsApart(std::vector<RunGroup>& groups, const std::vector<Options>& 
     if (same_name.size() == 1) continue;
     const int number = ++count[label];
     const std::string differences = Differences(settings[i], same_name);
-    label += differences.empty() || differences.size() > kLongText ? Concat(" #", number)
-                                                                   : Concat(" (", differences, ")");
+    const std::string folder = FolderOf(groups[i]);
+    if (!differences.empty() && differences.size() <= kLongText) {
+      label += Concat(" (", differences, ")");
+    } else if (!folder.empty() && in_folder[folder] == 1) {
+      label += Concat(" in ", folder);
+    } else {
+      label += Concat(" #", number);
+    }
   }
 }
 
@@ -205,6 +223,8 @@ Comparison GroupRuns(const CompareRequest& request) {
   for (RunGroup& group : groups) {
     std::ranges::sort(group.runs, {}, [](const RunRecord& run) { return run.config.train.seed; });
   }
+  // One order, in which pairs are compared, whatever the order of the runs on the command line.
+  std::ranges::stable_sort(groups, {}, &RunGroup::label);
   std::vector<Options> settings;
   for (RunGroup& group : groups) {
     Config& config = group.runs.front().config;

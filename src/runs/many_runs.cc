@@ -1,6 +1,7 @@
 #include "runs/many_runs.h"
 
 #include <algorithm>
+#include <iterator>
 #include <optional>
 
 #include "base/error.h"
@@ -71,6 +72,21 @@ FolderLock Prepare(const ManyRuns& many) {
   if (!many.study_file.empty()) WriteIfOther(plan.folder / "study.toml", many.study_file);
   for (const SeedRun& run : RunsOf(plan)) fs::remove(run.failed());  // so that it is tried again
   return std::move(*lock);
+}
+
+std::vector<int64_t> KeepFinishedSeeds(const StudyPlan& before, StudyPlan& plan) {
+  StudyPlan others = plan;
+  others.seeds.clear();
+  std::ranges::copy_if(before.seeds, std::back_inserter(others.seeds), [&](int64_t seed) {
+    return std::ranges::find(plan.seeds, seed) == plan.seeds.end();
+  });
+  for (const SeedRun& run : RunsOf(others)) {
+    if (!IsFile(run.done())) std::erase(others.seeds, run.seed);
+  }
+  if (others.seeds.empty()) return {};
+  std::ranges::copy(others.seeds, std::back_inserter(plan.seeds));
+  std::ranges::sort(plan.seeds);
+  return others.seeds;
 }
 
 int DefaultJobs(int64_t threads) {

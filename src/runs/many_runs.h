@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "os/lock.h"
 #include "runs/study_plan.h"
@@ -23,6 +24,10 @@ struct ManyRuns {
 /// Throws BadInput, before it touches anything, if the folder holds something else or runs with
 /// other settings.
 FolderLock Prepare(const ManyRuns& many);
+
+/// Adds the seeds of the plan `before` in the same folder for which all variants are finished.
+/// Returns the added ones.
+std::vector<int64_t> KeepFinishedSeeds(const StudyPlan& before, StudyPlan& plan);
 
 /// Best number of simultaneous runs if each run has `threads` threads.
 int DefaultJobs(int64_t threads);

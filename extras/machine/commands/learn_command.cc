@@ -52,8 +52,6 @@ std::string CommandOf(const LearnArguments& a, const Limits& limits, const Learn
 
 /// The settings of the session. Throws BadInput for missing or wrong arguments.
 LearnConfig LearnConfigOf(const LearnArguments& a) {
-  if (a.link.empty()) throw BadInput("machine learn: expected --link, got none");
-  if (a.out.empty()) throw BadInput("machine learn: expected --out FOLDER, got none");
   LearnConfig config = a.config;
   SetFlags(OptionsOf(config.limits), a.limits);
   const bool has_torque = std::ranges::count(a.limits, "max_torque", &FlagValue::name) > 0;
@@ -150,9 +148,12 @@ void AddLearn(CommandLine& line) {
             "machine: udp:HOST:PORT or serial:DEVICE[:BAUD], or a twin (file or shipped plant) to "
             "play it in simulated time");
   line.Text("--out", a.out, "FOLDER", "new folder to write: logs, twin.toml, report.txt");
+  line.Require("--link");
+  line.Require("--out");
   line.Text("--robot", a.robot, "ROBOT",
             "pendubot (motor at joint 1) or acrobot (joint 2) (default pendubot)");
   line.Arguments(OptionsOf(a.config));
+  line.Require("--encoder-counts");
   line.Settings(OptionsOf(a.config.limits), a.limits);
   AddSeed(line, a.seed, "the excitations and of simulated tries");
   AddThreads(line, a.threads);

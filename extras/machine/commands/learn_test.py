@@ -17,13 +17,13 @@ LEARN = ["machine", "learn", "--encoder-counts", 16470, "--out", "today"]
 class Learn(ProgramTest):
     def test_bad_input_is_one_line(self):
         for arguments, *words in [
-                (["machine", "learn"], "expected --link, got none"),
+                (["machine", "learn"], "machine learn: expected --link LINK (machine: udp:HOST:PORT"),
                 ([*LEARN, "--link", TWIN, "--length", 0.1], "--length: expected --max-torque with it, got none"),
                 ([*LEARN, "--link", TWIN, "--length", 0], "--length: expected a number in [0.02, 200]", '"0"'),
                 ([*LEARN, "--link", TWIN, "--max-torque", "strong"], "--max-torque", '"strong"'),
-                (["machine", "learn", "--link", TWIN], "expected --out FOLDER, got none"),
+                (["machine", "learn", "--link", TWIN], "expected --out FOLDER (new folder", "got none"),
                 (["machine", "learn", "--link", TWIN, "--out", "today"],
-                 "expected --encoder-counts, got none"),
+                 "expected --encoder-counts INTEGER (", "got none"),
                 ([*LEARN, "--link", TWIN, "--max-energy", 0.9],
                  "--max-energy: expected 1.1 or more for a swing-up, got 0.9"),
                 ([*LEARN, "--link", TWIN, "--robot", "cartpole"],

@@ -37,7 +37,7 @@ struct MachineArguments {
   std::vector<std::string> against;
   int64_t folds = 5, threads = 0;
   double seconds = 0;  // 0: by the natural time of the machine
-  bool as_json = false, one_body = false;
+  bool as_json = false, one_body = false, overwrite = false;
 };
 
 void PrintCheck(const LogCheck& check) {
@@ -335,21 +335,13 @@ void WarnIfWorseThanStart(std::span<const ErrorRow> rows) {
 bool Adapts(const MachineArguments& a) { return a.plant.empty() && !a.twin.empty(); }
 
 void CheckFitArguments(const MachineArguments& a) {
-  const bool adapts = Adapts(a);
-  if (!adapts && a.plant.empty()) {
-    throw BadInput("machine identify: expected --plant FILE with masses and lengths, got none");
-  }
-  if (a.out.empty()) {
-    throw BadInput(
-        fmt::format("machine {}: expected --out FILE, got none", adapts ? "adapt" : "identify"));
-  }
   constexpr double kShortestWindow = 0.01;  // s
   if (a.seconds != 0 && a.seconds < kShortestWindow) {
     throw BadInput(
         Concat("--seconds: expected 0, or ", kShortestWindow, " s or more, got ", a.seconds));
   }
   if (a.folds == 1) throw BadInput("--folds: expected 0, or 2 or more, got 1");
-  CheckWritable("--out", a.out);
+  CheckNewOutput("--out", a.out, a.overwrite);
 }
 
 /// Reads the twin or plant that the fit begins with. A plant file may leave out what the fit finds.
@@ -468,9 +460,13 @@ void AddCheck(CommandLine& line) {
 void AddIdentify(CommandLine& line) {
   MachineArguments& a = line.Runs(RunIdentify);
   AddLogs(line, a, "figure of the prediction errors to draw, .svg or .png");
-  line.Text("--plant", a.plant, "FILE",
-            "plant file or shipped plant with masses, lengths and first guesses");
+  line.Text("--plant", a.plant, "FILE|NAME",
+            Concat("plant file with masses, lengths and first guesses, or shipped plant (",
+                   Join(NamesOf(EmbeddedPlants()), ", "), ")"));
+  line.Require("--plant");
   line.Text("--out", a.out, "FILE", "TOML file of the twin to write");
+  line.Require("--out");
+  AddOverwrite(line, a.overwrite);
   AddPredictions(line, a);
   line.Flag("--one-body", a.one_body, "give all sessions the same centres, inertias and armature");
   Options own;
@@ -500,6 +496,8 @@ void AddAdapt(CommandLine& line) {
   line.Require("twin");
   AddLogs(line, a, "figure of the prediction errors to draw, .svg or .png");
   line.Text("--out", a.out, "FILE", "TOML file of today's twin to write");
+  line.Require("--out");
+  AddOverwrite(line, a.overwrite);
   AddPredictions(line, a);
   line.Notes(
       "Fits the twin of today to 10 to 30 s of today's logs. The covariance of TWIN says how\n"

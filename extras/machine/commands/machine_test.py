@@ -240,11 +240,15 @@ class Machine(ProgramTest):
                 (["machine", "validate", "plant.toml"], "machine validate: expected LOG"),
                 (["machine", "validate", "plant.toml", good, "--against", "plant.toml",
                   "--against", "plant.toml"], "--against", "more than once"),
-                (identify, "expected --out FILE"),
-                (["machine", "identify", good, *out], "expected --plant FILE"),
+                (identify, "machine identify: expected --out FILE (TOML file of the twin"),
+                (["machine", "identify", good, *out], "expected --plant FILE|NAME (plant file with masses", "realaigym-c1"),
                 (["machine", "adapt", "plant.toml", good], "machine adapt: expected --out FILE"),
                 (["machine", "adapt", "plant.toml", good, *out, "--folds", "2"], "flag --folds"),
                 ([*identify, "--out", "no/twin.toml"], "--out no/twin.toml"),
+                ([*identify, "--out", "plant.toml"], "--out plant.toml: expected a new file, got one that exists; "
+                 "--overwrite replaces it"),
+                (["machine", "adapt", "plant.toml", good, "--out", "plant.toml"], "--overwrite replaces it"),
+                ([*identify, "--out", "plant.toml", "--overwrite"], "--folds: expected two logs or more"),
                 ([*identify, *out, "--folds", "1"], "--folds: expected 0, or 2 or more, got 1"),
                 ([*identify, *out], "--folds: expected two logs or more", "got 1")):
             self.refuse(arguments, *words)
