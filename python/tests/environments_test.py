@@ -404,7 +404,7 @@ class BadInput(BadInputTest):
 
     def test_settings_as_the_program_has_them(self):
         for text, settings in {
-                'mass2: expected a number in [0.001, 100000], got "-1"': {"mass2": -1},
+                'mass2: expected a number in [0.001, 100000] kg, got "-1"': {"mass2": -1},
                 'gravty: expected a setting, got "gravty" (did you mean gravity?)': {"gravty": 1},
                 "gamma: expected a setting of an environment": {"gamma": 0.9},
                 "num_envs: expected": None,
@@ -416,7 +416,7 @@ class BadInput(BadInputTest):
                 "height: expected an integer": {"height": 4.5},
                 "actions: expected one of continuous, levels": {"actions": "discrete"},
                 "delay: expected a multiple of 0.02": {"delay": 0.03},
-                'mass1: expected a number in [0.001, 100000], got "nan"': {"mass1": np.nan},
+                'mass1: expected a number in [0.001, 100000] kg, got "nan"': {"mass1": np.nan},
                 'expected an agent, one of': {"agent": "acrobot-v1"},
                 'got "fsat"': {"agent": "fsat"},
                 "render_mode: expected": {"render_mode": "ansi"},

@@ -220,7 +220,7 @@ class Controllers(BadInputTest):
                 ("no such file", "nothing", {}),
                 ("actuated_joint: expected 1 or 2, got 3", "mpc", {"actuated_joint": 3}),
                 ("actuated_joint: expected 1, the joint of the motor of sac", "sac", {"actuated_joint": 2}),
-                ("max_velocity: expected a number in [0.1, 1000], got", "mpc", {"max_velocity": 0}),
+                ("max_velocity: expected a number in [0.1, 1000] rad/s, got", "mpc", {"max_velocity": 0}),
                 ("compensation: expected a number in [0, 1], got", "mpc", {"compensation": 2}),
                 ("latency: expected 0 to 0.1 s or None, got 1", "mpc", {"latency": 1}),
                 ("start: expected hanging", "mpc", {"start": "lying"}),

@@ -113,6 +113,19 @@ TEST(Csv, NamesOfATableAreEscapedAsItsTextsAre) {
             (std::vector<std::string>{"a, \"b\"\\nforged", "\\x1b[2J"}));
 }
 
+TEST(Csv, NoCellOfATableIsAFormula) {
+  CsvTable table;
+  for (const char* text : {"=1+1", "+a", "-a", "@SUM(1)", " =1", "x;=1", "x; -y", "-0.5", "-inf",
+                           "a=1", "a-b", "=a,b"}) {
+    table.Add("c", text);
+  }
+  table.Add("=name", 1);
+  table.EndRow();
+  EXPECT_EQ(table.text(),
+            "c,c,c,c,c,c,c,c,c,c,c,c,'=name\n"
+            "'=1+1,'+a,'-a,'@SUM(1), '=1,x;'=1,x; '-y,-0.5,-inf,a=1,a-b,\"'=a,b\",1\n");
+}
+
 TEST(Csv, ATableHasTheNamesOfItsFirstRowAndQuotesWhereNecessary) {
   CsvTable table;
   for (const int64_t row : {int64_t{1}, int64_t{9'000'000'000'000'000}}) {

@@ -119,12 +119,21 @@ TEST_F(OptionsTest, AnAliasSetsAllItsMembers) {
 }
 
 TEST_F(OptionsTest, MessagesHaveTheExpectedAndTheGivenValueAndThePlace) {
-  EXPECT_EQ(ErrorOf("count", "11"), "here: expected an integer in [1, 10], got \"11\"");
-  EXPECT_EQ(ErrorOf("count", "2.5"), "here: expected an integer in [1, 10], got \"2.5\"");
+  EXPECT_EQ(ErrorOf("count", "11"), "here: expected an integer in [1, 10] pieces, got \"11\"");
+  EXPECT_EQ(ErrorOf("count", "2.5"), "here: expected an integer in [1, 10] pieces, got \"2.5\"");
   EXPECT_EQ(ErrorOf("the_rate", "nan"), "here: expected a number in [0, 1], got \"nan\"");
   EXPECT_EQ(ErrorOf("fast", "yes"), "here: expected true or false, got \"yes\"");
   EXPECT_EQ(ErrorOf("widths", "4,x"), "here: expected a list of integers in [1, 100], got \"4,x\"");
   EXPECT_EQ(ErrorOf("cuont", "1"), "here: expected a setting, got \"cuont\" (did you mean count?)");
+}
+
+TEST_F(OptionsTest, ATextThatWrapsIsOnOneLine) {
+  EXPECT_EQ(ErrorOf("name", "a\nb"), "here: expected a text, got \"a\nb\"");
+  std::string text;
+  Options options;
+  options.Add(&text, "text", "a text").wraps = true;
+  options.Set("text", "  E; h;\r\n\n   5*inverted;\n tau\n", "");
+  EXPECT_EQ(text, "E; h; 5*inverted; tau");
 }
 
 TEST_F(OptionsTest, ARejectedValueLeavesNumbersAndListsAsTheyWere) {
@@ -171,13 +180,15 @@ TEST(Step, LetsThroughMultiplesAndNamesTheNearestOnes) {
     }
     return "no error";
   };
-  EXPECT_EQ(error_of("0.001"),
-            "--pause: expected a multiple of 0.02 in [0, 1], got \"0.001\"; the nearest are 0 and "
-            "0.02");
-  EXPECT_EQ(error_of("0.6999"),
-            "--pause: expected a multiple of 0.02 in [0, 1], got \"0.6999\"; the nearest are 0.68 "
-            "and 0.7");
-  EXPECT_EQ(error_of("1.001"), "--pause: expected a multiple of 0.02 in [0, 1], got \"1.001\"");
+  EXPECT_EQ(
+      error_of("0.001"),
+      "--pause: expected a multiple of 0.02 in [0, 1] s, got \"0.001\"; the nearest are 0 and "
+      "0.02");
+  EXPECT_EQ(
+      error_of("0.6999"),
+      "--pause: expected a multiple of 0.02 in [0, 1] s, got \"0.6999\"; the nearest are 0.68 "
+      "and 0.7");
+  EXPECT_EQ(error_of("1.001"), "--pause: expected a multiple of 0.02 in [0, 1] s, got \"1.001\"");
   EXPECT_EQ(pause, 1);
 }
 
@@ -215,7 +226,7 @@ TEST_F(OptionsTest, IntegersAreReadInOneWayWhereverTheyStand) {
   EXPECT_EQ(sample_.count, 10);
   options_.Set("widths", "1e2,+3", "");
   EXPECT_EQ(sample_.widths, (std::vector<int64_t>{100, 3}));
-  EXPECT_EQ(ErrorOf("count", "1e3"), "here: expected an integer in [1, 10], got \"1e3\"");
+  EXPECT_EQ(ErrorOf("count", "1e3"), "here: expected an integer in [1, 10] pieces, got \"1e3\"");
 }
 
 TEST_F(OptionsTest, FlagsAndTomlFollowFromTheSameLine) {

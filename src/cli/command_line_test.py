@@ -168,7 +168,7 @@ class NumberTest(ProgramTest):
              '--seed: expected an integer in [0, 9000000000000000], got "-1"'),
             (["map", "x", "--threads", "1.5"], '--threads: expected an integer in [0, 256]'),
             (["plot", "x", "--seconds", "nan"],
-             '--seconds: expected a number in [0.1, 1000], got "nan"'),
+             '--seconds: expected a number in [0.1, 1000] s, got "nan"'),
             (["train", "--hidden", "64,x"],
              '--hidden: expected a list of integers in [1, 4096], got "64,x"'),
             (["train", "--seeds", "3", "--jobs", "0"],

@@ -57,7 +57,7 @@ class RewardTest(ProgramTest):
             self.assertEqual([row["return"] for row in rows], expected)
             self.assertEqual(list(rows[0])[5:], ["energy", "height", "balance", "velocity", "torque"])
         # The same from a file with a text of several lines, as TOML writes them.
-        self.write("my.toml", f'reward = """\n{texts[0]}"""\n')
+        self.write("my.toml", f'[reward]\nreward = """\n{texts[0]}"""\n')
         self.succeed(*small(**same, out="file"), "--config", "my.toml")
         self.assertEqual([row["return"] for row in read_csv(self.folder / "file/episodes.csv")], expected)
         self.refuse(small(start_policy="a\nb"), "start-policy")

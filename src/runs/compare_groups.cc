@@ -224,7 +224,9 @@ Comparison GroupRuns(const CompareRequest& request) {
     std::ranges::sort(group.runs, {}, [](const RunRecord& run) { return run.config.train.seed; });
   }
   // One order, in which pairs are compared, whatever the order of the runs on the command line.
-  std::ranges::stable_sort(groups, {}, &RunGroup::label);
+  std::ranges::sort(groups, {}, [](const RunGroup& group) {
+    return std::pair(group.label, group.runs.front().path);
+  });
   std::vector<Options> settings;
   for (RunGroup& group : groups) {
     Config& config = group.runs.front().config;
@@ -233,6 +235,7 @@ Comparison GroupRuns(const CompareRequest& request) {
   }
   TellGroupsApart(groups, settings);
   TellTasksApart(comparison, settings);
+  std::ranges::stable_sort(groups, {}, &RunGroup::task);
   comparison.notes = found.notes;
   NotePlans(groups, comparison.notes);
   NoteTimes(found.runs, comparison.notes);

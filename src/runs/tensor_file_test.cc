@@ -235,6 +235,21 @@ TEST_F(TensorFileTest, HostileHeadersAreRefused) {
   EXPECT_EQ(HeaderError(R"({"a":{"dtype":"F32","shape":[1],"data_offsets":[0,4]}})", 4), "");
 }
 
+TEST_F(TensorFileTest, OtherFormatsAreNamed) {
+  const auto error = [&](const std::string& file) { return LoadError(BytesOf(file)); };
+  const std::string zeros(100, '\0');
+  EXPECT_NE(error("# My policy\n").find("got a text that begins with \"# My pol\""),
+            std::string::npos);
+  EXPECT_NE(error("PK\x03\x04\x14\x08\x08\x08" + zeros).find("got a zip archive"),
+            std::string::npos);
+  EXPECT_NE(error("\x80\x04\x95\x1f\x01\x01\x01\x01" + zeros).find("got a pickle"),
+            std::string::npos);
+  EXPECT_NE(error("\x1f\x8b\x08\x08\x01\x01\x01\x01" + zeros).find("got a gzip file"),
+            std::string::npos);
+  EXPECT_NE(error("\x01\x02\x03\x04\x05\x06\x07\x08" + zeros).find("got 578437695752307201"),
+            std::string::npos);
+}
+
 TEST_F(TensorFileTest, NumbersInAHeaderAreNeitherRoundedNorWrapped) {
   const auto error = [&](const std::string& shape, const std::string& offsets) {
     return HeaderError(

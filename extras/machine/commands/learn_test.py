@@ -23,7 +23,7 @@ class Learn(ProgramTest):
                 ([*LEARN, "--link", TWIN, "--max-torque", "strong"], "--max-torque", '"strong"'),
                 (["machine", "learn", "--link", TWIN], "expected --out FOLDER (new folder", "got none"),
                 (["machine", "learn", "--link", TWIN, "--out", "today"],
-                 "expected --encoder-counts INTEGER (", "got none"),
+                 "expected --encoder-counts NUMBER (steps of the encoders", "got none"),
                 ([*LEARN, "--link", TWIN, "--max-energy", 0.9],
                  "--max-energy: expected 1.1 or more for a swing-up, got 0.9"),
                 ([*LEARN, "--link", TWIN, "--robot", "cartpole"],

@@ -228,6 +228,7 @@ class Machine(ProgramTest):
     def test_bad_arguments_of_identify_and_validate(self):
         self.write("plant.toml", "[plant]\nmass1 = 0.5\n")
         good = self.write("log.csv", log())
+        self.write("old.toml", "[plant]\n")
         identify = ["machine", "identify", good, "--plant", "plant.toml"]
         out = ["--out", "twin.toml"]
         for arguments, *words in (
@@ -245,10 +246,10 @@ class Machine(ProgramTest):
                 (["machine", "adapt", "plant.toml", good], "machine adapt: expected --out FILE"),
                 (["machine", "adapt", "plant.toml", good, *out, "--folds", "2"], "flag --folds"),
                 ([*identify, "--out", "no/twin.toml"], "--out no/twin.toml"),
-                ([*identify, "--out", "plant.toml"], "--out plant.toml: expected a new file, got one that exists; "
+                ([*identify, "--out", "old.toml"], "--out old.toml: expected a new file, got one that exists; "
                  "--overwrite replaces it"),
-                (["machine", "adapt", "plant.toml", good, "--out", "plant.toml"], "--overwrite replaces it"),
-                ([*identify, "--out", "plant.toml", "--overwrite"], "--folds: expected two logs or more"),
+                (["machine", "adapt", "plant.toml", good, "--out", "old.toml"], "--overwrite replaces it"),
+                ([*identify, "--out", "old.toml", "--overwrite"], "--folds: expected two logs or more"),
                 ([*identify, *out, "--folds", "1"], "--folds: expected 0, or 2 or more, got 1"),
                 ([*identify, *out], "--folds: expected two logs or more", "got 1")):
             self.refuse(arguments, *words)
