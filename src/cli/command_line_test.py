@@ -409,7 +409,7 @@ class LauncherTest(ProgramTest):
             else:
                 (path / "CMakeCache.txt").write_text(f"CMAKE_CACHEFILE_DIR:INTERNAL={place}/{folder}\n")
 
-    def test_what_was_built_in_another_folder_is_built_again(self):
+    def test_builds_of_another_folder_are_made_again(self):
         here = self.folder.resolve()
         program = self.folder / "build/release/bin/upswing"
         # All packages are installed; CMake makes a program, and Ninja then has nothing to do.

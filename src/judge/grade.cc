@@ -188,7 +188,7 @@ std::vector<Grade> EntriesOf(const fs::path& folder) {
   return grades;
 }
 
-/// What decides the rank of a graded entry, the best first.
+/// The order of graded entries, the best first: by successes, then by return.
 std::pair<int64_t, double> OrderOf(const Grade& grade) {
   return {-grade.nominal.successes, -grade.nominal.reward_sum.mean};
 }

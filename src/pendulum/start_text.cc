@@ -53,7 +53,7 @@ Quantity ParseAnyAngle(std::string_view text, const std::string& where) {
 
 bool IsDegrees(const Quantity& angle) { return angle.unit == "deg" || angle.unit == "°"; }
 
-/// A number in few digits, with 0 for what rounds to -0.
+/// A number with four decimals at most, and 0 in place of -0.
 std::string Short(double x) {
   constexpr double kDigits = 1e4;
   return FormatNumber(std::round(x * kDigits) / kDigits + 0.0);

@@ -58,7 +58,7 @@ class Address(unittest.TestCase):
 
 
 class Metadata(unittest.TestCase):
-    def test_the_python_package_says_what_its_wheels_are(self):
+    def test_versions_of_python_authors_and_addresses(self):
         project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
         # package.py builds for CPython 3.11, and for 3.12 and later.
         self.assertEqual(project["requires-python"], ">=3.11")

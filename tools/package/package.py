@@ -119,7 +119,7 @@ class Packager:
         self.environment = {"DPKG_DEB_COMPRESSOR_TYPE": "xz"} | os.environ | {
             "SOURCE_DATE_EPOCH": str(self.epoch)}
         self.system = "windows" if target.preset == "windows" else "linux"
-        # Without "upswing-" at the beginning: pip takes what follows for the version of a source package.
+        # Not "upswing-VERSION-linux-…", which pip takes for a source package of the version "VERSION-linux-…".
         self.name = f"upswing_{self.version}_{self.system}_{target.machine}"
         self.venvs = arguments.work
         self.work = arguments.work / (self.system if self.system == "windows" else target.machine)
