@@ -229,7 +229,7 @@ class GradeTest(ProgramTest):
         # No cell is a formula for a spreadsheet that separates by commas, nor for one with semicolons.
         for row in (self.folder / "out/table.csv").read_text(encoding="utf-8").splitlines():
             for cell in re.split("[,;]", row):
-                self.assertRegex(cell, r'^"*(?![ "]*[=+@]|[ "]*-(?!\d+"*$))')
+                self.assertRegex(cell, r'^"*(?![ "]*[=+@]|[ "]*-(?!\d+(\.\d+)?"*$))')
         page = (self.folder / "out/index.html").read_text(encoding="utf-8")
         self.assertEqual([page.count(text) for text in ("<img", "\x1b", "</script>")], [0, 0, 2])
         self.assertEqual(len(self.data()["rows"]), 2 * len(names))

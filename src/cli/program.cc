@@ -52,7 +52,8 @@ void RunOtherProgram(int argc, char** argv, std::span<const Command> own) {
   const auto entry = std::ranges::find(table, name, &CommandEntry::name);
   if (entry == table.end() || std::ranges::find(own, name, &Command::name) != own.end()) return;
   if (!entry->program.empty()) BecomeProgram(SiblingProgram(std::string(entry->program)), argv);
-  const std::filesystem::path documents = SharePath().parent_path() / "doc/upswing/html/index.html";
+  const std::filesystem::path documents =
+      ProgramPath().parent_path().parent_path() / "share/doc/upswing/html/index.html";
   if (name == "docs" && IsInstalled() && IsFile(documents)) {
     throw BadInput(Concat("docs: the documentation of this package is ", documents.string(),
                           "; ./upswing docs in the source repository builds it"));

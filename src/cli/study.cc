@@ -76,9 +76,9 @@ ManyRuns ReadStudy(const StudyArguments& arguments) {
 
 /// The study file of this name, or the one that the package has under it.
 std::string FindStudy(const std::string& file) {
+  if (file.empty() || Exists(file) || !IsInstalled()) return file;
   const fs::path shipped = SharePath() / file;
-  const bool is_shipped = !file.empty() && !Exists(file) && IsInstalled() && IsFile(shipped);
-  return is_shipped ? shipped.string() : file;
+  return IsFile(shipped) ? shipped.string() : file;
 }
 
 /// Compares the finished runs of a study.

@@ -14,6 +14,8 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;  // rad
 constexpr double kLargestBare = 4 * std::numbers::pi;
+using Units = std::array<std::string_view, 3>;
+constexpr Units kAngleUnits{"deg", "°", "rad"}, kVelocityUnits{"deg/s", "°/s", "rad/s"};
 
 /// A finite number and the unit after it, which may be empty.
 struct Quantity {
@@ -22,8 +24,7 @@ struct Quantity {
 };
 
 /// The number and its unit, one of `units`; nothing for another text.
-std::optional<Quantity> Parse(std::string_view text,
-                              std::initializer_list<std::string_view> units) {
+std::optional<Quantity> Parse(std::string_view text, const Units& units) {
   text = Trim(text);
   std::string_view unit;
   for (const std::string_view each : units) {
@@ -37,7 +38,7 @@ std::optional<Quantity> Parse(std::string_view text,
 
 /// An angle with its unit, "" for rad. Throws BadInput.
 Quantity ParseAnyAngle(std::string_view text, const std::string& where) {
-  const auto angle = Parse(text, {"deg", "°", "rad"});
+  const auto angle = Parse(text, kAngleUnits);
   if (!angle) {
     throw BadInput(Concat(where, ": expected an angle such as 3.14 [rad] or 180deg, got \"",
                           Printable(text), "\""));
@@ -72,7 +73,7 @@ double ParseDegrees(std::string_view text, const std::string& where) {
 }
 
 double ParseVelocity(std::string_view text, const std::string& where) {
-  const auto velocity = Parse(text, {"deg/s", "°/s", "rad/s"});
+  const auto velocity = Parse(text, kVelocityUnits);
   if (!velocity) {
     throw BadInput(Concat(where, ": expected a velocity such as 1.5 [rad/s] or 90deg/s, got \"",
                           Printable(text), "\""));
@@ -83,9 +84,13 @@ double ParseVelocity(std::string_view text, const std::string& where) {
 
 PendulumState ParseState(const std::string& text, const std::string& where) {
   const std::vector<std::string_view> pieces = Split(text, ',');
-  if (pieces.size() != 4) {
-    throw BadInput(
-        Concat(where, ": expected 4 numbers q1,q2,w1,w2, got \"", Printable(text), "\""));
+  bool is_state = pieces.size() == 4;
+  for (size_t i = 0; is_state && i < pieces.size(); ++i) {
+    is_state = Parse(pieces[i], i < 2 ? kAngleUnits : kVelocityUnits).has_value();
+  }
+  if (!is_state) {
+    throw BadInput(Concat(where, ": expected 4 numbers q1,q2,w1,w2, such as 3.14,0,0,0 or ",
+                          "180deg,0,90deg/s,0, got \"", Printable(text), "\""));
   }
   return {ParseAngle(pieces[0], where), ParseAngle(pieces[1], where),
           ParseVelocity(pieces[2], where), ParseVelocity(pieces[3], where)};

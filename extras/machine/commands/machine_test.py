@@ -348,7 +348,7 @@ class Machine(ProgramTest):
         for name in ("guess", "bare"):
             with self.subTest(plant=name):
                 said = self.succeed("machine", "identify", "run-1.csv", "run-2.csv", "--plant",
-                                    f"{name}.toml", "--folds", "0", "--out", "twin.toml")
+                                    f"{name}.toml", "--folds", "0", "--out", "twin.toml", "--overwrite")
                 self.assertIn("the model explains the logs of the fit to ", said)
                 with open(self.folder / "twin.toml", "rb") as file:
                     found = tomllib.load(file)
