@@ -1,6 +1,8 @@
 #include "base/format.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "base/text.h"
 
@@ -34,6 +36,24 @@ std::string FormatCount(double number) {
   }
   return grouped;
 }
+
+std::string FormatPlain(double number, int digits) {
+  constexpr int kMostDecimals = 12;  // smaller numbers count as 0
+  const double size = std::abs(number);
+  const double before = size > 0 ? std::floor(std::log10(size)) : 0;
+  const int decimals =
+      static_cast<int>(std::clamp(digits - 1 - before, 0.0, double{kMostDecimals}));
+  char text[400];  // the longest finite number has 309 digits
+  std::snprintf(text, sizeof text, "%.*f", decimals, number);
+  std::string plain = text;
+  if (decimals > 0) {
+    plain.erase(plain.find_last_not_of('0') + 1);
+    if (plain.ends_with('.')) plain.pop_back();
+  }
+  return plain == "-0" ? "0" : plain;
+}
+
+std::string FormatPercent(double share) { return FormatPlain(100 * share, 2) + "%"; }
 
 std::string Counted(int64_t count, const std::string& noun) {
   return Concat(count, ' ', noun, count == 1 ? "" : "s");

@@ -23,6 +23,13 @@ std::string FormatCount(T number) {
   return FormatCount(static_cast<double>(number));
 }
 
+/// Formats a number with `digits` significant digits without an exponent, and without zeros at the
+/// end of a fraction: `0.00015`, `12.3`, `1250`.
+std::string FormatPlain(double number, int digits);
+
+/// Formats a share as a percentage with two significant digits: `0.034%`, `12%`, `100%`.
+std::string FormatPercent(double share);
+
 /// Formats a count of a noun: `1 run`, `3 runs`.
 std::string Counted(int64_t count, const std::string& noun);
 

@@ -28,6 +28,7 @@ class Kind:
 
 
 UNEVEN = ("sines", "steps")  # torques of one size only hide limits
+REACHES_LIMIT = ("sines", "pump")  # random steps end below it
 DRIVEN = ("both", "joint 1", "joint 2")
 
 
@@ -38,6 +39,19 @@ def scaled(joints, factors):
         for joint in joints:
             log["q"][:, joint] *= factor
             log["w"][:, joint] *= factor
+    return readings
+
+
+def scaled_columns(joints, factors):
+    """Columns of a file with absolute angles that have a multiple of the true ones."""
+    def readings(log, m, rng):
+        factor = rng.choice(factors)
+        for key in ("q", "w"):
+            column = log[key].copy()
+            column[:, 1] += column[:, 0]
+            column[:, joints] *= factor
+            column[:, 1] -= column[:, 0]
+            log[key] = column
     return readings
 
 
@@ -91,6 +105,7 @@ def nominal_clock(log, m, rng):
 
 
 def within_one(log, m, rng):
+    """Commands as shares of the limit. Only commands that reach 1 tell: a motor may give .97 N·m at most."""
     log["u"] = log["u"] / np.where(m["limit"] > 0, m["limit"], 1)
 
 
@@ -103,8 +118,13 @@ def saturates(m, rng):
 
 
 def dead_band(m, rng):
-    m["dead"] = rng.uniform(0.1, 0.25) * m["limit"]
+    """A dead band that shortens all torques, or swallows small ones.
+
+    Of commands that are as often small as large, one of a share d swallows d³ of the squares. Below a third of 1%
+    that is less than the commands of lost rows and the rounding of encoders hide.
+    """
     m["dead_steps"] = bool(rng.integers(2))
+    m["dead"] = rng.uniform(0.15 if m["dead_steps"] else 0.1, 0.25) * m["limit"]
 
 
 def dead_motor(m, rng):
@@ -185,6 +205,7 @@ def zero(log, m, rng):
 
 
 TIMES = "times the true one"
+ABSOLUTE = {"convention": True, "absolute": True}
 KINDS = [
     Kind("angle 1 doubled", (f"angle 1: .*{TIMES}",), readings=scaled([0], [2])),
     Kind("angle 2 doubled", (f"angle 2: .*{TIMES}",), readings=scaled([1], [2])),
@@ -194,6 +215,12 @@ KINDS = [
     Kind("belt 3:1 at joint 2", (f"angle 2: .*{TIMES}",), readings=scaled([1], [3, 1 / 3])),
     Kind("angle 2 times .9", (f"angle 2: .*{TIMES}",), readings=scaled([1], [0.9])),
     Kind("angle 2 times 4096/4000", (f"angle 2: .*{TIMES}",), readings=scaled([1], [1.024])),
+    Kind("absolute angle 1 doubled", (f"angle 1: .*{TIMES}",), readings=scaled_columns([0], [2]), logger=ABSOLUTE),
+    Kind("absolute angle 1 halved", (f"angle 1: .*{TIMES}",), readings=scaled_columns([0], [0.5]), logger=ABSOLUTE),
+    Kind("absolute angle 2 doubled", (f"angle 2: .*{TIMES}",), readings=scaled_columns([1], [2]), logger=ABSOLUTE),
+    Kind("absolute angle 2 halved", (f"angle 2: .*{TIMES}",), readings=scaled_columns([1], [0.5]), logger=ABSOLUTE),
+    Kind("absolute angles doubled or halved", (f"angle [12]: .*{TIMES}",),
+         readings=scaled_columns([0, 1], [2, 0.5]), logger=ABSOLUTE),
     Kind("offset of a torque", ("torque {j}: .*offset",), DRIVEN, readings=offset),
     Kind("torques late", ("torques that are .* later", "measured .* after"), DRIVEN, readings=late_torques),
     Kind("angle 2 late", ("angle 2: .* later",), readings=late_angle),
@@ -201,7 +228,7 @@ KINDS = [
     Kind("a tenth of the rows lost", ("rows are lost",), readings=nominal_clock,
          logger={"lost": 0}),
     Kind("commands in -1 to 1", ("between -1 and 1",), DRIVEN, readings=within_one, columns="commanded",
-         warns=True, logger={"convention": False}),
+         warns=True, logger={"convention": False}, signals=REACHES_LIMIT),
     Kind("gain .8, measured torque", ("another torque than commanded",), DRIVEN, motors=gain, columns="both",
          warns=True),
     Kind("saturation", ("saturate",), DRIVEN, motors=saturates, columns="commanded",

@@ -290,7 +290,7 @@ void AddRun(CommandLine& line) {
             "default hanging)");
   Options own;
   own.Section("loop");
-  own.Add(&a.hz, "hz", {100, 1000}, "1/s", "cycles per second").step = 50;
+  own.Add(&a.hz, "hz", {100, 1000}, "1/s", "cycles per second").step = 1;
   own.Add(&a.seconds, "seconds", {0.1, 86400}, "s", "time in which the controller drives");
   own.Add(&a.compensation, "compensation", kZeroToOne, "",
           "share of both joints' estimated dry friction that the motors compensate; needs a twin");

@@ -485,7 +485,7 @@ class Run(ProgramTest):
                 (["run", "lqr", "--link", "serial:x:12"], ["921600"]),
                 (["run", "lqr", "--link", "serial:x:115200"], ["220000 bit/s", "115200"]),
                 (["run", "lqr", "--link", "none.toml"], ["none.toml"]),
-                (["run", "lqr", "--link", "twin.toml", "--hz", "333"], ["multiple of 50"]),
+                (["run", "lqr", "--link", "twin.toml", "--hz", "333.5"], ["--hz", "an integer in [100, 1000]"]),
                 (["run", "lqr", "--link", "twin.toml", "--twin", "twin.toml"], ["--twin"]),
                 (["run", "lqr", "--link", "twin.toml", "--start", "here"], ["--start", "here"]),
                 (["run", "lqr", "--link", "twin.toml", "--robot", "arm"], ["pendubot", "arm"]),

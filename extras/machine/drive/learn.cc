@@ -39,10 +39,10 @@ constexpr ExcitationPlan kSmallMotion{4, 0.8, 0.2, 0.3}, kLargeMotion{6, 2, 0.6,
 constexpr double kLimitShare = 0.6;  // share of the user's limits that an excitation aims at
 constexpr int kMostExcitations = 3;  // until a twin that explains nothing has to do
 
-constexpr double kLargestError = 0.1;    // of a fit, rad
-constexpr double kLargestZero = 0.2;     // of the encoders, rad
+constexpr double kLargestError = 0.1;     // of a fit, rad
+constexpr double kLargestZero = 0.2;      // of the encoders, rad
 constexpr double kLongestSwinging = 600;  // until links without friction rest, s
-constexpr double kMostSpread = 4;        // of simulated machines, in deviations of the twin
+constexpr double kMostSpread = 4;         // of simulated machines, in deviations of the twin
 
 /// A controller to try.
 struct Choice {
@@ -260,10 +260,10 @@ class LearningSession {
       }
     }
     say_(
-        fmt::format("  {}: {:.1f} s, angles up to {:.2f} and {:.2f} rad, torques {:.2f} and "
-                    "{:.2f} N·m{}",
-                    file, run.motion, angle[0], angle[1], torque[0], torque[1],
-                    run.reason.empty() ? "" : "; " + run.reason));
+        fmt::format("  {}: {:.1f} s, angles up to {:.2f} and {:.2f} rad, torques {} and "
+                    "{} N·m{}",
+                    file, run.motion, angle[0], angle[1], FormatPlain(torque[0], 3),
+                    FormatPlain(torque[1], 3), run.reason.empty() ? "" : "; " + run.reason));
   }
 
   /// Identifies the twin from all logs, and judges it. The log of a try counts twice.
@@ -328,10 +328,11 @@ class LearningSession {
 
   void SayTwin(double error) const {
     const Manipulator m = ManipulatorOf(twin_.plant);
-    say_(fmt::format(
-        "  error {:.4f} rad; gravity {:.2f} and {:.2f} N·m, dry friction {:.3f} and {:.3f} "
-        "N·m, delay {:.1f} ms, lag {:.1f} ms",
-        error, m.G1, m.G2, m.f1, m.f2, 1e3 * twin_.actuator.delay, 1e3 * twin_.actuator.lag));
+    say_(
+        fmt::format("  error {:.4f} rad; gravity {} and {} N·m, dry friction {} and {} N·m, "
+                    "delay {:.1f} ms, lag {:.1f} ms",
+                    error, FormatPlain(m.G1, 3), FormatPlain(m.G2, 3), FormatPlain(m.f1, 3),
+                    FormatPlain(m.f2, 3), 1e3 * twin_.actuator.delay, 1e3 * twin_.actuator.lag));
   }
 
   double ErrorOf(const Twin& twin) const {

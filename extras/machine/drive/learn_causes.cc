@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "base/error.h"
+#include "base/format.h"
 #include "extras/machine/drive/learn_candidates.h"
 #include "extras/machine/drive/learn_trials.h"
 #include "extras/machine/logs/check.h"
@@ -41,12 +42,12 @@ void AddFriction(const SessionFacts& facts, std::vector<std::string>& causes) {
     const HeldLink& link = links[j];
     if (link.angle < kNotable) continue;
     std::string text = fmt::format(
-        "dry friction of joint {} holds {:.2g} N·m, so that its link stands still up to {:.0f}° "
+        "dry friction of joint {} holds {} N·m, so that its link stands still up to {:.0f}° "
         "from hanging",
-        j + 1, link.torque, link.angle / kDegree);
+        j + 1, FormatPlain(link.torque, 2), link.angle / kDegree);
     const double compensated = facts.config.limits.passive_torque;
     if (j + 1 != facts.config.actuated_joint && compensated < link.torque) {
-      text += fmt::format(", and --passive-torque compensates {:.2g} N·m", compensated);
+      text += fmt::format(", and --passive-torque compensates {} N·m", FormatPlain(compensated, 2));
     }
     causes.push_back(text);
   }
@@ -146,8 +147,9 @@ bool AddPlay(const SessionFacts& facts, std::vector<std::string>& causes) {
                                                        : "of the gear before the link";
   causes.push_back(fmt::format(
       "suspect play of about {:.1g} rad at joint {}, {}: with it the equations of a pendulum "
-      "leave {:.2g}% of the motion unexplained, without it {:.2g}%",
-      play->width, play->joint, where, 100 * play->left, 100 * play->left_without));
+      "leave {} of the motion unexplained, without it {}",
+      play->width, play->joint, where, FormatPercent(play->left),
+      FormatPercent(play->left_without)));
   return true;
 }
 

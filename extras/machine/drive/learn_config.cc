@@ -15,7 +15,7 @@ void LearnConfig::Describe(Options& o) {
   o.Add(&motion, "motion", {10, 3600}, "s",
         "longest time with torques, pulses and braking included, all runs together");
   o.Add(&computing, "computing", {1, 1e6}, "s", "longest processor time of models and controllers");
-  o.Add(&hz, "hz", {100, 1000}, "1/s", "cycles per second").step = 50;
+  o.Add(&hz, "hz", {100, 1000}, "1/s", "cycles per second").step = 1;
   o.Add(&length, "length", {0.02, 200}, "m",
         "length of both links together; with --max-torque it tells the size of the machine")
       .usual = "about that of RealAIGym's robot, 0.5";

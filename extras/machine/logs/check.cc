@@ -109,8 +109,8 @@ std::vector<Step> StepsOf(Pieces pieces, int joint, double cycle) {
 /// Reports rows that are lost without a trace in the clock: both joints then move twice as far.
 /// `cycle`: usual one, s.
 void CheckLostRows(Pieces pieces, double cycle, const Reporter& report) {
-  constexpr double kClear = 8;        // standard deviations of a step without a loss
-  constexpr double kOverEncoder = 6;  // steps of the encoder
+  constexpr double kClear = 4;        // standard deviations of a step without a loss
+  constexpr double kOverEncoder = 3;  // steps of the encoder
   constexpr double kNormal = 0.6745;  // median of the size of a normal number
   constexpr double kSigmas = 3;
   constexpr double kMuch = 2e-3, kFewest = 5;  // share of the clear steps, rows
@@ -141,9 +141,9 @@ void CheckLostRows(Pieces pieces, double cycle, const Reporter& report) {
   const double least_lost = std::max(kFewest, kSigmas * std::sqrt(lost + missing));
   if (lost - missing < std::max(least_lost, kMuch * clear)) return;
   report(Severity::kFault,
-         fmt::format("about {:.2g}% of the rows are lost, but the clock counts on: write the time "
+         fmt::format("about {} of the rows are lost, but the clock counts on: write the time "
                      "of each row",
-                     100 * lost / (lost + clear)),
+                     FormatPercent(lost / (lost + clear))),
          {}, {{"lost_share", lost / (lost + clear)}});
 }
 
@@ -182,9 +182,9 @@ void CheckLostCycles(const std::vector<Cycle>& cycles, double usual, const Repor
   constexpr double kMuch = 0.01;  // share of cycles
   const double share = lost / (lost + static_cast<double>(cycles.size()));
   report(share > kMuch ? Severity::kWarning : Severity::kNote,
-         fmt::format("{} ({:.2g}%) lost at {}, longest {:.3g} ms",
-                     Counted(std::lround(std::min(lost, 1e15)), "cycle"), 100 * share,
-                     Counted(places, "place"), 1e3 * longest->seconds),
+         fmt::format("{} ({}) lost at {}, longest {} ms",
+                     Counted(std::lround(std::min(lost, 1e15)), "cycle"), FormatPercent(share),
+                     Counted(places, "place"), FormatPlain(1e3 * longest->seconds, 3)),
          RangeOf(*longest), {{"lost", lost}, {"places", places}});
 }
 

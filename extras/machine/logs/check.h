@@ -146,6 +146,9 @@ double AngleRange(Pieces pieces, int joint);
 /// are not multiples of it.
 std::optional<double> QuantumOf(Pieces pieces, int joint);
 
+/// QuantumOf, or the smallest distance of two angles of a joint, rad; 0 if it never moves.
+double StepOf(Pieces pieces, int joint);
+
 /// Sums over pairs (x, y), for the regression y ≈ offset + gain x.
 struct Pairs {
   double n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;

@@ -134,6 +134,18 @@ std::optional<double> QuantumOf(Pieces pieces, int joint) {
   return quantum;
 }
 
+double StepOf(Pieces pieces, int joint) {
+  constexpr double kRounding = 1e-9;  // rad, of angles that are equal in the file
+  std::vector<double> values = ValuesOf(pieces, &MachineLog::angle, joint);
+  std::ranges::sort(values);
+  double step = 0;
+  for (size_t i = 1; i < values.size(); ++i) {
+    const double distance = values[i] - values[i - 1];
+    if (distance > kRounding && (step == 0 || distance < step)) step = distance;
+  }
+  return QuantumOf(pieces, joint).value_or(step);
+}
+
 void CheckAngles(Pieces pieces, Findings& findings) {
   const double own_time = OwnTime(pieces);
   for (const int joint : {0, 1}) {

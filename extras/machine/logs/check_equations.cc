@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "base/format.h"
 #include "base/sample.h"
 #include "extras/machine/logs/check.h"
 #include "extras/machine/logs/hypotheses.h"
@@ -79,10 +80,10 @@ void Report(const Hypotheses& tried, double seconds, bool in_proportion, Finding
   for (const Suspicion& s : suspicions) {
     Reporter{findings, s.aspect, s.joint}(
         Severity::kFault,
-        fmt::format("suspect {}: with {} the equations of a pendulum leave {:.2g}% of the motion "
-                    "unexplained, without {} {:.2g}%{}",
-                    s.text, is_one ? "it" : "all suspicions", 100 * best.fit.left(),
-                    is_one ? "it" : "them", 100 * log.fit.left(), rivals),
+        fmt::format("suspect {}: with {} the equations of a pendulum leave {} of the motion "
+                    "unexplained, without {} {}{}",
+                    s.text, is_one ? "it" : "all suspicions", FormatPercent(best.fit.left()),
+                    is_one ? "it" : "them", FormatPercent(log.fit.left()), rivals),
         {}, {{"unexplained", log.fit.left()}, {"unexplained_after", best.fit.left()}});
   }
 }
@@ -232,8 +233,8 @@ void ReportUnexplained(Pieces pieces, double left, Findings& findings) {
   }
   Reporter{findings, Aspect::kMotion}(
       severity,
-      fmt::format("the equations of a pendulum leave {:.2g}% of the motion unexplained{}",
-                  100 * left, meaning),
+      fmt::format("the equations of a pendulum leave {} of the motion unexplained{}",
+                  FormatPercent(left), meaning),
       {}, {{"unexplained", left}});
 }
 
@@ -250,7 +251,14 @@ void CheckEquations(Pieces pieces, Findings& findings) {
   if (free || pieces.front().commanded.empty()) {
     verdict = Judge(pieces, {false, false});
     if (!verdict) return;
-    if (verdict->tried->best().fit.left() <= kFreeLeft) {
+    const Hypothesis& best = verdict->tried->best();
+    bool moves_freely = best.fit.left() <= kFreeLeft;
+    if (moves_freely && !free && best.changes() > 0) {
+      // Wrong columns of a free pendulum may look like right ones of a driven one.
+      const std::optional<Verdict> with_torques = Judge(pieces, driven);
+      moves_freely = !with_torques || with_torques->tried->log().fit.left() > kFreeLeft;
+    }
+    if (moves_freely) {
       driven = {false, false};
     } else if (free) {
       return ReportDriven(pieces, findings);

@@ -6,6 +6,8 @@
 #include <limits>
 #include <numbers>
 
+#include "base/format.h"
+#include "extras/machine/logs/angle_noise.h"
 #include "extras/machine/logs/check.h"
 #include "pendulum/plant.h"
 
@@ -158,10 +160,17 @@ double TorqueChange(const MachineLog& piece, const std::vector<Joints>& torque, 
   return most - least > kClear * noise ? most - least : 0;
 }
 
-/// Reports a log in which no angle ever changes although torques do.
+/// Whether a joint stays within a few steps of its encoder, or within the noise of its sensor.
+bool IsStill(Pieces pieces, int joint) {
+  constexpr double kSteps = 4, kRounding = 1e-9;  // of the encoder, rad
+  const double range = AngleRange(pieces, joint);
+  const double step = std::max(StepOf(pieces, joint), StepOfNoise(AngleNoise(pieces, joint)));
+  return range < kMoves && range <= kSteps * step + kRounding;
+}
+
+/// Reports a log in which nothing moves: it says nothing about the machine.
 void CheckNoMotion(Pieces pieces, Findings& findings) {
-  constexpr double kRounding = 1e-9;  // rad
-  if (AngleRange(pieces, 0) > kRounding || AngleRange(pieces, 1) > kRounding) return;
+  if (!IsStill(pieces, 0) || !IsStill(pieces, 1)) return;
   double change = 0;
   for (const MachineLog& piece : pieces) {
     for (const int joint : {0, 1}) {
@@ -169,13 +178,23 @@ void CheckNoMotion(Pieces pieces, Findings& findings) {
                          TorqueChange(piece, piece.measured, joint)});
     }
   }
-  if (!(change > 0)) return;
-  Reporter{findings, Aspect::kMotion}(
-      Severity::kFault,
-      fmt::format("no angle ever changes although the torques change by {:.2g} N·m: both encoders "
-                  "are dead, the motors are off, or dry friction holds both joints",
-                  change),
-      {}, {{"change", change}});
+  const double range = std::max(AngleRange(pieces, 0), AngleRange(pieces, 1));
+  const std::string angles = range > 0 ? fmt::format(
+                                             "both angles stay within {} rad, a few steps "
+                                             "of the encoders",
+                                             FormatPlain(range, 2))
+                                       : "no angle ever changes";
+  const Reporter report{findings, Aspect::kMotion};
+  if (!(change > 0)) {
+    report(Severity::kWarning,
+           fmt::format("nothing moves: {}; the log says nothing about the machine", angles));
+    return;
+  }
+  report(Severity::kFault,
+         fmt::format("nothing moves: {} although the torques change by {} N·m: both encoders are "
+                     "dead, the motors are off, or dry friction holds both joints",
+                     angles, FormatPlain(change, 2)),
+         {}, {{"change", change}});
 }
 
 }  // namespace

@@ -11,17 +11,36 @@
 #include <functional>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "extras/machine/logs/check.h"
 #include "extras/machine/logs/check_terms.h"
+#include "extras/machine/logs/smooth_motion.h"
 
 namespace upswing::machine {
 namespace {
 
-constexpr double kWindow = 0.3;     // s
 constexpr double kRounding = 1e-9;  // rad, of angles that are equal in the file
+
+/// Times of a log, s.
+struct Times {
+  double cycle;   // usual one
+  double own;     // of the motion; see OwnTime
+  double window;  // of an equation
+
+  /// Nothing if the log has no usual cycle. The window is a third of a swing, which has a length of
+  /// 2 π own times: shorter ones have more noise of the encoders, and longer ones miss short
+  /// faults. A log without a swing counts as one of links of 20 cm.
+  static std::optional<Times> Of(Pieces pieces) {
+    constexpr double kOwn = 0.14, kWindow = 2.1;  // s, own times
+    const double cycle = UsualCycle(pieces), found = OwnTime(pieces);
+    if (!(cycle > 0)) return {};
+    const double own = found > 0 ? found : kOwn;
+    return Times{cycle, own, kWindow * own};
+  }
+};
 
 /// Rows of a piece in which an angle does not change.
 struct Stretch {
@@ -32,7 +51,7 @@ struct Stretch {
 };
 
 /// The stretches, at least as long as a window, in which none of these joints' angles changes.
-std::vector<Stretch> StretchesOf(Pieces pieces, const std::vector<int>& joints) {
+std::vector<Stretch> StretchesOf(Pieces pieces, const std::vector<int>& joints, double window) {
   std::vector<Stretch> stretches;
   for (const MachineLog& piece : pieces) {
     for (int first = 0; first < piece.rows();) {
@@ -43,7 +62,7 @@ std::vector<Stretch> StretchesOf(Pieces pieces, const std::vector<int>& joints) 
                });
       };
       while (repeats(stretch.last + 1)) ++stretch.last;
-      if (stretch.seconds() >= kWindow) stretches.push_back(stretch);
+      if (stretch.seconds() >= window) stretches.push_back(stretch);
       first = stretch.last + 1;
     }
   }
@@ -77,22 +96,24 @@ struct Equation {
 };
 using EquationList = std::vector<Equation>;
 
-/// The unknown part of dry friction at a velocity (rad/s), as a share of the friction of fast
-/// motion. At rest, friction is any torque up to a limit; how it grows in slow motion differs.
+/// The unknown part of dry friction at a velocity (rad in an own time), as a share of the friction
+/// of fast motion. At rest, friction is any torque up to a limit; how it grows in slow motion
+/// differs.
 double UnknownFriction(double w) {
-  constexpr double kAtRest = 1.2, kSlow = 0.5, kFast = 0.15;  // shares, rad/s
+  constexpr double kAtRest = 1.2, kSlow = 0.5, kFast = 0.02;  // shares, rad in an own time
   if (std::abs(w) < kRounding) return kAtRest;
   return std::abs(w) < kFast ? kSlow : 0;
 }
 
 /// The equations of joint `row` over windows within the rows `first` to `last`, `hop` (s) apart.
 EquationList EquationsWithin(const MachineLog& log, int first, int last, int row, double hop,
-                             double cycle) {
+                             const Times& times) {
   constexpr std::array kTerm{kOther, kCoupling,    kTurnedCoupling, kLink2,   kTurnedLink2,
                              kLink1, kTurnedLink1, kDamping,        kFriction};
   constexpr int kRows = 6;  // fewest in a window
+  const double cycle = times.cycle;
   const int span = SpanOf(cycle);
-  const int length = std::max(kRows, static_cast<int>(std::lround(kWindow / cycle)));
+  const int length = std::max(kRows, static_cast<int>(std::lround(times.window / cycle)));
   const int step = std::max(1, static_cast<int>(std::lround(hop / cycle)));
   last = std::min(last, log.rows() - 1 - span);
   EquationList equations;
@@ -106,7 +127,7 @@ EquationList EquationsWithin(const MachineLog& log, int first, int last, int row
     e.terms[kOwnInertia] = terms[kInertia];
     for (const Sample& s : window) {
       e.terms[kConstant] += s.force;
-      e.unknown += s.force * UnknownFriction(s.w[row]);
+      e.unknown += s.force * UnknownFriction(times.own * s.w[row]);
     }
     equations.push_back(e);
   }
@@ -156,27 +177,15 @@ double Remainder(const EquationList& equations, const Vector& x) {
   return sum;
 }
 
-/// Smallest distance of two angles of a joint, rad; 0 if it never moves.
-double StepOf(Pieces pieces, int joint) {
-  std::vector<double> values = ValuesOf(pieces, &MachineLog::angle, joint);
-  std::ranges::sort(values);
-  double step = 0;
-  for (size_t i = 1; i < values.size(); ++i) {
-    const double distance = values[i] - values[i - 1];
-    if (distance > kRounding && (step == 0 || distance < step)) step = distance;
-  }
-  return QuantumOf(pieces, joint).value_or(step);
-}
-
 /// The variance of a window's inertia term that the steps of both encoders make, (rad/s)². The
 /// other joint may move within a step of its own, which counts twice.
-double StepNoise(Pieces pieces, int row) {
+double StepNoise(Pieces pieces, int row, double window) {
   double own = StepOf(pieces, row);
   double other = StepOf(pieces, 1 - row);
   // A joint that does not move shows no step: take the other one's.
   if (own <= 0) own = other;
   if (other <= 0) other = own;
-  return (own * own + 2 * other * other) / 12 * std::pow(2 * std::numbers::pi / kWindow, 2);
+  return (own * own + 2 * other * other) / 12 * std::pow(2 * std::numbers::pi / window, 2);
 }
 
 /// Whether the joint of these windows moves by far more than the noise (a variance).
@@ -265,18 +274,18 @@ void Drop(const std::vector<Stretch>& stretches, const MachineLog& piece, int sp
 }
 
 /// The equations of joint `row` in windows in which both encoders change.
-EquationList LiveOf(Pieces pieces, int row, double cycle) {
+EquationList LiveOf(Pieces pieces, int row, const Times& times) {
   constexpr double kMost = 1000;  // windows; more would only take longer
-  std::vector<Stretch> stretches = StretchesOf(pieces, {0});
-  const std::vector<Stretch> second = StretchesOf(pieces, {1});
+  std::vector<Stretch> stretches = StretchesOf(pieces, {0}, times.window);
+  const std::vector<Stretch> second = StretchesOf(pieces, {1}, times.window);
   stretches.insert(stretches.end(), second.begin(), second.end());
   double seconds = 0;
   for (const MachineLog& piece : pieces) seconds += piece.time.back();
-  const double hop = std::max(kWindow / 2, seconds / kMost);
+  const double hop = std::max(times.window / 2, seconds / kMost);
   EquationList live;
   for (const MachineLog& piece : pieces) {
-    EquationList all = EquationsWithin(piece, 0, piece.rows() - 1, row, hop, cycle);
-    Drop(stretches, piece, SpanOf(cycle), all);
+    EquationList all = EquationsWithin(piece, 0, piece.rows() - 1, row, hop, times);
+    Drop(stretches, piece, SpanOf(times.cycle), all);
     live.insert(live.end(), all.begin(), all.end());
   }
   for (Equation& e : live) e.terms[kConstant] = 0;
@@ -284,11 +293,11 @@ EquationList LiveOf(Pieces pieces, int row, double cycle) {
 }
 
 /// The equations of joint `row` in windows within a stretch.
-EquationList StuckOf(const Stretch& stretch, int row, double cycle) {
+EquationList StuckOf(const Stretch& stretch, int row, const Times& times) {
   constexpr double kMost = 1000;  // windows
-  const int span = SpanOf(cycle);
+  const int span = SpanOf(times.cycle);
   return EquationsWithin(*stretch.piece, stretch.first + span, stretch.last - span, row,
-                         std::max(kWindow / 4, stretch.seconds() / kMost), cycle);
+                         std::max(times.window / 4, stretch.seconds() / kMost), times);
 }
 
 /// The longest stretches, at most four, because more would only take longer.
@@ -312,18 +321,18 @@ void ReportStuck(const std::vector<Stretch>& found, int joint, const std::string
 }
 
 /// The stretches of a joint in which the other joint moves as it does only if both move.
-std::vector<Stretch> FindByMotion(Pieces pieces, int joint, double cycle) {
+std::vector<Stretch> FindByMotion(Pieces pieces, int joint, const Times& times) {
   constexpr size_t kEnough = 12;  // live windows
   const int other = 1 - joint;
-  const std::vector<Stretch> stretches = StretchesOf(pieces, {joint});
+  const std::vector<Stretch> stretches = StretchesOf(pieces, {joint}, times.window);
   if (stretches.empty()) return {};
-  const EquationList live = LiveOf(pieces, other, cycle);
-  const std::vector<Stretch> still = StretchesOf(pieces, {other});
-  const double noise = StepNoise(pieces, other);
+  const EquationList live = LiveOf(pieces, other, times);
+  const std::vector<Stretch> still = StretchesOf(pieces, {other}, times.window);
+  const double noise = StepNoise(pieces, other, times.window);
   std::vector<Stretch> found;
   for (const Stretch& stretch : LongestOf(stretches)) {
-    EquationList stuck = StuckOf(stretch, other, cycle);
-    Drop(still, *stretch.piece, SpanOf(cycle), stuck);
+    EquationList stuck = StuckOf(stretch, other, times);
+    Drop(still, *stretch.piece, SpanOf(times.cycle), stuck);
     if (!MovesClearly(stuck, noise)) continue;
     const bool moves =
         live.size() < kEnough ? NeedsTwoJoints(stuck, noise) : Contradicts(live, stuck, noise);
@@ -333,15 +342,15 @@ std::vector<Stretch> FindByMotion(Pieces pieces, int joint, double cycle) {
 }
 
 /// The stretches in which neither angle changes although a joint's torque must move it.
-std::vector<Stretch> FindByTorque(Pieces pieces, int joint, double cycle) {
+std::vector<Stretch> FindByTorque(Pieces pieces, int joint, const Times& times) {
   constexpr size_t kEnough = 12;  // live windows
-  const std::vector<Stretch> both = StretchesOf(pieces, {0, 1});
+  const std::vector<Stretch> both = StretchesOf(pieces, {0, 1}, times.window);
   if (both.empty()) return {};
-  const EquationList live = LiveOf(pieces, joint, cycle);
+  const EquationList live = LiveOf(pieces, joint, times);
   if (live.size() < kEnough) return {};
   std::vector<Stretch> found;
   for (const Stretch& stretch : LongestOf(both)) {
-    if (MustMove(live, StuckOf(stretch, joint, cycle))) found.push_back(stretch);
+    if (MustMove(live, StuckOf(stretch, joint, times))) found.push_back(stretch);
   }
   return found;
 }
@@ -349,18 +358,18 @@ std::vector<Stretch> FindByTorque(Pieces pieces, int joint, double cycle) {
 }  // namespace
 
 void CheckStuck(Pieces pieces, Findings& findings) {
-  const double cycle = UsualCycle(pieces);
-  if (!(cycle > 0)) return;
+  const std::optional<Times> times = Times::Of(pieces);
+  if (!times) return;
   for (const int joint : {0, 1}) {
     if (IsStuck(findings, joint)) continue;
-    const std::vector<Stretch> by_motion = FindByMotion(pieces, joint, cycle);
+    const std::vector<Stretch> by_motion = FindByMotion(pieces, joint, *times);
     if (!by_motion.empty()) {
       ReportStuck(by_motion, joint,
                   fmt::format("joint {} moves as it does only if this joint moves", 2 - joint),
                   findings);
       continue;
     }
-    ReportStuck(FindByTorque(pieces, joint, cycle), joint,
+    ReportStuck(FindByTorque(pieces, joint, *times), joint,
                 "neither angle changes, although torques beyond dry friction act", findings);
   }
 }

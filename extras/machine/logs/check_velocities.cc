@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/format.h"
 #include "base/text.h"
 #include "extras/machine/logs/angle_noise.h"
 #include "extras/machine/logs/check.h"
@@ -182,8 +183,8 @@ void CheckClockByVelocities(Pieces pieces, const Reporter& report) {
   if (std::abs(mean - 1) > 0.3) return;  // CheckVelocity reports it
   report(Severity::kFault,
          fmt::format("both velocities are {:.3f} times the change of their angles: suspect a clock "
-                     "that is {:.2g}% {} (key factor), or another unit of both velocities",
-                     mean, 100 * std::abs(1 / mean - 1), mean < 1 ? "fast" : "slow"),
+                     "that is {} {} (key factor), or another unit of both velocities",
+                     mean, FormatPercent(std::abs(1 / mean - 1)), mean < 1 ? "fast" : "slow"),
          {}, {{"gain", mean}});
 }
 

@@ -3,15 +3,17 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "extras/machine/logs/angle_noise.h"
 
 namespace upswing::machine {
 namespace {
 
-constexpr double kChange = 2.5;       // by which a change must reduce the misfit
-constexpr double kExactChange = 0.9;  // the same, where it explains the log to the encoders' noise
-constexpr int kThinWindows = 64;      // of a scan
+constexpr double kChange = 2.5;        // by which a change must reduce the misfit
+constexpr double kExactChange = 0.9;   // the same, where it explains the log to the encoders' noise
+constexpr double kTorqueChange = 1.2;  // the same, where it shows in the equation of its motor
+constexpr int kThinWindows = 64;       // of a scan
 
 bool HasScale(double scale) { return std::abs(scale) != 1; }
 
@@ -50,7 +52,7 @@ int Hypothesis::changes() const {
 }
 
 bool IsSameKind(const Hypothesis& a, const Hypothesis& b) {
-  return a.change.joint == b.change.joint &&
+  return a.change.joint == b.change.joint && a.angles.absolute == b.angles.absolute &&
          HasScale(a.angles.scale[0]) == HasScale(b.angles.scale[0]) &&
          HasScale(a.angles.scale[1]) == HasScale(b.angles.scale[1]) &&
          a.angles.scale[0] * b.angles.scale[0] > 0 && a.angles.scale[1] * b.angles.scale[1] > 0 &&
@@ -62,6 +64,16 @@ bool IsSameKind(const Hypothesis& a, const Hypothesis& b) {
          (a.torques.flips_at >= 0) == (b.torques.flips_at >= 0) && a.change.kind == b.change.kind;
 }
 
+Joints Hypothesis::more_turn() const {
+  const Eigen::VectorXd& x = fit.constants;
+  // Both angles turn gravity at link 2, angle 1 at link 1, too. Without gravity nothing is known.
+  const auto turn_of = [&](int column, weak::Column gravity) {
+    return x(gravity) > 0 ? x(weak::kColumns + column) / x(gravity) : 0;
+  };
+  const double first = turn_of(0, weak::kG1), both = turn_of(1, weak::kG2);
+  return {first, both - first};
+}
+
 Hypotheses::Hypotheses(const WeakForm& form, Pieces pieces, Driven driven)
     : form_(form),
       thin_(form.Thinned(kThinWindows)),
@@ -70,6 +82,7 @@ Hypotheses::Hypotheses(const WeakForm& form, Pieces pieces, Driven driven)
       noise_{AngleNoise(pieces, 0), AngleNoise(pieces, 1)},
       largest_(LargestTorques(pieces)),
       cycle_(UsualCycle(pieces)),
+      absolute_(pieces.front().absolute),
       per_change_(kChange * (1 + 8.0 / form.windows())) {
   ImproveDelay(log_);
   equations_ = EquationsOf(log_);
@@ -123,14 +136,14 @@ std::vector<double> Hypotheses::UsualDelays() const {
 /// Finds the delay of the torques that explains the motion best.
 void Hypotheses::ImproveDelay(Hypothesis& h) const {
   WeakEquations equations = EquationsOf(h);
-  h.fit = FitSmallZeros(equations);
+  h.fit = FitOf(h, equations);
   if (!IsDriven()) return;
   const std::vector<double> usual = UsualDelays();
   const auto with = [&](double delay) {
     Hypothesis next = h;
     next.delay = std::clamp(delay, usual.front(), usual.back());
     SetTorques(next.torques, next.delay, equations);
-    next.fit = FitSmallZeros(equations);
+    next.fit = FitOf(next, equations);
     return next;
   };
   Hypothesis found = h;
@@ -159,31 +172,67 @@ void Hypotheses::ImproveDelays() {
   std::ranges::sort(offered_, {}, [](const Hypothesis& h) { return h.misfit(); });
   for (size_t i = 0; i < std::min(kMost, offered_.size()); ++i) {
     Hypothesis& h = offered_[i];
-    if (!h.is_late && h.change.kind == Change::kNone) ImproveDelay(h);
+    if (!h.is_late) ImproveDelay(h);
   }
 }
 
-/// Chooses the best hypotheses. One that explains the log to the noise of its encoders needs less
-/// to convince.
+/// The joints whose motors a hypothesis suspects of another torque than the log's.
+Driven ChangedMotors(const Hypothesis& h) {
+  Driven changed{};
+  for (const int j : {0, 1}) {
+    changed[j] = h.torques.largest[j] > 0 || h.torques.dead_band[j] > 0 ||
+                 (h.change.kind == Change::kOffset && h.change.joint == j);
+  }
+  return changed;
+}
+
+/// Whether a single suspicion of motors makes their equations much better, and no other equation
+/// worse. The torque of a joint is in the equation of this joint only, so that errors of a model of
+/// the links, which are in both, do not look like it.
+bool Hypotheses::ShowsAtItsMotor(const Hypothesis& h) const {
+  constexpr double kSame = 1.1, kLeast = 2e-6;  // factor, share
+  const Driven changed = ChangedMotors(h);
+  if (h.changes() != 1 || (!changed[0] && !changed[1])) return false;
+  double gain = 0;
+  for (const int j : {0, 1}) {
+    const double before = std::max(log_.fit.unexplained[j], kLeast);
+    const double after = std::max(h.fit.unexplained[j], kLeast);
+    if (changed[j]) gain += std::log(before / after);
+    if (!changed[j] && after > kSame * before) return false;
+  }
+  return gain > kTorqueChange;
+}
+
+/// Chooses the best hypotheses. One that explains the log to the noise of its encoders, or shows at
+/// its motor only, needs less to convince.
 void Hypotheses::Choose() {
-  const auto find = [&](double per_change, bool is_exact, const Hypothesis* other) {
+  using Rule = std::function<bool(const Hypothesis&)>;
+  const auto find = [&](const Rule& counts, const Hypothesis* other) {
     const Hypothesis* found = &log_;
     for (const Hypothesis& h : offered_) {
-      if (other != nullptr && IsSameKind(h, *other)) continue;
-      if (is_exact && !ExplainsToNoise(h.fit)) continue;
-      if (h.cost(per_change) < found->cost(per_change)) found = &h;
+      if ((other != nullptr && IsSameKind(h, *other)) || !counts(h)) continue;
+      if (h.cost(per_change_) < found->cost(per_change_)) found = &h;
     }
     return found;
   };
-  bool is_exact = false;
-  const Hypothesis* best = find(per_change_, is_exact, nullptr);
+  Rule counts = [](const Hypothesis&) { return true; };
+  const Hypothesis* best = find(counts, nullptr);
+  const auto try_rule = [&](double change, const Rule& rule) {
+    const double before = std::exchange(per_change_, per_change_ * change / kChange);
+    const Hypothesis* found = find(rule, nullptr);
+    if (found == &log_) {
+      per_change_ = before;
+      return;
+    }
+    best = found;
+    counts = rule;
+  };
   if (best == &log_ && !ExplainsToNoise(log_.fit)) {
-    is_exact = true;
-    per_change_ *= kExactChange / kChange;
-    best = find(per_change_, is_exact, nullptr);
+    try_rule(kExactChange, [&](const Hypothesis& h) { return ExplainsToNoise(h.fit); });
   }
+  if (best == &log_) try_rule(kTorqueChange, [&](const auto& h) { return ShowsAtItsMotor(h); });
   best_ = *best;
-  second_ = *find(per_change_, is_exact, &best_);
+  second_ = *find(counts, &best_);
 }
 
 /// The shares of the squares of a fit's motion that the noise of the encoders makes.
@@ -248,19 +297,43 @@ Hypothesis Hypotheses::WithChange(const Change& change) const {
   Hypothesis next = log_;
   if (equations_.windows() < kEnough) return next;
   next.change = change;
-  // No window has a smooth motion where the encoder slips.
-  const WeakEquations equations = equations_.Selected([&](int row) {
-    const double place = equations_.when[row];
-    return change.kind != Change::kSlip || std::abs(place - change.place) > equations_.length;
-  });
+  const WeakEquations equations = Smooth(change, equations_);
   if (equations.windows() < equations_.windows()) {
     next.excused = std::max(0.0, log_.fit.misfit() - FitSmallZeros(equations).misfit());
   }
-  next.fit = FitSmallZeros(equations, ColumnsOf(change, equations));
+  next.fit = FitOf(next, equations_);
   return next;
 }
 
-/// The columns of a change that there is.
+/// The windows in which the motion is smooth: not those where the encoder slips.
+WeakEquations Hypotheses::Smooth(const Change& change, const WeakEquations& equations) {
+  return equations.Selected([&](int row) {
+    const double place = equations.when[row];
+    return change.kind != Change::kSlip || std::abs(place - change.place) > equations.length;
+  });
+}
+
+WeakFit Hypotheses::FitOf(const Hypothesis& h, const WeakEquations& equations) const {
+  if (h.change.kind == Change::kNone) return FitSmallZeros(equations);
+  const WeakEquations smooth = Smooth(h.change, equations);
+  return FitSmallZeros(smooth, ColumnsOf(h.change, smooth));
+}
+
+/// Turns the angles by what the columns of a slip or drift find, which are exact for small turns.
+Hypothesis Hypotheses::Turned(Hypothesis h) const {
+  constexpr int kRounds = 4;
+  for (int round = 0; round < kRounds && h.fit.constants.size() > weak::kColumns; ++round) {
+    Hypothesis next = h;
+    const Joints more = h.more_turn();
+    for (const int j : {0, 1}) next.angles.turn[j] += more[j];
+    next.angles.turns_at = h.change.kind == Change::kSlip ? h.change.place : -1;
+    next.fit = FitOf(next, EquationsOf(next));
+    if (next.misfit() >= h.misfit()) break;
+    h = next;
+  }
+  return h;
+}
+
 std::array<Eigen::MatrixXd, 2> Hypotheses::ColumnsOf(const Change& change,
                                                      const WeakEquations& equations) const {
   std::array<Eigen::MatrixXd, 2> columns;
@@ -271,12 +344,11 @@ std::array<Eigen::MatrixXd, 2> Hypotheses::ColumnsOf(const Change& change,
     }
     return columns;
   }
+  const AngleReading turns{.turns_at = change.kind == Change::kSlip ? change.place : -1};
   for (const int joint : {0, 1}) {
     columns[joint] = equations.A[joint].middleCols(weak::kZero1, 3);
     for (int row = 0; row < windows; ++row) {
-      const double place = equations.when[row];
-      const bool after = place > change.place;
-      columns[joint].row(row) *= change.kind == Change::kSlip ? (after ? 1 : 0) : place - 0.5;
+      columns[joint].row(row) *= turns.TurnedAt(equations.when[row]);
     }
   }
   return columns;

@@ -39,6 +39,8 @@ struct Hypothesis {
 
   /// Misfit of the equations that are not used up by constants.
   double misfit() const { return fit.misfit() - 2 * std::log(fit.freedom) + excused; }
+  /// By which the columns of a slip or drift turn the angles further than `angles`, rad.
+  Joints more_turn() const;
   /// Number of things that are wrong with the log.
   int changes() const;
   double cost(double per_change) const { return misfit() + per_change * changes(); }
@@ -80,12 +82,13 @@ class Hypotheses {
 
   // hypotheses_scan.cc: numbers that a scan finds.
   void TryScales();
-  void TryScale(int joint);
+  void TryScale(int joint, bool absolute);
   void TryTimes();
   void TryLateTorques(int way);
   void TryTorques();
   void TryLimits(Joints TorqueReading::*limit, bool only_small);
   void TryEncoders();
+  void TryDrift();
   void TryPlaces(double step, const std::function<Hypothesis(double)>& with);
   /// The hypothesis with a number near `value`, improved by steps that halve down to `least`.
   /// `with`: the fitted hypothesis with a number.
@@ -109,6 +112,7 @@ class Hypotheses {
   void Choose();
   Joints NoiseShares(const WeakFit& fit) const;
   bool ExplainsToNoise(const WeakFit& fit) const;
+  bool ShowsAtItsMotor(const Hypothesis& h) const;
 
   WeakEquations EquationsOf(const WeakForm& form, const Hypothesis& h) const;
   WeakEquations EquationsOf(const Hypothesis& h) const { return EquationsOf(form_, h); }
@@ -117,6 +121,11 @@ class Hypotheses {
   Hypothesis WithAngles(const AngleReading& angles) const;
   Hypothesis WithTorques(const TorqueReading& torques, double delay) const;
   Hypothesis WithChange(const Change& change) const;
+  Hypothesis Turned(Hypothesis h) const;
+  static WeakEquations Smooth(const Change& change, const WeakEquations& equations);
+  /// The fit of a hypothesis to its equations.
+  WeakFit FitOf(const Hypothesis& h, const WeakEquations& equations) const;
+  /// The columns of a change that there is.
   std::array<Eigen::MatrixXd, 2> ColumnsOf(const Change& change,
                                            const WeakEquations& equations) const;
 
@@ -125,7 +134,9 @@ class Hypotheses {
   Driven driven_;
   Joints range_, noise_;  // of the angles, rad
   Joints largest_;        // torques of the log, N·m
-  double cycle_, per_change_;
+  double cycle_;
+  bool absolute_;  // whether the file's angles of joint 2 are against the vertical
+  double per_change_;
   Hypothesis log_;
   WeakEquations equations_;          // of it
   std::vector<Hypothesis> offered_;  // the best of each kind

@@ -9,8 +9,8 @@ namespace upswing::machine {
 namespace {
 
 /// All ways to read angles with these ranges (rad) that are another convention, without their
-/// mirror images.
-std::vector<AngleReading> Readings(const Joints& range) {
+/// mirror images. `absolute`: whether the file's angles of joint 2 are against the vertical.
+std::vector<AngleReading> Readings(const Joints& range, bool absolute) {
   constexpr double kLeast = 0.3, kMost = 1000;  // rad
   std::vector<AngleReading> readings;
   for (const Joints& unit : {Joints{1, 1},
@@ -24,6 +24,12 @@ std::vector<AngleReading> Readings(const Joints& range) {
     });
     if (is_unlikely) continue;
     for (const double sign : {1, -1}) {
+      for (const bool swapped : {false, true}) {
+        // Other readings of the columns are the same as one of the angles.
+        if (!absolute || (unit[0] == unit[1] && sign > 0 && !swapped)) continue;
+        readings.push_back(
+            {.absolute = true, .scale = {unit[0], sign * unit[1]}, .swapped = swapped});
+      }
       for (const double link1 : {0, 1, -1}) {
         for (const bool swapped : {false, true}) {
           readings.push_back(
@@ -38,7 +44,7 @@ std::vector<AngleReading> Readings(const Joints& range) {
 }  // namespace
 
 void Hypotheses::TryReadings() {
-  for (const AngleReading& reading : Readings(range_)) TryReading(reading);
+  for (const AngleReading& reading : Readings(range_, absolute_)) TryReading(reading);
 }
 
 /// Tries a reading and its mirror image, both with all joints of the torques.

@@ -28,21 +28,26 @@ void Hypotheses::TryScales() {
        {1.0 / 2, 1.0 / 3, 1.0 / 4, 1.0 / 5, 1.0 / 6, 1.0 / 7, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0}) {
     for (const Joints& both : {Joints{scale, 1}, {1, scale}, {scale, scale}}) {
       Offer(WithAngles({.scale = both}));
+      // Both columns of absolute angles have the scale of both angles.
+      if (absolute_ && both[0] != both[1]) Offer(WithAngles({.absolute = true, .scale = both}));
     }
   }
-  for (const int joint : {0, 1}) TryScale(joint);
+  for (const int joint : {0, 1}) {
+    TryScale(joint, /*absolute=*/false);
+    if (absolute_) TryScale(joint, /*absolute=*/true);
+  }
 }
 
 /// Tries scales near 1. Where a joint turns round often, a scale explains nothing until it is
 /// nearly exact.
-void Hypotheses::TryScale(int joint) {
+void Hypotheses::TryScale(int joint, bool absolute) {
   constexpr double kLeast = 0.7, kMost = 1.4, kWidest = 0.05;
   constexpr double kTurn = 0.7, kExact = 0.004;  // rad at the end of the range
   constexpr double kFarthest = 150;              // rad; a finer scan would take too long
   const double range = std::clamp(range_[joint], 1.0, kFarthest);
   const double step = std::min(kWidest, kTurn / range);
   const auto reading = [&](double scale) {
-    AngleReading angles;
+    AngleReading angles{.absolute = absolute};
     angles.scale[joint] = scale;
     return angles;
   };
@@ -150,14 +155,40 @@ void Hypotheses::TryPlaces(double step, const std::function<Hypothesis(double)>&
     found = next;
     best = place;
   }
-  Offer(Refined(found, best, step / 2, std::min(step / 4, equations_.length / 2), with));
+  found = Refined(found, best, step / 2, std::min(step / 4, equations_.length / 2), with);
+  Offer(found.change.kind == Change::kSlip ? Turned(found) : found);
 }
 
 void Hypotheses::TryEncoders() {
   TryPlaces(0.05, [&](double place) {
     return WithChange({Change::kSlip, std::clamp(place, 0.05, 0.95)});
   });
-  Offer(WithChange({Change::kDrift}));
+  TryDrift();
+}
+
+/// Tries drifts of each joint. The columns of a drift are right for small turns: those of a large
+/// drift begin near it.
+void Hypotheses::TryDrift() {
+  constexpr double kMost = 1, kStep = 0.2;  // rad in the log
+  Hypothesis best = WithChange({Change::kDrift});
+  if (best.change.kind != Change::kDrift) return;
+  const auto thin_misfit = [&](const Hypothesis& h) {
+    return FitOf(h, EquationsOf(thin_, h)).misfit();
+  };
+  const Hypothesis none = best;
+  double least = thin_misfit(none);
+  for (const int joint : {0, 1}) {
+    for (double turn = -kMost; turn < kMost + kStep / 2; turn += kStep) {
+      Hypothesis next = none;
+      next.angles.turn[joint] = turn;
+      const double misfit = thin_misfit(next);
+      if (misfit >= least) continue;
+      least = misfit;
+      best = next;
+    }
+  }
+  best.fit = FitOf(best, EquationsOf(best));
+  Offer(Turned(best));
 }
 
 }  // namespace upswing::machine

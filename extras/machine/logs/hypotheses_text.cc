@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "base/format.h"
 #include "extras/machine/logs/hypotheses.h"
 
 namespace upswing::machine {
@@ -21,25 +22,22 @@ std::string ScaleText(double scale) {
 /// A change of an encoder or a torque during the log. `seconds`: length of the log.
 Suspicion SuspicionOfChange(const Hypothesis& h, double seconds) {
   const Eigen::VectorXd& x = h.fit.constants;
-  const auto extra = [&](int i) { return x(weak::kColumns + i); };
   if (h.change.kind == Change::kOffset) {
     const int joint = h.change.joint;
     const double effect = x(joint == 0 ? weak::kTorque1 : weak::kTorque2);
     return {Aspect::kTorque, joint + 1,
-            fmt::format("an offset of {:.2g} N·m", effect > 0 ? -extra(0) / effect : 0)};
+            fmt::format("an offset of {} N·m",
+                        FormatPlain(effect > 0 ? -x(weak::kColumns) / effect : 0, 2))};
   }
-  // Both angles turn gravity at link 2, angle 1 at link 1, too. Without gravity nothing is known.
-  const auto turn_of = [](double extra, double gravity) {
-    return gravity > 0 ? extra / gravity : 0;
-  };
-  const double first = turn_of(extra(0), x(weak::kG1)), both = turn_of(extra(1), x(weak::kG2));
-  const bool is_first = std::abs(first) > std::abs(both - first);
-  const double turn = -(is_first ? first : both - first);
+  const Joints more = h.more_turn();
+  const Joints slip{-h.angles.turn[0] - more[0], -h.angles.turn[1] - more[1]};
+  const bool is_first = std::abs(slip[0]) > std::abs(slip[1]);
+  const double turn = slip[is_first ? 0 : 1];
   const std::string text =
       h.change.kind == Change::kSlip
-          ? fmt::format("an encoder that slips by {:.2g} rad near {:.3g} s", turn,
-                        h.change.place * seconds)
-          : fmt::format("an encoder that drifts by {:.2g} rad/s", turn / seconds);
+          ? fmt::format("an encoder that slips by {} rad near {} s", FormatPlain(turn, 2),
+                        FormatPlain(h.change.place * seconds, 3))
+          : fmt::format("an encoder that drifts by {} rad/s", FormatPlain(turn / seconds, 2));
   return {Aspect::kAngle, is_first ? 1 : 2, text};
 }
 
@@ -52,6 +50,7 @@ std::vector<Suspicion> SuspicionsOf(const Hypothesis& h, double seconds) {
   };
   const AngleReading& r = h.angles;
   const TorqueReading& t = h.torques;
+  const bool is_absolute = r.absolute || r.link1 > 0;
   if (r.swapped && t.swapped) add(Aspect::kMotion, 0, "swapped columns of both joints");
   if (r.swapped && !t.swapped) add(Aspect::kAngle, 0, "swapped angles");
   if (!r.swapped && t.swapped) add(Aspect::kTorque, 0, "swapped torques");
@@ -62,8 +61,8 @@ std::vector<Suspicion> SuspicionsOf(const Hypothesis& h, double seconds) {
   }
   if (r.late != 0) {
     add(Aspect::kAngle, 2,
-        fmt::format("angles that are {:.2g} ms {} than those of joint 1", 1e3 * std::abs(r.late),
-                    r.late > 0 ? "later" : "earlier"));
+        fmt::format("angles that are {} ms {} than those of joint 1",
+                    FormatPlain(1e3 * std::abs(r.late), 2), r.late > 0 ? "later" : "earlier"));
   }
   for (const int j : {0, 1}) {
     if (std::abs(r.scale[j]) != 1) add(Aspect::kAngle, j + 1, ScaleText(std::abs(r.scale[j])));
@@ -72,30 +71,32 @@ std::vector<Suspicion> SuspicionsOf(const Hypothesis& h, double seconds) {
     if (std::abs(r.zero[j]) <= kZero) continue;
     // The reading of a link that hangs, by the column's own sign.
     const double hangs = -std::copysign(1.0, r.scale[j]) *
-                         (j == 1 && r.link1 > 0 ? r.zero[1] + r.zero[0] : r.zero[j]);
+                         (j == 1 && is_absolute ? r.zero[1] + r.zero[0] : r.zero[j]);
     const double zero = std::remainder(hangs, kFullTurn);
     add(Aspect::kAngle, j + 1,
         fmt::format("another zero, {:.2f} rad ({:.0f} deg) when its link {} (add it to the key "
                     "hanging, in the column's unit)",
                     zero, zero / kOneDegree,
-                    j == 0 || r.link1 > 0 ? "hangs" : "is in line with link 1"));
+                    j == 0 || is_absolute ? "hangs" : "is in line with link 1"));
   }
   if (h.is_late) {
     add(Aspect::kTorque, 0,
-        fmt::format("torques that are {:.2g} ms {} than they act", 1e3 * std::abs(h.delay),
-                    h.delay > 0 ? "earlier" : "later"));
+        fmt::format("torques that are {} ms {} than they act",
+                    FormatPlain(1e3 * std::abs(h.delay), 2), h.delay > 0 ? "earlier" : "later"));
   }
   for (const int j : {0, 1}) {
     if (t.largest[j] > 0) {
       add(Aspect::kTorque, j + 1,
-          fmt::format("motors that saturate near {:.2g} N·m", t.largest[j]));
+          fmt::format("motors that saturate near {} N·m", FormatPlain(t.largest[j], 2)));
     }
     if (t.dead_band[j] > 0) {
-      add(Aspect::kTorque, j + 1, fmt::format("a dead band of about {:.2g} N·m", t.dead_band[j]));
+      add(Aspect::kTorque, j + 1,
+          fmt::format("a dead band of about {} N·m", FormatPlain(t.dead_band[j], 2)));
     }
   }
   if (t.flips_at >= 0) {
-    add(Aspect::kTorque, 0, fmt::format("a sign that turns near {:.3g} s", t.flips_at * seconds));
+    add(Aspect::kTorque, 0,
+        fmt::format("a sign that turns near {} s", FormatPlain(t.flips_at * seconds, 3)));
   }
   if (h.change.kind != Change::kNone) all.push_back(SuspicionOfChange(h, seconds));
   return all;

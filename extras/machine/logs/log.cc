@@ -328,6 +328,21 @@ std::vector<ReadColumn> ReadColumnsOf(const LogColumns& columns) {
   return read;
 }
 
+/// Why the clock of a log goes back before row `k`, and the remedy. A clock that begins again goes
+/// back to where it began, one that is set goes back by less.
+std::string CauseOfClockBack(const MachineLog& log, int k) {
+  constexpr double kBegins = 0.05;  // of the time before
+  const double begin = log.time.front(), before = log.time[k - 1];
+  if (log.time[k] - begin <= kBegins * (before - begin)) {
+    return "split logs that follow each other, name a column by piece, or the key wrap of a clock "
+           "that starts again";
+  }
+  return Concat(
+      "the clock was set back by ", FormatPlain(before - log.time[k], 3),
+      " s, as NTP and users do; log a clock that is never set, such as CLOCK_MONOTONIC or "
+      "Python's time.monotonic()");
+}
+
 void CheckRows(const MachineLog& log, const std::string& where) {
   if (log.rows() < 2) {
     throw BadInput(
@@ -337,8 +352,7 @@ void CheckRows(const MachineLog& log, const std::string& where) {
     if (log.time[k] >= log.time[k - 1]) continue;
     throw BadInput(Concat(where, ": row ", log.first_row + k, ": time: expected at least ",
                           FormatNumber(log.time[k - 1]), " s as in the row before, got ",
-                          FormatNumber(log.time[k]),
-                          " s; split logs that follow each other, or name a column by piece"));
+                          FormatNumber(log.time[k]), " s: ", CauseOfClockBack(log, k)));
   }
 }
 
@@ -361,6 +375,7 @@ MachineLog PieceOf(const MachineLog& whole, int begin, int end) {
   MachineLog piece;
   piece.name = whole.name;
   piece.first_row = whole.first_row + begin;
+  piece.absolute = whole.absolute;
   piece.time.assign(whole.time.begin() + begin, whole.time.begin() + end);
   for (const JointQuantity& q : kJointQuantities) {
     const std::vector<Joints>& values = whole.*q.values;
@@ -407,6 +422,7 @@ std::vector<MachineLog> ParseLog(std::string_view csv, const LogColumns* columns
     FinishAngles(own, piece);
     if (own.torque_follows) ToCyclesEnds(piece.commanded);
     piece.columns = ReadColumnsOf(own);
+    piece.absolute = own.absolute;
   }
   return pieces;
 }

@@ -41,6 +41,7 @@ struct MachineLog {
   std::vector<Joints> measured;   // from the motors' currents, N·m
   std::vector<Joints> push;       // added to the commanded torque after clipping, N·m
   std::vector<ReadColumn> columns = {};
+  bool absolute = false;  // whether the file's angles of joint 2 are against the vertical
 
   int rows() const { return static_cast<int>(time.size()); }
 };

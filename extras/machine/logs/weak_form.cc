@@ -309,9 +309,12 @@ void WeakForm::FindWindows(double quiet) {
   }
 }
 
-void WeakForm::SetMotion(const AngleReading& reading, const Window& window, int row,
+void WeakForm::SetMotion(const AngleReading& reading, const Window& window, double place, int row,
                          WeakEquations& equations) const {
   using namespace weak;
+  const double turned = reading.TurnedAt(place);
+  const Joints zero{reading.zero[0] + turned * reading.turn[0],
+                    reading.zero[1] + turned * reading.turn[1]};
   const std::vector<Sample> late = reading.late != 0
                                        ? SamplesOf(window.piece, window.begin, reading.late)
                                        : std::vector<Sample>();
@@ -321,7 +324,7 @@ void WeakForm::SetMotion(const AngleReading& reading, const Window& window, int 
   for (int i = 0; i < weight_.size(); ++i) {
     Joints q = reading.Of(samples[i].q);
     const Joints w = reading.Of(samples[i].w);
-    for (const int j : {0, 1}) q[j] += reading.zero[j];
+    for (const int j : {0, 1}) q[j] += zero[j];
     const auto angles = dynamics::AnglesOf<double>({q[0], q[1]});
     const auto& [s1, c1, s2, c2] = angles;
     const auto plain = MomentumRegressorOf(angles, {w[0], w[1]});
@@ -352,8 +355,9 @@ WeakEquations WeakForm::Equations(const AngleReading& angles, const TorqueReadin
   equations.length = length_ / seconds;
   for (int row = 0; row < windows(); ++row) {
     const Window& window = windows_[row];
-    SetMotion(angles, window, row, equations);
-    equations.when.push_back((before[window.piece] + window.begin + length_ / 2) / seconds);
+    const double place = (before[window.piece] + window.begin + length_ / 2) / seconds;
+    SetMotion(angles, window, place, row, equations);
+    equations.when.push_back(place);
   }
   SetTorques(torques, delay, equations);
   return equations;

@@ -16,17 +16,28 @@ namespace upswing::machine {
 
 /// A way to read the angles: operations on the columns of the file, in this order.
 struct AngleReading {
+  // Whether the column of joint 2 has angles against the vertical, from which the log subtracted
+  // those of joint 1.
+  bool absolute = false;
   Joints scale{1, 1};
   double link1 = 0;  // angles of joint 1 that are in those of joint 2; 1: against the vertical
   bool swapped = false;
-  Joints zero{};    // added at the end, rad
-  double late = 0;  // time by which angle 2 is behind angle 1, s
+  Joints zero{};         // added at the end, rad
+  double late = 0;       // time by which angle 2 is behind angle 1, s
+  Joints turn{};         // added after a moment of the log, or more and more, rad
+  double turns_at = -1;  // this moment, as a place in the log from 0 to 1; negative: more and more
 
-  /// Angles without the zeros, or velocities, of both joints.
+  /// Angles without the zeros and turns, or velocities, of both joints.
   Joints Of(const Joints& x) const {
-    Joints y{scale[0] * x[swapped ? 1 : 0], scale[1] * x[swapped ? 0 : 1]};
-    y[1] -= link1 * y[0];
+    const Joints column{x[0], absolute ? x[0] + x[1] : x[1]};
+    Joints y{scale[0] * column[swapped ? 1 : 0], scale[1] * column[swapped ? 0 : 1]};
+    y[1] -= (absolute ? 1 + link1 : link1) * y[0];
     return y;
+  }
+  /// The share of the turns that is added at a place in the log: none at its beginning.
+  double TurnedAt(double place) const {
+    if (turns_at < 0) return place;
+    return place > turns_at ? 1 : 0;
   }
 };
 
@@ -126,7 +137,8 @@ class WeakForm {
   double LongestGap(const SmoothMotion& motion) const;
   /// The samples of a window whose angles 2 are `late` (s).
   std::vector<Sample> SamplesOf(int piece, double begin, double late) const;
-  void SetMotion(const AngleReading& reading, const Window& window, int row,
+  /// `place`: of the window in the log, from 0 to 1.
+  void SetMotion(const AngleReading& reading, const Window& window, double place, int row,
                  WeakEquations& equations) const;
 
   std::span<const MachineLog> pieces_;

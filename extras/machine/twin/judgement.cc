@@ -9,9 +9,9 @@
 
 #include "base/format.h"
 #include "base/sample.h"
+#include "extras/machine/logs/angle_noise.h"
 #include "extras/machine/logs/check.h"
 #include "extras/machine/logs/windows.h"
-#include "extras/machine/logs/angle_noise.h"
 #include "extras/machine/twin/residuals.h"
 #include "extras/machine/twin/validate.h"
 
@@ -240,7 +240,7 @@ std::string SentenceOf(const Judgement& j) {
   }
   const std::string error = fmt::format("{:.2g} rad over {:.2g} s", j.error, j.seconds);
   const std::string times = fmt::format("{:.2g} times the encoders' noise", j.times_noise);
-  const std::string share = fmt::format("{:.2g}% of the motion", 100 * j.share);
+  const std::string share = FormatPercent(j.share) + " of the motion";
   constexpr double kWithoutNoise = 1e4;  // times: the logs of a simulation
   if (j.explains() && j.times_noise > kWithoutNoise) {
     return fmt::format("the model explains {} to {}: {}; the angles have no noise", j.logs, share,

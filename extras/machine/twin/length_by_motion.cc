@@ -6,6 +6,7 @@
 #include <cmath>
 #include <vector>
 
+#include "base/format.h"
 #include "extras/machine/logs/check.h"
 #include "extras/machine/logs/weak_form.h"
 #include "pendulum/scale.h"
@@ -95,10 +96,10 @@ std::string LengthContradiction(std::span<const MachineLog> logs, const Twin& tw
   // A clock that runs fast by a factor makes all accelerations less by its square.
   const double clock = std::sqrt(ratio);
   return fmt::format(
-      "the motion shows length1 = {:.3g} m ± {:.2g}%, not {:.3g} m: is the length wrong, does the "
-      "clock run {:.2g}% {}, or is gravity {:.3g} m/s²?",
-      found->length, 100 * found->deviation, twin.plant.length1, 100 * std::abs(clock - 1),
-      clock > 1 ? "fast" : "slow", twin.plant.gravity / ratio);
+      "the motion shows length1 = {:.3g} m ± {}, not {:.3g} m: is the length wrong, does the "
+      "clock run {} {}, or is gravity {:.3g} m/s²?",
+      found->length, FormatPercent(found->deviation), twin.plant.length1,
+      FormatPercent(std::abs(clock - 1)), clock > 1 ? "fast" : "slow", twin.plant.gravity / ratio);
 }
 
 }  // namespace upswing::machine
