@@ -698,11 +698,15 @@ TEST(MachineCheck, FaultsOfTheWiringAreNamedForEachSize) {
        each([](Joints& q, double share) { q[1] += share > 0.55 ? 0.1 : 0; })},
       {"angle 2: suspect an encoder that drifts",
        each([](Joints& q, double share) { q[1] += 0.4 * share; })},
+      {"angle 1: suspect an encoder that drifts",
+       each([](Joints& q, double share) { q[0] -= 0.8 * share; })},
       {"torque 1: suspect an offset", [](MachineLog&) {}, [](double u, double) { return u + 0.4; }},
       {"motors that saturate near", [](MachineLog&) {},
        [](double u, double) { return std::clamp(u, -1.6, 1.6); }},
       {"a dead band", [](MachineLog&) {},
        [](double u, double) { return std::copysign(std::max(0.0, std::abs(u) - 1.5), u); }},
+      {"a dead band", [](MachineLog&) {},
+       [](double u, double) { return std::abs(u) < 0.9 ? 0 : u; }},
       {"a sign that turns near", [](MachineLog&) {},
        [](double u, double share) { return share > 0.5 ? -u : u; }},
       {"rows are lost, but the clock counts on", [](MachineLog& log) {
@@ -726,6 +730,54 @@ TEST(MachineCheck, FaultsOfTheWiringAreNamedForEachSize) {
           << length << " times, " << fault.text << ":\n"
           << found;
     }
+  }
+}
+
+TEST(MachineCheck, AFactorOfAColumnWithAbsoluteAnglesIsNamed) {
+  for (const double length : {0.1, 4.0}) {
+    MachineLog exact = Sampled(OfSize(length, AsCommanded), 1, 8192);
+    exact.absolute = true;
+    EXPECT_EQ(FaultsOf(exact), "");
+    for (const double factor : {2.0, 0.5}) {
+      for (const Joints& factors : {Joints{factor, 1}, {1, factor}, {factor, factor}}) {
+        MachineLog log = exact;
+        for (Joints& q : log.angle) {
+          const double absolute = factors[1] * (q[0] + q[1]);
+          q[0] *= factors[0];
+          q[1] = absolute - q[0];
+        }
+        const std::string found = FaultsOf(log);
+        for (const int j : {0, 1}) {
+          const std::string text =
+              fmt::format("angle {}: suspect an angle of {:g} times", j + 1, factor);
+          EXPECT_EQ(found.find(text) != std::string::npos, factors[j] != 1)
+              << length << " times, factors " << factors[0] << ", " << factors[1] << ":\n"
+              << found;
+        }
+      }
+    }
+  }
+}
+
+TEST(MachineCheck, NothingMoves) {
+  MachineLog log = GoodLog();
+  log.velocity.clear();
+  log.measured.clear();
+  const double step = 2 * std::numbers::pi / 4096;
+  for (int k = 0; k < log.rows(); ++k) log.angle[k] = {0.5 + step * (k / 700 % 3), -step * (k % 2)};
+  EXPECT_NE(FaultsOf(log).find("motion: nothing moves: both angles stay within 0.0031 rad, a few "
+                               "steps of the encoders although the torques change by"),
+            std::string::npos)
+      << FaultsOf(log);
+  log.commanded.clear();
+  for (const bool is_constant : {false, true}) {
+    if (is_constant) std::ranges::fill(log.angle, Joints{0.5, 0});
+    const Findings found = Check(log);
+    const auto finding = std::ranges::find(found, Aspect::kMotion, &Finding::aspect);
+    ASSERT_NE(finding, found.end());
+    EXPECT_EQ(finding->severity, Severity::kWarning);
+    EXPECT_EQ(finding->text.find("nothing moves: "), 0U) << finding->text;
+    EXPECT_NE(finding->text.find("the log says nothing about the machine"), std::string::npos);
   }
 }
 
@@ -848,7 +900,9 @@ TEST(MachineCheck, BothEncodersFreeze) {
   EXPECT_NE(FaultsOf(log).find("angle 1: the encoder sticks"), std::string::npos) << FaultsOf(log);
 
   Freeze(log, {0, 1}, 0, log.rows());
-  EXPECT_EQ(FaultsOf(log).find("motion: no angle ever changes although the torques change by"), 0U);
+  EXPECT_EQ(FaultsOf(log).find("motion: nothing moves: no angle ever changes although the "
+                               "torques change by"),
+            0U);
   // Links hang, and the measured torque has noise.
   Rng rng(4, "noise");
   for (Joints& u : log.measured) u = {0.01 * rng.Normal(), 0.01 * rng.Normal()};

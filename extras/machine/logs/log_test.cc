@@ -153,8 +153,13 @@ TEST(MachineLog, BadFilesGetOneLineWithThePlace) {
             "its row");
   EXPECT_EQ(ComplaintAbout(head + "1,2\n"), "log.csv:3: expected 3 columns, got 2");
   EXPECT_EQ(ComplaintAbout(head + "1,2,3\n0.5,2,3\n"),
-            "log.csv: row 3: time: expected at least 1 s as in the row before, got 0.5 s; split "
-            "logs that follow each other, or name a column by piece");
+            "log.csv: row 3: time: expected at least 1 s as in the row before, got 0.5 s: the "
+            "clock was set back by 0.5 s, as NTP and users do; log a clock that is never set, such "
+            "as CLOCK_MONOTONIC or Python's time.monotonic()");
+  EXPECT_EQ(ComplaintAbout(head + "1,2,3\n0.01,2,3\n"),
+            "log.csv: row 3: time: expected at least 1 s as in the row before, got 0.01 s: split "
+            "logs that follow each other, name a column by piece, or the key wrap of a clock that "
+            "starts again");
   EXPECT_EQ(ComplaintAbout("time,pos1\n0,1\n1,1\n"),
             "log.csv:1: expected a column \"pos2\", got \"time,pos1\"");
   EXPECT_EQ(
