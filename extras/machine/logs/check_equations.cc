@@ -138,21 +138,56 @@ std::optional<WeakForm> FormNear(Pieces pieces, double own) {
   return form ? form : first;
 }
 
+/// The way of the faster joint from a row to the next in the fastest hundredth of the rows, rad.
+double LongestWay(Pieces pieces) {
+  std::vector<double> ways;
+  for (const MachineLog& log : pieces) {
+    for (int k = 1; k < log.rows(); ++k) {
+      const Joints &a = log.angle[k - 1], &b = log.angle[k];
+      ways.push_back(std::max(std::abs(b[0] - a[0]), std::abs(b[1] - a[1])));
+    }
+  }
+  std::ranges::sort(ways);
+  return Quantile(ways, 0.99);
+}
+
+/// Whether the motion between the rows is not known: a joint moves by a radian from one to the
+/// next.
+bool HasFarRows(double way) { return way > 1; }
+
 /// A verdict on the hypotheses about a log, with the equations that it needs.
 struct Verdict {
   std::unique_ptr<WeakForm> form;
   std::unique_ptr<Hypotheses> tried;
+  bool far_rows = false;  // see HasFarRows
 
   bool confirms() const {
+    return is_plausible() && (!tells_of_turn() || (!far_rows && divides_all()));
+  }
+
+  bool is_plausible() const {
     constexpr int kMostChanges = 3;
     constexpr double kGood = 0.2;  // share that a reported hypothesis leaves unexplained at most
     const Hypothesis& best = tried->best();
     return best.changes() > 0 && best.changes() <= kMostChanges && best.fit.left() <= kGood;
   }
+
+  /// Whether it suspects an encoder that slips or drifts.
+  bool tells_of_turn() const {
+    const Change::Kind kind = tried->best().change.kind;
+    return kind == Change::kSlip || kind == Change::kDrift;
+  }
+
+  /// Whether it explains the worse joint better, too. The angles of both joints are in both
+  /// equations, so that a wrong angle shows in both.
+  bool divides_all() const {
+    constexpr double kTimes = 3;
+    return kTimes * tried->best().fit.left() < tried->log().fit.left();
+  }
 };
 
 Verdict TryHypotheses(Pieces pieces, const WeakForm& form, Driven driven) {
-  Verdict verdict{std::make_unique<WeakForm>(form), nullptr};
+  Verdict verdict{std::make_unique<WeakForm>(form), nullptr, HasFarRows(LongestWay(pieces))};
   verdict.tried = std::make_unique<Hypotheses>(*verdict.form, pieces, driven);
   verdict.tried->TryAll();
   return verdict;
@@ -202,28 +237,14 @@ double UnknownShare(Pieces pieces) {
   return std::max(0.0, 1 - rows / cycles);
 }
 
-/// The way of the faster joint from a row to the next in the fastest hundredth of the rows, rad.
-double LongestWay(Pieces pieces) {
-  std::vector<double> ways;
-  for (const MachineLog& log : pieces) {
-    for (int k = 1; k < log.rows(); ++k) {
-      const Joints &a = log.angle[k - 1], &b = log.angle[k];
-      ways.push_back(std::max(std::abs(b[0] - a[0]), std::abs(b[1] - a[1])));
-    }
-  }
-  std::ranges::sort(ways);
-  return Quantile(ways, 0.99);
-}
-
 /// Reports the share of the motion that the equations leave unexplained, and what that means.
 void ReportUnexplained(Pieces pieces, double left, Findings& findings) {
-  constexpr double kFar = 1;  // rad; the motion between such rows is not known
   // A larger share is none of a pendulum, unless the torques of lost rows are unknown.
   const double most = 0.1 + 2 * UnknownShare(pieces);
   const double way = LongestWay(pieces);
   Severity severity = Severity::kNote;
   std::string meaning;
-  if (left > most && way > kFar) {
+  if (left > most && HasFarRows(way)) {
     severity = Severity::kWarning;
     meaning = fmt::format(
         ": the rows are too far apart, a joint moves by {:.2g} rad from one to the next", way);
