@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/rng.h"
+#include "base/text.h"
 #include "extras/machine/drive/estimator.h"
 #include "extras/machine/twin/simulated_machine.h"
 #include "extras/realaigym/machine_trials.h"
@@ -50,7 +51,8 @@ class Pilot {
   Joints Torque(double time, const Joints& angle) {
     const TimedReading reading{{angle, {}}, time};
     estimator_.Update(time, sent_, &reading);
-    // The cycle nearest to the end of a control period counts. After a late one, actions are left out.
+    // The cycle nearest to the end of a control period counts. After a late one, actions are left
+    // out.
     const auto step = static_cast<int64_t>((time + kPeriod / 2) / controller_.period());
     if (step > step_) wanted_ = controller_(step, estimator_.ahead());
     step_ = std::max(step, step_);
@@ -157,18 +159,25 @@ class Run {
   bool within_limits_ = true;
 };
 
+/// Throws BadInput unless the machine has about the size of CloudPendulum's.
+void ExpectUsualSize(const char* flag, const Twin& twin) {
+  if (CarryOver(ReadTwin("cloudpendulum", "olympics").plant, twin.plant) == Scale()) return;
+  throw BadInput(
+      Concat(flag,
+             ": expected a machine of about the size of cloudpendulum, for which the pushes and "
+             "limits of 2026 are, got one of another size"));
+}
+
 }  // namespace
 
-std::vector<OlympicsRun> RunOlympics(const Twin& twin, const MachinePolicy& policy, int count,
-                                     uint64_t seed, ThreadPool* pool, const Progress& progress) {
-  if (CarryOver(ReadTwin("cloudpendulum", "olympics").plant, twin.plant) != Scale()) {
-    throw BadInput(
-        "--twin: expected a machine of about the size of cloudpendulum, for which the pushes and "
-        "limits of 2026 are, got one of another size");
-  }
+std::vector<OlympicsRun> RunOlympics(const Twin& twin, const MachinePolicy& policy,
+                                     const Twin& machines, int count, uint64_t seed,
+                                     ThreadPool* pool, const Progress& progress) {
+  ExpectUsualSize("--twin", twin);
+  ExpectUsualSize("--machine", machines);
   return RunAll(count, pool, progress, [&](int i) {
     Rng rng(seed, "olympics: machine", static_cast<uint64_t>(i));
-    const Twin machine = DrawTwin(twin, rng);
+    const Twin machine = DrawTwin(machines, rng);
     return Run(twin, policy, machine, rng.Next()).Judge();
   });
 }

@@ -37,13 +37,14 @@ struct OlympicsRun {
   }
 };
 
-/// Runs on `count` machines drawn from the twin's posterior, with cycles of which one in 250 is
-/// late by up to 67.5 ms, as in logs of the machine's users. Only the policy's motor drives; it
-/// compensates most of its own joint's dry friction, and acts in the cycle nearest to the end of its
-/// control period. An Estimator of the twin gives the state. Throws BadInput for a twin of another
-/// size than CloudPendulum's machines.
-std::vector<OlympicsRun> RunOlympics(const Twin& twin, const MachinePolicy& policy, int count,
-                                     uint64_t seed, ThreadPool* pool,
-                                     const Progress& progress = nullptr);
+/// Runs on `count` machines drawn from the posterior of `machines`, with cycles of which one in 250
+/// is late by up to 67.5 ms, as in logs of the machine's users. Only the policy's motor drives; it
+/// compensates most of its own joint's dry friction, and acts in the cycle nearest to the end of
+/// its control period. An Estimator of `twin`, which is what the policy's user knows of the
+/// machines, gives the state. Throws BadInput for a twin or machines of another size than
+/// CloudPendulum's.
+std::vector<OlympicsRun> RunOlympics(const Twin& twin, const MachinePolicy& policy,
+                                     const Twin& machines, int count, uint64_t seed,
+                                     ThreadPool* pool, const Progress& progress = nullptr);
 
 }  // namespace upswing::realaigym

@@ -30,7 +30,7 @@ namespace {
 
 struct ScoreArguments {
   PolicyArguments policy;
-  std::string robot, twin, csv, score_version = "3";
+  std::string robot, twin, machine, csv, score_version = "3";
   int64_t runs = 100, threads = 0, seed = 1;
   bool as_json = false, no_pushes = false;
 
@@ -206,14 +206,14 @@ std::string ShareText(int64_t count, int64_t all) {
                      100 * interval.low, 100 * interval.high);
 }
 
-/// Scores a policy by the task of 2026 on machines drawn from a twin's posterior.
+/// Scores a policy by the task of 2026 on machines drawn from the posterior of `machines`.
 void ScoreOlympics(const ScoreArguments& a, const Twin& twin, const MachinePolicy& policy,
-                   ThreadPool& pool) {
+                   const Twin& machines, ThreadPool& pool) {
   std::vector<OlympicsRun> runs;
   {
     EpisodeProgress progress(a.as_json, "machines");
-    runs = RunOlympics(twin, policy, static_cast<int>(a.runs), static_cast<uint64_t>(a.seed), &pool,
-                       std::ref(progress));
+    runs = RunOlympics(twin, policy, machines, static_cast<int>(a.runs),
+                       static_cast<uint64_t>(a.seed), &pool, std::ref(progress));
   }
   int64_t held = 0, poses = 0, pushes = 0, perfect = 0, beyond = 0;
   for (const OlympicsRun& run : runs) {
@@ -226,6 +226,7 @@ void ScoreOlympics(const ScoreArguments& a, const Twin& twin, const MachinePolic
   if (a.as_json) {
     fmt::print("{}\n", PrintableJson({{"policy", policy->name},
                                       {"twin", twin.name},
+                                      {"machine", machines.name},
                                       {"runs", a.runs},
                                       {"held", held},
                                       {"poses", poses},
@@ -235,7 +236,7 @@ void ScoreOlympics(const ScoreArguments& a, const Twin& twin, const MachinePolic
     return;
   }
   fmt::print("{} on {} of {}, the {}'s task of 2026\n", Printable(policy->name),
-             Counted(a.runs, "machine"), Printable(twin.name), NameOf(RobotOf(*policy)));
+             Counted(a.runs, "machine"), Printable(machines.name), NameOf(RobotOf(*policy)));
   fmt::print("  swings up and stays     {}\n", ShareText(held, a.runs));
   fmt::print("  back after a pose       {}\n", ShareText(poses, a.runs * kOlympicsPoses));
   fmt::print("  back after a push       {}\n", ShareText(pushes, a.runs * kOlympicsPushes));
@@ -272,8 +273,10 @@ int RunScore(const ScoreArguments& a) {
     WriteOutput(a.csv, BoardCsv(a.version2() ? NominalLog(policy) : UptimeLog(policy, seed)));
     if (IsStandardStream(a.csv)) return 0;
   }
+  std::optional<Twin> machines = twin;  // which the policy's runs are on
+  if (!a.machine.empty()) machines = ReadTwin(a.machine, "--machine");
   if (a.olympics()) {
-    ScoreOlympics(a, *twin, policy, pool);
+    ScoreOlympics(a, *twin, policy, *machines, pool);
   } else if (!a.version2()) {
     ScoreUptimes(a, twin, policy, pool);
   } else if (twin) {
@@ -294,8 +297,9 @@ int RunScore(const ScoreArguments& a) {
   if (a.as_json) return 0;
   const std::string other = twin ? std::string() : OtherPlant(policy);
   if (!other.empty()) fmt::print("  designed for {}, not for the board's plant\n", other);
-  if (twin && twin->covariance.empty()) {
-    fmt::print("  all machines are equal, because the twin has no [covariance]\n");
+  if (machines && machines->covariance.empty()) {
+    fmt::print("  all machines are equal, because {} has no [covariance]\n",
+               Printable(machines->name));
   }
   if (!a.csv.empty()) fmt::print("  written {}\n", Printable(a.csv));
   return 0;
@@ -323,6 +327,10 @@ void AddScore(CommandLine& line) {
   line.Arguments(rules);
   line.Text("--twin", a.twin, "FILE",
             "score on machines drawn from this twin, by the hardware rules");
+  line.Text(
+      "--machine", a.machine, "FILE",
+      "version 2026: score on this machine, or on machines drawn from it, with --twin as what "
+      "is known of it (default: --twin)");
   AddSeed(line, a.seed, "resets, noise, pushes and machines");
   AddThreads(line, a.threads);
   line.Flag("--no-pushes", a.no_pushes, "no pushes on the twin's machines, version 2");
@@ -336,6 +344,9 @@ void AddScore(CommandLine& line) {
     }
     if (a.olympics() && a.twin.empty()) {
       throw BadInput("--score-version 2026: expected --twin FILE with it, such as cloudpendulum");
+    }
+    if (line.Has("--machine") && !a.olympics()) {
+      throw BadInput("--machine: expected --score-version 2026 with it");
     }
   });
   line.Notes(
