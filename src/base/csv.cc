@@ -172,7 +172,6 @@ std::string SimilarIn(const std::vector<std::string_view>& cells, const std::str
   return "";
 }
 
-/// A text as a cell: Printable, which keeps the row on one line, and in quotes if necessary.
 /// A text that a spreadsheet takes for no formula, also where it separates cells by semicolons: a '
 /// stands before =, +, - and @.
 std::string NoFormula(const std::string& text) {
@@ -186,6 +185,8 @@ std::string NoFormula(const std::string& text) {
   return safe;
 }
 
+/// A text as a cell: Printable, which keeps the row on one line, without a formula, and in quotes
+/// if necessary.
 std::string CellOf(std::string_view given) {
   std::string text = Printable(given);
   if (!ParseNumber(text)) text = NoFormula(text);
