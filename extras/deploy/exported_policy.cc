@@ -26,7 +26,7 @@ std::vector<std::string> IdentifiedMeanings() {
           constant("gravity on link 2 about joint 2"),
           constant("damping of joint 1"),
           constant("damping of joint 2"),
-          "distance of the identified plant from those that the motor cannot hold",
+          "distance of the identified plant from plants that the motor cannot hold",
           "steep near 0, where the motor cannot hold the plant",
           "energy of the identified plant: 0 hanging at rest, 1 upright",
           "z / (1 + size of z) of the faster fall, which the motor can stop for z within +-1",

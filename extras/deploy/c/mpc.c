@@ -4,7 +4,7 @@
 #include "linearize.c"
 #include "trajectory.c"
 
-/* Makes the plan from the start under its torques alone. */
+/* Makes the plan from the start under its torques, without feedback. */
 static inline void policy_plain(policy_state *s, const float *start) {
   int t, i;
   for (t = 0; t < POLICY_HORIZON; t++) {

@@ -70,7 +70,7 @@ static inline int policy_observe_sample(policy_state *state, int sample, float *
   policy_observe(state, x[0], x[1], x[2], x[3], observation);
 #ifdef POLICY_IDENTIFIED_SIZE
   {
-    /* The network then gets the program's numbers, so that its outputs tell of it alone. */
+    /* The network then gets the program's numbers, so that its outputs test only the network. */
     const float *expected = policy_sample_identified + POLICY_IDENTIFIED_SIZE * sample;
     int i;
     for (i = 0; i < POLICY_IDENTIFIED_SIZE; i++) {
