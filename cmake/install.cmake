@@ -2,6 +2,7 @@
 # libraries of the layers, and the package by which find_package(upswing) finds them. The folder can be
 # moved: nothing in it is an absolute path.
 include(GNUInstallDirs)
+set(UPSWING_LAYERS base nn pendulum rl control os mujoco report agents runs judge)
 set(UPSWING_EXTRAS machine realaigym deploy)
 list(TRANSFORM UPSWING_EXTRAS PREPEND upswing- OUTPUT_VARIABLE UPSWING_PROGRAMS)
 list(APPEND UPSWING_PROGRAMS upswing)

@@ -1,16 +1,15 @@
 # The installed library: headers, static libraries and the package upswing. Read by cmake/install.cmake.
 include(CMakePackageConfigHelpers)
-set(UPSWING_LAYERS base nn pendulum rl control os mujoco report agents runs judge)
 set(UPSWING_PACKAGE ${CMAKE_INSTALL_LIBDIR}/cmake/upswing)
 
 # The libraries of folders in FOLDER, and their headers, which are included from include/upswing.
 function(upswing_install_layers FOLDER DESTINATION)
   foreach(LAYER IN LISTS ARGN)
     install(TARGETS upswing_${LAYER} EXPORT upswing)
-    # Without headers for tests, and without parts of kernels.
+    # Without headers for tests or Windows, and without parts of kernels.
     install(DIRECTORY ${FOLDER}/${LAYER} DESTINATION ${DESTINATION}
             FILES_MATCHING PATTERN "*.h" PATTERN "*.inc"
-            PATTERN "*testing.h" EXCLUDE PATTERN "*-inl.h" EXCLUDE PATTERN "testdata" EXCLUDE)
+            PATTERN "*testing.h" EXCLUDE PATTERN "*-inl.h" EXCLUDE PATTERN "win32.h" EXCLUDE PATTERN "testdata" EXCLUDE)
   endforeach()
 endfunction()
 upswing_install_layers(src include/upswing ${UPSWING_LAYERS})

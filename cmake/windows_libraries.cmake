@@ -1,5 +1,5 @@
-# The libraries of cmake/libraries.cmake for Windows, which Debian has no packages of, except zlib. Those of
-# headers only are this system's. The others are compiled from the sources of the same versions.
+# The libraries of cmake/libraries.cmake for Windows, which Debian has no packages of, except zlib. Libraries of headers
+# only are this system's. The others are compiled from the sources of the same versions.
 set(UPSWING_DEPS ${PROJECT_SOURCE_DIR}/build/deps)
 
 # upswing_fetch(NAME VARIABLE): fetches the source NAME and sets VARIABLE to its folder.

@@ -467,7 +467,7 @@ class LauncherTest(ProgramTest):
             with self.subTest(words=words):
                 self.assert_one_line(self.launch("--no-setup", "test", *words), 2,
                                      "expected flags of ctest, such as -R dqn, got foo")
-        for word in ("--cluster", "--benchmarks"):
+        for word in ("--cluster", "--windows", "--benchmarks"):
             self.assert_one_line(self.launch("--no-setup", "test", "--preset=debug", word), 2,
                                  f"expected {word}")
 
@@ -476,7 +476,7 @@ class LauncherTest(ProgramTest):
                       ["--cluster", "--foo"]):
             with self.subTest(words=words):
                 self.assert_one_line(self.launch("--no-setup", "test", *words), 2, "test: unknown flag -",
-                                     "expected --preset, --cluster, --benchmarks or flags of ctest")
+                                     "expected --preset, --cluster, --windows, --benchmarks or flags of ctest")
         # Flags of ctest pass this check and reach the next one: nothing is built here.
         for words in ("-R dqn", "-R --foo", "-LE slow -j4 -V", "-j 4 --parallel 2 -I 1,3", "--tests-regex=dqn",
                       "-N", "--show-only=json-v1", "--no-tests=ignore", "--timeout 5 -E -x", "-FA x -U",

@@ -22,8 +22,8 @@ class DuplexChild {
   DuplexChild(const DuplexChild&) = delete;
   DuplexChild& operator=(const DuplexChild&) = delete;
 
-  /// Reads what has arrived, at most the size of `buffer`. Returns 0 if nothing arrives within
-  /// `patience`, and nothing at the end of the output.
+  /// Reads the bytes that have arrived, at most the size of `buffer`. Returns 0 if nothing arrives
+  /// within `patience`, and nothing at the end of the output.
   std::optional<size_t> Read(std::span<char> buffer, std::chrono::milliseconds patience);
   /// Writes a short text, which fits into the system's buffer; a failure shows at the next Read.
   void Write(std::string_view text);

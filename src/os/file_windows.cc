@@ -30,7 +30,7 @@ std::optional<BY_HANDLE_FILE_INFORMATION> InformationOf(HANDLE handle) {
 }  // namespace
 
 Descriptor Open(const fs::path& path, Access access) {
-  // FILE_FLAG_BACKUP_SEMANTICS opens folders, too, so that the caller can say what is there.
+  // FILE_FLAG_BACKUP_SEMANTICS opens folders, too, so that the caller can name them.
   DWORD wanted = GENERIC_READ, creation = OPEN_EXISTING, flags = FILE_FLAG_BACKUP_SEMANTICS;
   if (access == Access::kOverwrite) wanted = GENERIC_WRITE;
   if (access == Access::kAppend || access == Access::kAppendNew) {

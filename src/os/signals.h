@@ -1,17 +1,12 @@
 #pragma once
 
-#include <csignal>
 #include <string_view>
 
 /// Signals for long work. Handlers only record a signal; the work polls for it.
 namespace upswing {
 
 /// Number of the signal by which ChildProcess::Signal asks for a checkpoint.
-#ifdef SIGUSR1
-inline constexpr int kCheckpointSignal = SIGUSR1;
-#else
-inline constexpr int kCheckpointSignal = 10;  // SIGUSR1 of Linux, for processes of ours only
-#endif
+extern const int kCheckpointSignal;
 
 /// Starts recording SIGUSR1 and ignoring SIGUSR2, so that neither ends the program. On Windows,
 /// starts listening to ChildProcess::Signal of the process that started this one. Call this in

@@ -45,6 +45,8 @@ void BrakeOrEnd(int signal) {
 
 }  // namespace
 
+const int kCheckpointSignal = SIGUSR1;
+
 void ListenToSignals() {
   Handle(
       SIGUSR1, [](int) { g_checkpoint_wanted = true; }, SA_RESTART);

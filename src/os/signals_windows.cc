@@ -20,7 +20,8 @@ std::string_view g_notice;         // set before the handler is installed
 void (*g_switch_off)() = nullptr;  // set before the handler is installed
 
 // Signals between processes of ours; each is an event with the receiver's number in its name.
-constexpr std::array kSignals{SIGINT, SIGTERM, kCheckpointSignal};
+constexpr int kCheckpoint = 10;  // SIGUSR1 of Linux
+constexpr std::array kSignals{SIGINT, SIGTERM, kCheckpoint};
 
 std::wstring EventName(DWORD process, int signal) {
   return win32::Wide(Concat("Local\\upswing-", process, "-signal-", signal));
@@ -33,7 +34,7 @@ void Listen(std::array<HANDLE, kSignals.size()> events) {
         WaitForMultipleObjects(static_cast<DWORD>(events.size()), events.data(), FALSE, INFINITE) -
         WAIT_OBJECT_0;
     if (got >= kSignals.size()) return;
-    if (kSignals.at(got) == kCheckpointSignal) {
+    if (kSignals.at(got) == kCheckpoint) {
       g_checkpoint_wanted = true;
     } else {
       g_stop_signal = kSignals.at(got);
@@ -63,6 +64,8 @@ bool win32::SendSignal(DWORD process, int signal) {
   const Handle event(OpenEventW(EVENT_MODIFY_STATE, FALSE, EventName(process, signal).c_str()));
   return event.valid() && SetEvent(event.get()) != 0;
 }
+
+const int kCheckpointSignal = kCheckpoint;
 
 void ListenToSignals() {
   std::array<HANDLE, kSignals.size()> events{};

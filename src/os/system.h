@@ -10,7 +10,7 @@
 #include "os/making.h"
 
 /// System calls on files, which differ between systems: file_posix.cc and lock_posix.cc, or
-/// file_windows.cc and lock_windows.cc. Those that fail set errno. Only src/os uses them.
+/// file_windows.cc and lock_windows.cc. A failed call sets errno. Only src/os uses them.
 namespace upswing::system {
 
 enum class Access {
@@ -51,14 +51,14 @@ void Remove(const std::filesystem::path& path);
 bool IsAt(const std::filesystem::path& path, int fd);
 
 /// Lock of an open file or folder, which follows it when it is renamed. It ends with the last copy
-/// of the pointer and with `fd`. Returns null with EWOULDBLOCK if somebody holds it.
+/// of the pointer and with `fd`. Returns null with EWOULDBLOCK if another holder has it.
 std::shared_ptr<const void> LockOpen(int fd);
 /// Whether an error number says that another process holds the lock.
 bool IsOfHolder(int error_number);
 
 /// Lock of a file's content, also between hosts. It ends when `fd` is closed.
 bool LockContent(int fd);
-/// Whether somebody else holds the lock of LockContent.
+/// Whether a process holds the lock of LockContent.
 bool IsContentLocked(const std::filesystem::path& path);
 
 }  // namespace upswing::system

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdio>
-#include <memory>
 
 /// Standard input, output and error, and the terminal.
 namespace upswing {

@@ -7,7 +7,8 @@
 #ifndef NOMINMAX
 #define NOMINMAX
 #endif
-// clang-format off: the second header needs the first
+// The second header needs the first.
+// clang-format off
 #include <windows.h>
 #include <shellapi.h>
 // clang-format on

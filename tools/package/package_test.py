@@ -196,7 +196,7 @@ class WindowsTest(unittest.TestCase):
         objdump.chmod(0o755)
         return list(windows.faults([Path("upswing.exe")], objdump))
 
-    def test_programs_need_only_what_windows_has(self):
+    def test_programs_need_only_libraries_of_windows(self):
         safe = "DYNAMIC_BASE NX_COMPAT HIGH_ENTROPY_VA\n\tDLL Name: KERNEL32.dll\n\tDLL Name: mujoco.dll"
         self.assertEqual(self.faults(safe), [])
         self.assertEqual(self.faults(f"{safe}\n\tDLL Name: zlib1.dll"), ["upswing.exe needs zlib1.dll"])

@@ -13,7 +13,7 @@ SAFE = ("DYNAMIC_BASE", "NX_COMPAT", "HIGH_ENTROPY_VA")  # random addresses, no 
 
 
 def faults(programs, objdump):
-    """What makes programs unfit for the archive, in words."""
+    """Faults of programs that may not go into the archive, in words."""
     for program in programs:
         listed = subprocess.run([objdump, "-p", program], check=True, encoding="utf-8",
                                 stdout=subprocess.PIPE).stdout

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Tests of the programs for Windows, in Wine: trainings have the bits of Linux, locks and processes work, and
-what is missing says so. `./upswing test --windows` builds them and runs this program, which exits with 77
+missing parts say so. `./upswing test --windows` builds them and runs this program, which exits with 77
 if there is no Wine or no build/windows.
 
 UPSWING names the program of this system, to compare with (see src/cli/testing.py).
@@ -143,7 +143,7 @@ class WindowsTest(unittest.TestCase):
         self.assertIn("4 already done", again)
         self.assertEqual(list((self.folder / "study").rglob("*.claim")), [])
 
-    def test_what_is_missing_says_so(self):
+    def test_missing_parts_say_so(self):
         self.refuse(["run", "fast", "--link", "udp:127.0.0.1:4000"], "UDP and serial links exist on Linux only")
 
 
