@@ -329,8 +329,8 @@ void AddScore(CommandLine& line) {
             "score on machines drawn from this twin, by the hardware rules");
   line.Text(
       "--machine", a.machine, "FILE",
-      "version 2026: score on this machine, or on machines drawn from it, with --twin as what "
-      "is known of it (default: --twin)");
+      "version 2026: machine to score on, or the twin from which machines are drawn; --twin is the "
+      "user's knowledge of it (default: --twin)");
   AddSeed(line, a.seed, "resets, noise, pushes and machines");
   AddThreads(line, a.threads);
   line.Flag("--no-pushes", a.no_pushes, "no pushes on the twin's machines, version 2");
