@@ -29,11 +29,12 @@ const Handle& Of(const std::shared_ptr<const void>& handle) {
   return *static_cast<const Handle*>(handle.get());
 }
 
-/// A copy of a handle that a started program inherits.
-Handle Inherited(HANDLE handle) {
+/// A copy of a file's handle that a started program inherits. Each write through it goes to the end
+/// of the file, also if several programs have a copy.
+Handle InheritedForAppending(HANDLE handle) {
   HANDLE copy = nullptr;
-  DuplicateHandle(GetCurrentProcess(), handle, GetCurrentProcess(), &copy, 0, TRUE,
-                  DUPLICATE_SAME_ACCESS);
+  DuplicateHandle(GetCurrentProcess(), handle, GetCurrentProcess(), &copy,
+                  FILE_APPEND_DATA | SYNCHRONIZE, TRUE, 0);
   return Handle(copy);
 }
 
@@ -44,7 +45,7 @@ ChildProcess::ChildProcess(const std::vector<std::string>& arguments,
   std::vector<std::string> words{"upswing"};
   words.insert(words.end(), arguments.begin(), arguments.end());
   const AppendFile log_file(log);
-  const Handle output = Inherited(win32::HandleOf(log_file.descriptor()));
+  const Handle output = InheritedForAppending(win32::HandleOf(log_file.descriptor()));
   SECURITY_ATTRIBUTES inherited{sizeof(SECURITY_ATTRIBUTES), nullptr, TRUE};
   const Handle nothing(CreateFileW(L"NUL", GENERIC_READ, FILE_SHARE_READ | FILE_SHARE_WRITE,
                                    &inherited, OPEN_EXISTING, 0, nullptr));
@@ -68,8 +69,9 @@ ChildProcess::~ChildProcess() {
 }
 
 void ChildProcess::Signal(int signal) const {
-  // os/signals_windows.cc listens.
-  if (pid_ >= 0) win32::SendSignal(static_cast<DWORD>(pid_), signal);
+  if (pid_ < 0) return;
+  // os/signals_windows.cc listens. A program that does not listen yet ends, as on other systems.
+  if (!win32::SendSignal(static_cast<DWORD>(pid_), signal)) TerminateProcess(Of(handle_).get(), 1);
 }
 
 std::optional<int> ChildProcess::Poll() {

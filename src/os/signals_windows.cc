@@ -42,11 +42,11 @@ void Listen(std::array<HANDLE, kSignals.size()> events) {
   }
 }
 
-/// Records Ctrl-C, and a console that closes, in a thread of the system. The second one switches
-/// the motors off and ends the program.
+/// Records Ctrl-C, and a console that closes, in a thread of the system. The second one of a kind
+/// switches the motors off and ends the program.
 BOOL WINAPI Record(DWORD event) {
   const int signal = event == CTRL_C_EVENT ? SIGINT : SIGTERM;
-  if (g_stop_signal.exchange(signal) != 0) {
+  if (g_stop_signal.exchange(signal) == signal) {
     if (g_switch_off != nullptr) g_switch_off();
     return FALSE;  // ends the program
   }

@@ -119,6 +119,19 @@ std::wstring CommandLineOf(const std::vector<std::string>& words) {
   return Wide(line);
 }
 
+/// The program of this name in the folders of PATH; empty if there is none. CreateProcessW would
+/// also take one from the current folder.
+std::wstring FindInPath(const std::string& name) {
+  const wchar_t* folders = _wgetenv(L"PATH");
+  std::wstring found(32768, L'\0');  // the longest path
+  const DWORD size = folders == nullptr
+                         ? 0
+                         : SearchPathW(folders, Wide(name).c_str(), L".exe",
+                                       static_cast<DWORD>(found.size()), found.data(), nullptr);
+  found.resize(size < found.size() ? size : 0);
+  return found;
+}
+
 Process Start(const std::vector<std::string>& words, const std::wstring& path, HANDLE input,
               HANDLE output, HANDLE error, DWORD flags) {
   STARTUPINFOW startup{};
@@ -129,8 +142,13 @@ Process Start(const std::vector<std::string>& words, const std::wstring& path, H
   startup.hStdError = error;
   PROCESS_INFORMATION information{};
   std::wstring line = CommandLineOf(words);
-  if (CreateProcessW(path.empty() ? nullptr : path.c_str(), line.data(), nullptr, nullptr, TRUE,
-                     flags, nullptr, nullptr, &startup, &information) == 0) {
+  const std::wstring program = path.empty() ? FindInPath(words.front()) : path;
+  if (program.empty()) {
+    SetLastError(ERROR_FILE_NOT_FOUND);
+    return Process{};
+  }
+  if (CreateProcessW(program.c_str(), line.data(), nullptr, nullptr, TRUE, flags, nullptr, nullptr,
+                     &startup, &information) == 0) {
     return Process{};
   }
   const Handle thread(information.hThread);
