@@ -222,18 +222,17 @@ void AddPredictive(const LoadedPolicy& loaded, const ControllerConfig& config, C
   parts.state_bytes = kFloat * (3 + 4 * (T + 1) + (guesses > 1 ? 7 : 6) * T);
   parts.stack_bytes = kFloat * 230;
   parts.code = "4 to 8 KB";
+  const int rounds = guesses > 1 ? guesses + 1 : 1;  // the best guess goes on once more
   parts.note = Concat(
       "The first call after policy_init makes a plan, and takes as long as up to ",
-      MpcPolicy::kFirstIterations * (guesses > 1 ? guesses + 1 : 1) /
-          static_cast<int>(config.mpc.iterations),
+      std::max(1, MpcPolicy::kFirstIterations * rounds / static_cast<int>(config.mpc.iterations)),
       " calls: make it before the motion, and set its torque a period before the next call. The "
       "self-test takes as long as about 8 calls, and has a state on its stack.");
   const auto derivatives = static_cast<size_t>(4 * config.plant.physics_steps()) * T;
-  parts.work = Concat(
-      config.mpc.iterations, " iterations, each of ", derivatives,
-      " derivatives with their own derivatives and up to ", 17 * derivatives,
-      " without; the first call after policy_init takes up to ", MpcPolicy::kFirstIterations,
-      guesses > 1 ? Concat(" iterations for each of ", guesses, " guesses.") : " iterations.");
+  parts.work = Concat(config.mpc.iterations, " iterations, each of ", derivatives,
+                      " derivatives with their own derivatives and up to ", 17 * derivatives,
+                      " without; the first call takes up to ", MpcPolicy::kFirstIterations * rounds,
+                      " iterations.");
 }
 
 }  // namespace upswing::deploy

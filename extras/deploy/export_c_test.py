@@ -350,7 +350,8 @@ class HeadersTest(HeaderTest):
     def test_only_an_export_is_replaced(self):
         policy = AGENTS / "fast.safetensors"
         for flag in ("--c", "--onnx"):
-            for text in ("int main(void) { return 0; }\n", ""):
+            for text in ("int main(void) { return 0; }\n", "", "import upswing  # Written by Upswing\n",
+                         (AGENTS / "d3qn.safetensors").read_bytes()):
                 with self.subTest(flag=flag, text=text):
                     self.write("mine", text)
                     self.refuse(["export", policy, flag, "mine"],

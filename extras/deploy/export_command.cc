@@ -40,38 +40,26 @@ LoadedPolicy SinglePolicy(const ExportArguments& a, const char* flag) {
   return GetPolicy(policy);
 }
 
-/// The first words of a file, without line breaks and the stars of a C comment.
-std::string BeginOf(const std::string& path) {
-  constexpr size_t kMost = 4096;  // bytes
-  std::ifstream file(path, std::ios::binary);
-  std::string text(kMost, '\0');
-  file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<size_t>(std::max<std::streamsize>(0, file.gcount())));
-  std::string words;
-  for (const char c : text) {
-    const bool blank = c == '\n' || c == '*' || c == ' ';
-    if (!blank || !words.ends_with(' ')) words += blank ? ' ' : c;
-  }
-  return words;
-}
-
-/// Checks an output before the work. An older export, which begins with `mark`, may be replaced;
+/// Writes an export. An older export, whose first bytes are those of `text`, may be replaced;
 /// another file only with --overwrite. Returns a remark on the replaced file, or "". Throws
 /// BadInput.
-std::string CheckExport(const ExportArguments& a, const std::string& flag, const std::string& path,
-                        std::string_view mark) {
+std::string WriteExport(const ExportArguments& a, const std::string& flag, const std::string& path,
+                        const std::string& text) {
+  constexpr size_t kSame = 11;  // bytes: of an ONNX model up to the producer's name
   std::error_code error;
   const bool exists = !IsStandardStream(path) && fs::is_regular_file(path, error);
-  const bool is_export = exists && BeginOf(path).find(mark) != std::string::npos;
+  std::string begin(kSame, '\0');
+  std::ifstream(path, std::ios::binary).read(begin.data(), kSame);
+  const bool is_export = exists && text.starts_with(begin);
   CheckNewOutput(flag, path, a.overwrite || is_export);
+  WriteOutput(path, text);
   return exists ? ", in place of the file that was there" : "";
 }
 
 int ExportOnnx(const ExportArguments& a) {
   const LoadedPolicy loaded = SinglePolicy(a, "--onnx");
-  const std::string replaced = CheckExport(a, "--onnx", a.onnx, "upswing");
   const std::string model = OnnxModelOf(loaded);
-  WriteOutput(a.onnx, model);
+  const std::string replaced = WriteExport(a, "--onnx", a.onnx, model);
   if (!IsStandardStream(a.onnx)) {
     fmt::print("{} ({} KB), {}{}\n", Printable(a.onnx), model.size() / 1024,
                loaded.policy->description(), replaced);
@@ -81,9 +69,8 @@ int ExportOnnx(const ExportArguments& a) {
 
 int ExportC(const ExportArguments& a) {
   const LoadedPolicy loaded = SinglePolicy(a, "--c");
-  const std::string replaced = CheckExport(a, "--c", a.c, "Written by Upswing");
   const CHeader header = CHeaderOf(loaded, a.prefix.empty() ? CPrefixOf(a.c, loaded) : a.prefix);
-  WriteOutput(a.c, header.text);
+  const std::string replaced = WriteExport(a, "--c", a.c, header.text);
   if (IsStandardStream(a.c)) return 0;
   fmt::print("{} ({} KB), names begin with {}_{}\n", Printable(a.c), header.text.size() / 1024,
              header.prefix, replaced);
