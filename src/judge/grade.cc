@@ -203,19 +203,25 @@ bool SameFigures(const Grade& a, const Grade& b) {
   return figures(a) == figures(b);
 }
 
-/// Adds the first entry with the same figures to the notes of the others: with the same file, or
-/// with another one.
+/// Adds the first entry with the same file to the notes of the others, or else the first one with
+/// the same figures.
 void NameCopies(const fs::path& folder, std::vector<Grade>& grades) {
   const auto content = [&](const Grade& grade) {
     return ReadOwnBytes(folder / grade.file, kMostBytes);
   };
   for (auto grade = grades.begin(); grade != grades.end() && grade->refused.empty(); ++grade) {
-    const auto first = std::find_if(grades.begin(), grade,
-                                    [&](const Grade& other) { return SameFigures(other, *grade); });
-    if (first == grade) continue;
-    const bool same = content(*first) == content(*grade);
-    const std::string copy =
-        Concat(same ? "the same file as " : "the same figures as ", first->name);
+    const auto same_figures = [&](const Grade& other) { return SameFigures(other, *grade); };
+    const auto same_file = [&](const Grade& other) {
+      return same_figures(other) && content(other) == content(*grade);
+    };
+    std::string copy;
+    if (const auto first = std::find_if(grades.begin(), grade, same_file); first != grade) {
+      copy = "the same file as " + first->name;
+    } else if (const auto alike = std::find_if(grades.begin(), grade, same_figures);
+               alike != grade) {
+      copy = "the same figures as " + alike->name;
+    }
+    if (copy.empty()) continue;
     grade->note = grade->note.empty() ? copy : Concat(copy, "; ", grade->note);
   }
 }

@@ -80,8 +80,9 @@ std::vector<int64_t> KeepFinishedSeeds(const StudyPlan& before, StudyPlan& plan)
   std::ranges::copy_if(before.seeds, std::back_inserter(others.seeds), [&](int64_t seed) {
     return std::ranges::find(plan.seeds, seed) == plan.seeds.end();
   });
-  for (const SeedRun& run : RunsOf(others)) {
-    if (!IsFile(run.done())) std::erase(others.seeds, run.seed);
+  for (SeedRun& run : RunsOf(others)) {
+    run.Refresh();
+    if (!run.finished || !run.AtEnd()) std::erase(others.seeds, run.seed);
   }
   if (others.seeds.empty()) return {};
   std::ranges::copy(others.seeds, std::back_inserter(plan.seeds));

@@ -25,8 +25,8 @@ struct ManyRuns {
 /// other settings.
 FolderLock Prepare(const ManyRuns& many);
 
-/// Adds the seeds of the plan `before` in the same folder for which all variants are finished.
-/// Returns the added ones.
+/// Adds the seeds of the plan `before` in the same folder for which all variants are finished, also
+/// by the settings of `plan`: a run that would be continued is not added. Returns the added ones.
 std::vector<int64_t> KeepFinishedSeeds(const StudyPlan& before, StudyPlan& plan);
 
 /// Best number of simultaneous runs if each run has `threads` threads.
