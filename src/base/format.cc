@@ -1,8 +1,8 @@
 #include "base/format.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
-#include <cstdio>
 
 #include "base/text.h"
 
@@ -43,9 +43,10 @@ std::string FormatPlain(double number, int digits) {
   const double before = size > 0 ? std::floor(std::log10(size)) : 0;
   const int decimals =
       static_cast<int>(std::clamp(digits - 1 - before, 0.0, double{kMostDecimals}));
-  char text[400];  // the longest finite number has 309 digits
-  std::snprintf(text, sizeof text, "%.*f", decimals, number);
-  std::string plain = text;
+  std::string plain(400, '\0');  // the longest finite number has 309 digits
+  const auto end = std::to_chars(plain.data(), plain.data() + plain.size(), number,
+                                 std::chars_format::fixed, decimals);
+  plain.resize(static_cast<size_t>(end.ptr - plain.data()));
   if (decimals > 0) {
     plain.erase(plain.find_last_not_of('0') + 1);
     if (plain.ends_with('.')) plain.pop_back();

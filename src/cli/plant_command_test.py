@@ -87,7 +87,7 @@ class PlantCommandTest(ProgramTest):
     def no_plant(self, text, *words, arguments=(), code=2, name="model.xml"):
         """Asserts that a model is refused."""
         file = name if text is None else self.write(name, text)
-        self.refuse(["plant", file, "--out", "plant.toml", *arguments], *words, code=code,
+        self.refuse(["plant", file, "--out", "plant.toml", "--overwrite", *arguments], *words, code=code,
                     env=self.ENVIRONMENT)
 
     def assert_close(self, plant, **expected):

@@ -353,9 +353,6 @@ class PolicyRolloutTest(ProgramTest):
                       ("info",)):
             with self.subTest(words[0]):
                 self.succeed(words[0], "identifying", *words[1:])
-        for flag in ("--c", "--onnx"):
-            with self.subTest(flag):
-                self.refuse(["export", "identifying", flag, "out"], "expected a policy without identification")
         # A network without the inputs that its metadata claim.
         metadata, tensors = read_tensors(self.folder / "identifying/policy.safetensors")
         metadata["observation"] = json.dumps(observation | {"identified": {
@@ -397,8 +394,6 @@ class PolicyRolloutTest(ProgramTest):
         self.refuse(["eval", "poses", "--goal", "up"], "--goal", 'expected one of up-up, up-down, down-up, down-down, got "up"')
         for words in (["eval", "run"], ["eval", "mpc"], ["simulate"]):
             self.refuse([*words, "--goal", "up-down"], "--goal up-down: expected a policy for any pose")
-        for flag in ("--c", "--onnx"):
-            self.refuse(["export", "poses", flag, "out"], "expected a policy without a choice of its goal")
         # A network without the inputs that its metadata claim.
         metadata["observation"] = json.dumps(json.loads(metadata["observation"]) | {"goal": ["up"]})
         write_tensors(self.folder / "one.safetensors", metadata, tensors)
