@@ -350,10 +350,10 @@ class HeadersTest(HeaderTest):
     def test_only_an_export_is_replaced(self):
         policy = AGENTS / "fast.safetensors"
         for flag in ("--c", "--onnx"):
-            for text in ("int main(void) { return 0; }\n", "", "import upswing  # Written by Upswing\n",
-                         (AGENTS / "d3qn.safetensors").read_bytes()):
-                with self.subTest(flag=flag, text=text):
-                    self.write("mine", text)
+            for other in (b"int main(void) { return 0; }\n", b"", b"import upswing  # Written by Upswing\n",
+                          (AGENTS / "d3qn.safetensors").read_bytes()):
+                with self.subTest(flag=flag, other=other[:40]):
+                    (self.folder / "mine").write_bytes(other)
                     self.refuse(["export", policy, flag, "mine"],
                                 f"{flag} mine: expected a new file, got one that exists; --overwrite replaces it")
                     out = self.succeed("export", policy, flag, "mine", "--overwrite")
