@@ -151,18 +151,19 @@ double LongestWay(Pieces pieces) {
   return Quantile(ways, 0.99);
 }
 
-/// Whether the motion between the rows is not known: a joint moves by a radian from one to the
-/// next.
-bool HasFarRows(double way) { return way > 1; }
+/// The LongestWay beyond which the motion between the rows is not known, rad.
+constexpr double kFar = 1;
 
 /// A verdict on the hypotheses about a log, with the equations that it needs.
 struct Verdict {
+  Pieces pieces;
   std::unique_ptr<WeakForm> form;
   std::unique_ptr<Hypotheses> tried;
-  bool far_rows = false;  // see HasFarRows
 
   bool confirms() const {
-    return is_plausible() && (!tells_of_turn() || (!far_rows && divides_all()));
+    if (!is_plausible()) return false;
+    if (!suspects_slip_or_drift()) return true;
+    return improves_worse_joint() && LongestWay(pieces) <= kFar;
   }
 
   bool is_plausible() const {
@@ -172,22 +173,21 @@ struct Verdict {
     return best.changes() > 0 && best.changes() <= kMostChanges && best.fit.left() <= kGood;
   }
 
-  /// Whether it suspects an encoder that slips or drifts.
-  bool tells_of_turn() const {
+  bool suspects_slip_or_drift() const {
     const Change::Kind kind = tried->best().change.kind;
     return kind == Change::kSlip || kind == Change::kDrift;
   }
 
-  /// Whether it explains the worse joint better, too. The angles of both joints are in both
+  /// Whether it explains the worse joint much better, too. The angles of both joints are in both
   /// equations, so that a wrong angle shows in both.
-  bool divides_all() const {
+  bool improves_worse_joint() const {
     constexpr double kTimes = 3;
     return kTimes * tried->best().fit.left() < tried->log().fit.left();
   }
 };
 
 Verdict TryHypotheses(Pieces pieces, const WeakForm& form, Driven driven) {
-  Verdict verdict{std::make_unique<WeakForm>(form), nullptr, HasFarRows(LongestWay(pieces))};
+  Verdict verdict{pieces, std::make_unique<WeakForm>(form), nullptr};
   verdict.tried = std::make_unique<Hypotheses>(*verdict.form, pieces, driven);
   verdict.tried->TryAll();
   return verdict;
@@ -244,7 +244,7 @@ void ReportUnexplained(Pieces pieces, double left, Findings& findings) {
   const double way = LongestWay(pieces);
   Severity severity = Severity::kNote;
   std::string meaning;
-  if (left > most && HasFarRows(way)) {
+  if (left > most && way > kFar) {
     severity = Severity::kWarning;
     meaning = fmt::format(
         ": the rows are too far apart, a joint moves by {:.2g} rad from one to the next", way);
