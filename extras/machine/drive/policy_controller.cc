@@ -110,14 +110,13 @@ std::string DifferencesFromTwin(const LoadedPolicy& policy, const Twin& twin) {
   const auto compare = [&](const char* what, double of_policy, double of_twin, const char* unit) {
     if (std::abs(of_policy - of_twin) <= kSimilar * std::abs(of_twin)) return;
     if (!text.empty()) text += ", ";
-    text += fmt::format("{} {:.3g}{}{} (twin {:.3g})", what, of_policy, *unit == '\0' ? "" : " ",
-                        unit, of_twin);
+    text += fmt::format("{} {:.3g}{} (twin {:.3g})", what, of_policy, unit, of_twin);
   };
   // Upright at rest, with straight links: inertia about joint 1 and its moment of gravity.
-  compare("inertia", own.Mass(1).M11, body.Mass(1).M11, "kg·m²");
-  compare("moment of gravity", own.G1 + own.G2, body.G1 + body.G2, "N·m");
-  compare("inertia of link 2", own.J2, body.J2, "kg·m²");
-  compare("torque limit", policy.plant.torque_limit, twin.plant.torque_limit, "N·m");
+  compare("inertia", own.Mass(1).M11, body.Mass(1).M11, " kg·m²");
+  compare("moment of gravity", own.G1 + own.G2, body.G1 + body.G2, " N·m");
+  compare("inertia of link 2", own.J2, body.J2, " kg·m²");
+  compare("torque limit", policy.plant.torque_limit, twin.plant.torque_limit, " N·m");
   // Without units: link 2's part of the moment of gravity, and how often the policy decides.
   compare("share of link 2 in it", own.G2 / (own.G1 + own.G2), body.G2 / (body.G1 + body.G2), "");
   const double period = policy.control_period();
