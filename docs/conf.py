@@ -48,8 +48,9 @@ package = importlib.util.find_spec("sphinx-mathjax-offline").submodule_search_lo
 mathjax_path = "tex-svg-full.js"
 html_static_path = ["_static", str(Path(package) / "static/mathjax" / mathjax_path)]
 html_css_files = ["style.css"]
+html_js_files = [("site.js", {"defer": "defer"})]
 html_favicon = "_static/icon.svg"
-html_search_scorer = str(root / "docs/_static/scorer.js")
+html_search_scorer = str(Path(__file__).parent / "search.js")  # with words, by tools/docs.py
 html_show_sourcelink = html_copy_source = True  # "view": the page's Markdown, also without a network
 html_show_sphinx = False
 FACE = {"font-stack": "'Hanken Grotesk', system-ui, sans-serif"}
@@ -57,11 +58,13 @@ html_theme_options = {  # the page's face and colours (web/src/style)
     "light_logo": "icon.svg", "dark_logo": "icon.svg",
     "light_css_variables": FACE | {
         "color-background-primary": "#fffdf8", "color-background-secondary": "#f4efe4",
-        "color-foreground-primary": "#1a2133", "color-brand-primary": "#08766b",
+        "color-foreground-primary": "#1a2133", "color-foreground-secondary": "#555c6d",
+        "color-foreground-muted": "#555c6d", "color-brand-primary": "#08766b",
         "color-brand-content": "#2456c4", "color-brand-visited": "#2456c4"},
     "dark_css_variables": FACE | {
         "color-background-primary": "#0b1020", "color-background-secondary": "#151c30",
-        "color-foreground-primary": "#ecf0f9", "color-brand-primary": "#35d0bd",
+        "color-foreground-primary": "#ecf0f9", "color-foreground-secondary": "#a8b2ca",
+        "color-foreground-muted": "#a8b2ca", "color-brand-primary": "#35d0bd",
         "color-brand-content": "#82abff", "color-brand-visited": "#82abff"}}
 # "edit", if the address of the repository is known (as in the page, web/build/addresses.ts).
 source = os.environ.get("UPSWING_SOURCE", "").rstrip("/")
@@ -77,6 +80,13 @@ html_sidebars = {"**": ["sidebar/brand.html", "page-link.html", "sidebar/search.
 def setup(app):
     app.connect("doctree-read", simplify, priority=0)  # before Sphinx collects the contents
     app.connect("html-page-context", hide_source)
+    app.connect("html-page-context", give_levels, priority=900)  # after the theme
+
+
+def give_levels(app, page, template, context, doctree):
+    """Gives the headings of the list of pages a level, which the theme leaves out."""
+    tree = context.get("furo_navigation_tree", "")
+    context["furo_navigation_tree"] = tree.replace('role="heading"', 'role="heading" aria-level="2"')
 
 
 def hide_source(app, page, template, context, doctree):

@@ -12,11 +12,13 @@ reference. Unchanged pages are not rebuilt.
 import argparse
 import functools
 import http.server
+import json
 import os
 import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -77,12 +79,21 @@ def stage_pages(stage):
         name = str(path.relative_to(docs))
         if path.suffix == ".md":
             stage_page(stage, path, name)
-        elif path.is_file() and "__pycache__" not in name:
+        elif path.is_file() and "__pycache__" not in name and name != "search.js":
             stage.write(name, path.read_bytes())
+    stage.write("search.js", search_code())
     for root_name, name in ROOT_PAGES.items():
         stage_page(stage, ROOT / root_name, name)
     for name in ("icon.svg", "fonts/hanken-grotesk.woff2", "fonts/bricolage-grotesque.woff2"):
         stage.write(f"_static/{name}", (ROOT / "web/public" / name).read_bytes())
+
+
+def search_code():
+    """The code of the search, with the words that lead to pages and sections."""
+    words = tomllib.loads((ROOT / "docs/search.toml").read_text(encoding="utf-8"))
+    by_page = {place.replace(".md", ""): texts for place, texts in words.items()}
+    code = (ROOT / "docs/search.js").read_text(encoding="utf-8")
+    return f"const SEARCH_WORDS = {json.dumps(by_page)};\n{code}"
 
 
 def stage_page(stage, path, name):

@@ -9,6 +9,8 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
+import tomllib
 import unittest
 from pathlib import Path
 
@@ -188,6 +190,12 @@ class Documents(ProgramTest):
                               check=False, stdout=subprocess.PIPE, encoding="utf-8")
         self.assertEqual((done.returncode, done.stdout), (0, ""))
 
+    def test_no_line_begins_with_the_mark_of_a_value(self):
+        # In Markdown, a comment at the beginning of a line ends the paragraph.
+        for path in PAGES:
+            found = re.findall(r"^ *<!-- value.*", path.read_text(encoding="utf-8"), re.MULTILINE)
+            self.assertEqual(found, [], path.name)
+
     def test_a_wrong_table_or_value_is_found(self):
         path = next(path for path in results.DATA.glob("*.json") if path.stem != "machines")
         table = results.load(path.stem)
@@ -271,6 +279,18 @@ class Documents(ProgramTest):
                         self.assertRegex(done.stdout, pattern_of(shown))
             shutil.rmtree(here)
 
+    def test_the_arduino_sketch_compiles(self):
+        sketch, = re.findall(r"^```cpp\n(.*?)^```", text_of("docs/howto/export.md"),
+                             re.MULTILINE | re.DOTALL)
+        self.succeed("export", "lqr", "--c", self.folder / "policy.h")
+        stubs = ("unsigned long micros(void); void STOP_MOTOR(void); void SET_MOTOR(float);"
+                 "void READ_ANGLES(float *, float *); void READ_VELOCITIES(float *, float *);\n")
+        (self.folder / "sketch.cc").write_text(stubs + sketch, encoding="utf-8")
+        done = subprocess.run(["c++", "-Wall", "-Wextra", "-Werror", "-fsyntax-only",
+                               self.folder / "sketch.cc"], check=False, stdout=subprocess.PIPE,
+                              stderr=subprocess.STDOUT, encoding="utf-8")
+        self.assertEqual((done.returncode, done.stdout), (0, ""))
+
     def test_shown_output_is_compared(self):
         markdown = "```sh test\na\n```\n\n```text\nsolved at … steps\n…\nend 5\n```\n"
         (commands, shown), = tested_blocks(markdown)
@@ -321,26 +341,92 @@ class Documents(ProgramTest):
         self.assertIn('"debian 12 "* | "debian 13 "*', text_of("upswing"))
 
 
+# Questions of readers, and the page or section that the search has to show first.
+FIRST_HITS = {
+    "answers#can-i-use-my-own-robot": ["my own robot", "another robot", "use my robot arm"],
+    "answers#what-is-q-learning": ["what is Q-learning", "Q-value"],
+    "answers#how-long-does-training-take": ["how long does training take", "training time"],
+    "answers#gpu": ["GPU", "do I need a graphics card"],
+    "answers#macos": ["Mac"],
+    "answers#ipad-phone-chromebook": ["iPad", "Chromebook", "does it run on a phone"],
+    "answers#matlab-and-simulink": ["MATLAB", "Simulink"],
+    "answers#licence": ["license"],
+    "answers#cite": ["how do I cite this"],
+    "howto/model-files": ["MJCF", "URDF"],
+    "howto/python#policies-evaluations-maps": ["load a policy in Python", "use a trained policy"],
+    "howto/python#notebooks": ["Colab", "Jupyter", "notebook"],
+    "howto/python#more-examples": ["Stable-Baselines3"],
+    "howto/export#arduino": ["export to Arduino", "ESP32"],
+    "howto/export": ["microcontroller", "export a policy"],
+    "howto/gymnasium": ["train on my own environment"],
+    "howto/random-plants": ["domain randomization"],
+    "howto/random-plants#imperfect-sensors-and-motors": ["my encoder", "sensor noise"],
+    "howto/reward": ["change the reward"],
+    "howto/viewer#films-and-pictures": ["record a video"],
+    "start/install#windows": ["install on Windows"],
+    "start/install#container": ["Docker"],
+    "start/install#bit-arm": ["Raspberry Pi"],
+    "course/index": ["lesson plan"],
+    "course/answers": ["worksheet answers", "solutions"],
+    "course/sheet-2": ["reward hacking"],
+    "controllers#lqr": ["LQR"],
+    "agents/ppo": ["PPO"],
+    "reference/run-folder": ["TensorBoard"],
+    "reference/settings": ["hyperparameters", "learning rate"],
+    "tutorials/cluster-study#use-slurm": ["Slurm"],
+    "development/changelog": ["changelog", "release notes"],
+}
+
+
 class Site(ProgramTest):
     """Tests of the documentation as HTML, built by ./upswing docs in build/docs-venv."""
 
-    def setUp(self):
-        super().setUp()
-        self.python = ROOT / "build/docs-venv/bin/python"
-        if not self.python.exists() or not shutil.which("doxygen"):
+    PYTHON = ROOT / "build/docs-venv/bin/python"
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        if not cls.PYTHON.exists() or not shutil.which("doxygen"):
             if os.environ.get("UPSWING_REQUIRE_DOCS"):
-                self.fail("build/docs-venv or Doxygen is missing: run ./upswing docs")
-            self.skipTest("run ./upswing docs once, which installs Sphinx and Doxygen")
+                raise AssertionError("build/docs-venv or Doxygen is missing: run ./upswing docs")
+            raise unittest.SkipTest("run ./upswing docs once, which installs Sphinx and Doxygen")
+        folder = tempfile.TemporaryDirectory()  # pylint: disable=consider-using-with
+        cls.addClassCleanup(folder.cleanup)
+        cls.site = Path(folder.name) / "site"
+        # Two processes would take 40% more processor time, in which other tests run.
+        cls.built = subprocess.run([cls.PYTHON, "-B", ROOT / "tools/docs.py", "build", cls.site,
+                                    "--jobs", "1"], check=False, stdin=subprocess.DEVNULL,
+                                   stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                   encoding="utf-8")
+
+    def skip_without(self, what):
+        if os.environ.get("UPSWING_REQUIRE_WEB"):
+            self.fail(f"{what} is missing: run ./upswing test")
+        self.skipTest(f"{what} is missing, which ./upswing test installs")
+
+    def node(self, *command, **more):
+        """Runs a script with Node. Skips the test without Node."""
+        if not shutil.which("node"):
+            self.skip_without("Node")
+        return subprocess.run(["node", *command], check=False, stdin=subprocess.DEVNULL,
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8",
+                              **more)
+
+    def browse(self, site, *arguments):
+        """Looks at a site in Chromium. Skips the test without it or the page's packages."""
+        if not (ROOT / "web/node_modules/axe-core").exists():
+            self.skip_without("web/node_modules")
+        found = subprocess.run(["sh", "-c", 'root=$1; . "$1/tools/web.sh"; find_chromium || has_own_chromium',
+                                "sh", ROOT], check=False, stdout=subprocess.PIPE, encoding="utf-8")
+        if found.returncode != 0:
+            self.skip_without("Chromium")
+        chromium = {"UPSWING_CHROMIUM": found.stdout.strip()} if found.stdout else {}
+        return self.node(ROOT / "web/tests/docs.mjs", site, *arguments, env=os.environ | chromium)
 
     def test_builds_without_a_warning_and_needs_no_network(self):
-        site = self.folder / "site"
-        # Two processes would take 40% more processor time, in which other tests run.
-        done = subprocess.run([self.python, "-B", ROOT / "tools/docs.py", "build", site,
-                               "--jobs", "1"], check=False, stdin=subprocess.DEVNULL,
-                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8")
-        self.assertEqual((done.returncode, done.stdout), (0, ""))
+        site = self.site
+        self.assertEqual((self.built.returncode, self.built.stdout), (0, ""))
         self.assertTrue((site / "searchindex.js").exists())
-        self.assertIn("kind === 'object'", (site / "_static/language_data.js").read_text("utf-8"))
         answers = (site / "answers.html").read_text(encoding="utf-8")
         self.assertIn("_sources/answers.md.txt", answers)
         self.assertIn("copybutton.js", answers)
@@ -355,14 +441,13 @@ class Site(ProgramTest):
             self.assertIn(header, page.read_text(encoding="utf-8"))
         self.assertIn("Dqn", (site / "reference/cpp-api/rl.html").read_text(encoding="utf-8"))
 
-        # As one site with the page, each links to the other.
+    def test_page_and_documentation_link_to_each_other(self):
         whole = self.folder / "whole"
-        whole.mkdir()
-        site.rename(whole / "docs")
+        shutil.copytree(self.site, whole / "docs")
         (whole / "index.html").write_text(text_of("web/index.html"), encoding="utf-8")
-        subprocess.run([self.python, "-B", ROOT / "tools/docs.py", "join", whole], check=True)
+        subprocess.run([self.PYTHON, "-B", ROOT / "tools/docs.py", "join", whole], check=True)
         shown = re.findall(r'class="site"[^>]*>', (whole / "index.html").read_text(encoding="utf-8"))
-        self.assertEqual(len(shown), 2)
+        self.assertEqual(len(shown), text_of("web/index.html").count('class="site"'))
         for tag in shown:
             self.assertNotIn("hidden", tag)
         tour = (whole / "docs/start/page-tour.html").read_text(encoding="utf-8")
@@ -370,6 +455,46 @@ class Site(ProgramTest):
         self.assertIn('href="../../"', tour)
         for page in (whole / "docs").rglob("*.html"):
             self.assertNotIn('href="http://localhost', page.read_text(encoding="utf-8"), page.name)
+
+    def hits(self, *queries):
+        """The first hits of the search for each query."""
+        done = self.node(ROOT / "tools/docs_search.mjs", self.site, *queries)
+        self.assertEqual(done.returncode, 0, done.stdout)
+        return [line.split("\t") for line in done.stdout.removesuffix("\n").split("\n")]
+
+    def test_search_answers_questions_with_the_first_hit(self):
+        expected = {query: place for place, queries in FIRST_HITS.items() for query in queries}
+        for (query, place), found in zip(expected.items(), self.hits(*expected)):
+            with self.subTest(query=query):
+                self.assertEqual(found[0], place)
+
+    def test_search_accepts_any_query(self):
+        self.assertEqual(self.hits("xyzzy"), [[""]])
+        self.assertEqual(len(self.hits("what is", "?", "__proto__")), 3)
+
+    def test_words_of_the_search_lead_to_pages_and_sections(self):
+        words = tomllib.loads(text_of("docs/search.toml"))
+        for place in words:
+            name, _, section = place.partition("#")
+            with self.subTest(place=place):
+                page = (self.site / name).with_suffix(".html").read_text(encoding="utf-8")
+                if section:
+                    self.assertIn(f'<section id="{section}">', page)
+        listed = [word.lower() for group in words.values() for word in group]
+        self.assertEqual(sorted(listed), sorted(set(listed)))
+
+    def test_sheets_print_whole_and_pages_are_accessible(self):
+        done = self.browse(self.site)
+        self.assertEqual((done.returncode, done.stdout), (0, ""))
+
+        # Without the rules for paper, commands are cut.
+        shutil.copytree(self.site, self.folder / "site")
+        style = self.folder / "site/_static/style.css"
+        style.write_text(style.read_text(encoding="utf-8").replace("@media print", "@media none"),
+                         encoding="utf-8")
+        done = self.browse(self.folder / "site", "sheets")
+        self.assertEqual(done.returncode, 1)
+        self.assertRegex(done.stdout, r"sheet-2 on A4: \d+ px of")
 
 
 class Launcher(ProgramTest):
