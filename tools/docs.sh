@@ -14,8 +14,8 @@ Builds the documentation into build/docs: static pages with search, which work f
 Doxygen and, into build/docs-venv, Sphinx, if they are missing.
 
   --serve        serve it on this machine only
-  --site FOLDER  write a complete web site: the page of ./upswing demo, and the documentation in docs/;
-                 FOLDER must be new or empty
+  --site FOLDER  write a complete web site: the page of ./upswing demo, the page as one file
+                 (upswing.html), and the documentation in docs/; FOLDER must be new or empty
 
 Examples:
   ./upswing docs
@@ -46,7 +46,8 @@ docs() {
 
   if [ "$setup" = yes ]; then
     set_up_docs
-    set_up release upswing
+    # shellcheck disable=SC2046  # a list of words: all programs, whose help the reference has
+    set_up release upswing $(extra_programs)
     build_docs
   fi
   [ -f "$docs/index.html" ] || fail "the documentation is not built: run ./upswing docs once" \
@@ -104,6 +105,7 @@ write_site() {
   trap 'exit 130' INT
   trap 'exit 143' TERM
   { cp -R "$page/." "$tmp" && cp -R "$docs" "$tmp/docs" &&
+    UPSWING_PAGE="$page" "$program" demo --file "$tmp/upswing.html" >/dev/null &&
     "$python" -B "$root/tools/docs.py" join "$tmp" &&
     # GitHub Pages leaves out folders such as _static unless this file is there.
     : >"$tmp/.nojekyll"; } || fail "could not copy the site (see above)"
