@@ -40,7 +40,7 @@ test('every link of the gallery and of the documentation is understood', async (
   await expect(page.locator('#problem')).toBeHidden();
   const ofGallery = await links(page);
   expect(ofGallery.length).toBeGreaterThan(8);
-  const ofDocs = linksOfDocs().filter((hash) => !hash.includes('agent=fast-seed1')); // one's own
+  const ofDocs = linksOfDocs().filter((hash) => !hash.includes('agent=fast-seed1')); // the reader's own
   expect(ofDocs.length).toBeGreaterThan(8);
   const stage = await context.newPage();
   for (const hash of new Set([...ofGallery, ...ofDocs])) {
