@@ -67,6 +67,7 @@ export function inline(
       .replace(POLICY, policy)
       .replace(/<link[^>]*rel="(?:preload|modulepreload|manifest)"[^>]*>\s*/g, '')
       .replace(/<meta[^>]*"(?:og|twitter):[^>]*>\s*/g, '')
+      .replace(/<a href="\.\/gallery\.html">[^<]*<\/a>\s*/, '') // a file of its own
       .replace('./fonts/OFL.txt', 'https://openfontlicense.org'),
   )
     .replace(/<link[^>]*rel="stylesheet"[^>]*>/, () => `<style>${style}</style>`)
