@@ -75,6 +75,11 @@ class PythonDriver final : public TrainObserver {
     events_.emplace_back("best", Row{{"step", s.steps}});
   }
 
+  /// Tells the events that came after the last Poll, such as those of the last evaluation.
+  void TellRest() {
+    if (!events_.empty() && !error_) Poll();
+  }
+
   TrainRequest Poll() {
     constexpr std::chrono::milliseconds kBetween(100);
     const auto now = std::chrono::steady_clock::now();
@@ -157,7 +162,10 @@ struct Driven {
 
   const Training& its() const { return run ? run->training() : *training; }
 
-  void Train(PythonDriver& driver) {
+  /// `waits`: the training waits for each evaluation, because Python may stop it at a step.
+  void Train(PythonDriver& driver, bool waits) {
+    if (waits && run) run->WaitForEvaluations();
+    if (waits && training) training->WaitForEvaluations();
     driver.Begin(its());
     if (run) {
       finished = run->Train(driver, [&] { return driver.Poll(); });
@@ -165,6 +173,7 @@ struct Driven {
     }
     training->AddObserver(driver);
     while (training->Step() && driver.Poll() != TrainRequest::kStop) continue;
+    training->FinishEvaluation();
     finished = training->trainer().finished();
   }
 };
@@ -194,7 +203,7 @@ Driven Make(const std::vector<FlagValue>& flags, const std::string& config_file,
 
 nb::dict Train(const SettingTexts& settings, const std::string& config, const std::string& out,
                const std::string& resume, const nb::object& make_foreign, const nb::callable& tick,
-               const nb::callable& warn) {
+               const nb::callable& warn, bool may_stop) {
   const std::vector<FlagValue> flags = FlagsOf(settings);
   PythonDriver driver(tick);
   const auto warn_about = [&](const Config& settings_now) {
@@ -208,7 +217,8 @@ nb::dict Train(const SettingTexts& settings, const std::string& config, const st
   {
     const nb::gil_scoped_release unlocked;
     driven = Make(flags, config, out, resume, maker, warn_about);
-    driven.Train(driver);
+    driven.Train(driver, may_stop);
+    driver.TellRest();
     if (driver.error() && !driver.interrupted()) std::rethrow_exception(driver.error());
     last = CopyOf(*driven.its().policy(), "the last policy of this training");
     best = driver.best();
@@ -227,7 +237,7 @@ nb::dict Train(const SettingTexts& settings, const std::string& config, const st
 
 void BindTraining(nb::module_& m) {
   m.def("train", &Train, nb::arg("settings"), nb::arg("config"), nb::arg("out"), nb::arg("resume"),
-        nb::arg("make_foreign").none(), nb::arg("tick"), nb::arg("warn"));
+        nb::arg("make_foreign").none(), nb::arg("tick"), nb::arg("warn"), nb::arg("may_stop"));
 }
 
 }  // namespace upswing

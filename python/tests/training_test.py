@@ -132,6 +132,19 @@ class Callbacks(InFolder):
         # The run folder has a checkpoint of step 4000.
         self.assertEqual(upswing.train(resume=self.path / "run").steps, 4000)
 
+    def test_a_stop_is_at_its_step_with_several_threads(self):
+        threads = {**SMALL, "threads": 3}
+        for stops in ({"on_metrics": lambda row: row["step"] < 3000},
+                      {"on_evaluation": lambda row: False}):
+            training = upswing.train("fast", **threads, **stops)
+            expected = upswing.train("fast", **SMALL, **stops)
+            self.assertEqual((training.steps, training.best_step), (expected.steps, expected.best_step))
+            self.assertEqual(len(training.evaluations), 1)
+        # Without callbacks, evaluations run in the background, and their rows arrive all the same.
+        training = upswing.train("fast", out=self.path / "run", **threads)
+        with open(self.path / "run/evals.csv", encoding="utf-8") as file:
+            self.assertEqual(len(training.evaluations), len(list(csv.DictReader(file))))
+
     def test_other_objects_than_functions_are_refused_at_once(self):
         with self.assertRaisesRegex(upswing.InputError, "on_best: expected a function, got 3"):
             upswing.train("fast", **SMALL, out=self.path / "run", on_best=3)

@@ -38,7 +38,7 @@ class Training:
             callback or Ctrl-C
         solved_step, solved_seconds: steps and training time until solved; None if not solved
         steps, episodes, updates: number of control steps, episodes and updates
-        seconds: training time without evaluations [s]
+        seconds: training time without evaluations that the training waits for [s]
         best_step, best_success_rate, best_return: results of the evaluation of `best`
         agent, seed, threads: agent, seed and number of threads
         path: run folder; None if none was written
@@ -198,8 +198,9 @@ def train(
     make = source.make if source is not None else None
     try:
         with interrupts or contextlib.nullcontext():
+            may_stop = on_best is not None or any(listeners.values())
             result = _upswing.train(texts, config_path, out_path, resume_path, make, tick,
-                                    warn)
+                                    warn, may_stop)
     except Exception as error:
         folder = out_path or resume_path
         # Before Python 3.11 an exception has no notes. The package's own errors say it themselves.

@@ -38,16 +38,26 @@ std::unique_ptr<VectorEnv> MakeTrainingEnv(const Config& config, const Host& hos
 
 /// Evaluates policies from new start states with the reward's standard weights, with the
 /// disturbances of the training. Plants are the training plant, or a new random plant per episode
-/// if training randomizes plants.
+/// if training randomizes plants. An evaluation in the background has half of the threads.
 class TrainingEvaluator : public Evaluator {
  public:
-  /// The settings and the pool must outlive the evaluator.
+  /// The settings and the training's pool must outlive the evaluator.
   TrainingEvaluator(const Config& config, const Host& host, ThreadPool& pool)
-      : config_(config), make_foreign_(host.make_foreign), pool_(pool) {
+      : config_(config),
+        make_foreign_(host.make_foreign),
+        training_pool_(pool),
+        own_pool_(pool.threads() / 2, pool.adapts()) {
     const bool screened = config.eval_physics == kScreened;
     engine_ = &EngineOf(host, screened ? kMuJoCoName : config.eval_physics, "--eval-physics");
   }
 
+  bool CanRunInBackground() const override {
+    return training_pool_.threads() > 1 && !config_.is_foreign();
+  }
+  void ShareThreads(bool shared) override {
+    training_pool_.Lend(shared ? own_pool_.threads() : 0);
+    pool_ = shared ? &own_pool_ : &training_pool_;
+  }
   Evaluation Evaluate(const Policy& policy, int64_t step) override {
     return EvaluateIn(IsScreened(config_) ? kClosedForm : *engine_, policy, step);
   }
@@ -65,16 +75,18 @@ class TrainingEvaluator : public Evaluator {
     env.reward = RewardConfig();
     env.stream = Concat("evaluation at step ", step);
     env.for_evaluation = true;
-    env.pool = &pool_;
+    env.pool = pool_;
     env.engine = &engine;
     env.make_foreign = make_foreign_;
-    return upswing::Evaluate(policy, *MakeEnv(env), &pool_);
+    return upswing::Evaluate(policy, *MakeEnv(env), pool_);
   }
 
   const Config& config_;
   ForeignMaker make_foreign_;
-  ThreadPool& pool_;
-  const Engine* engine_;  // of Evaluate, or of Confirm if evaluations are screened
+  ThreadPool& training_pool_;
+  ThreadPool own_pool_;
+  ThreadPool* pool_ = &training_pool_;  // of the next evaluation
+  const Engine* engine_;                // of Evaluate, or of Confirm if evaluations are screened
 };
 
 }  // namespace

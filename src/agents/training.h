@@ -42,6 +42,10 @@ class Training {
   void StartFrom(const Policy& policy, const std::string& where);
   /// Makes one step of all environments; see Trainer::Step.
   bool Step() { return trainer_.Step(); }
+  /// Lets the training wait for each evaluation; see Trainer::WaitForEvaluations.
+  void WaitForEvaluations() { trainer_.WaitForEvaluations(); }
+  /// Takes the result of the last evaluation; see Trainer::FinishEvaluation.
+  void FinishEvaluation() { trainer_.FinishEvaluation(); }
   const Trainer& trainer() const { return trainer_; }
   const TrainState& state() const { return trainer_.state(); }
   const Config& config() const { return config_; }

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <atomic>
 #include <cassert>
+#include <chrono>
 #include <cstdint>
 #include <exception>
+#include <future>
 #include <limits>
 #include <mutex>
 #include <thread>
@@ -125,22 +127,45 @@ void ThreadPool::Workers::RunTasks() {
 }
 
 ThreadPool::ThreadPool(int threads, bool adapts)
-    : threads_(std::max(threads, 1)), adapts_(adapts), used_(threads_) {
+    : threads_(std::max(threads, 1)), adapts_(adapts), requested_(threads_), used_(threads_) {
   if (threads_ > 1) workers_ = std::make_unique<Workers>(static_cast<uint32_t>(threads_ - 1));
 }
 
 ThreadPool::~ThreadPool() = default;
 
 void ThreadPool::Use(int threads) {
-  if (used_ == threads) return;
-  used_ = threads;
-  if (workers_ != nullptr) workers_->Use(static_cast<uint32_t>(threads - 1));
+  requested_ = threads;
+  const int available = std::max(1, threads_ - lent_);
+  const int used = std::min(threads, available);
+  if (used_ == used) return;
+  used_ = used;
+  if (workers_ != nullptr) workers_->Use(static_cast<uint32_t>(used - 1));
+}
+
+void ThreadPool::Lend(int threads) {
+  lent_ = threads;
+  Use(requested_);
 }
 
 void ThreadPool::ParallelFor(int n, const std::function<void(int)>& task) {
   if (used_ > 1 && n > 1) return workers_->ParallelFor(n, task);
   for (int i = 0; i < n; ++i) task(i);  // no need to wake a thread
 }
+
+struct BackgroundTask::Future {
+  std::future<void> result;
+};
+
+BackgroundTask::BackgroundTask(const std::function<void()>& task)
+    : future_(std::make_unique<Future>(std::async(std::launch::async, task))) {}
+
+BackgroundTask::~BackgroundTask() = default;  // the future's destructor waits for the task
+
+bool BackgroundTask::done() const {
+  return future_->result.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+}
+
+void BackgroundTask::Wait() { future_->result.get(); }
 
 void ParallelFor(ThreadPool* pool, int n, const std::function<void(int)>& task) {
   if (pool != nullptr) return pool->ParallelFor(n, task);

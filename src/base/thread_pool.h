@@ -20,10 +20,17 @@ class ThreadPool {
   bool adapts() const { return adapts_; }
   /// Number of threads that take tasks now; see Use.
   int used() const { return used_; }
+  /// Number of threads that sleep while other work has their processors; see Lend.
+  int lent() const { return lent_; }
 
   /// Lets only the first `threads` threads (1 to threads(), including the caller) take tasks from
-  /// now on. The other threads sleep. Do not call it within a task.
+  /// now on, and at most threads() - lent() of them, at least one. The other threads sleep. Do not
+  /// call it within a task.
   void Use(int threads);
+
+  /// Leaves the processors of `threads` threads to work outside of the pool, until Lend(0). Do not
+  /// call it within a task.
+  void Lend(int threads);
 
   /// Calls task(0) … task(n-1), each on the next free thread, and returns when all tasks are done.
   /// It does not wait for threads that wake too late to take a task.
@@ -39,8 +46,30 @@ class ThreadPool {
 
   int threads_;
   bool adapts_;
+  int requested_;  // threads of the last Use
   int used_;
+  int lent_ = 0;
   std::unique_ptr<Workers> workers_;  // null in a pool of one thread
+};
+
+/// A task on its own thread, while the caller goes on. In a browser the constructor runs the task.
+class BackgroundTask {
+ public:
+  /// Throws std::system_error if the system has no thread to spare.
+  explicit BackgroundTask(const std::function<void()>& task);
+  /// Waits for the task.
+  ~BackgroundTask();
+  BackgroundTask(const BackgroundTask&) = delete;
+  BackgroundTask& operator=(const BackgroundTask&) = delete;
+
+  bool done() const;
+  /// Waits for the task. Rethrows its exception. Call it once.
+  void Wait();
+
+ private:
+  /// Defined in thread_pool.cc, as Workers is.
+  struct Future;
+  std::unique_ptr<Future> future_;
 };
 
 /// Runs ParallelFor on the pool; if it is null, the caller runs all tasks.

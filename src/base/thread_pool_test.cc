@@ -98,5 +98,47 @@ TEST(ThreadPool, OfTwoExceptionsOneReachesTheCallerAndNoneIsLeft) {
   }
 }
 
+TEST(ThreadPool, LentThreadsTakeNoTasks) {
+  ThreadPool pool(3);
+  pool.Lend(1);
+  EXPECT_EQ(pool.used(), 2);
+  pool.Use(3);
+  EXPECT_EQ(pool.used(), 2);
+  pool.Use(1);
+  pool.Lend(2);
+  EXPECT_EQ(pool.used(), 1);
+  pool.Use(2);
+  pool.Lend(0);  // the last request counts again
+  EXPECT_EQ(pool.used(), 2);
+
+  ThreadPool alone(1);
+  alone.Lend(1);
+  EXPECT_EQ(alone.used(), 1);
+  int done = 0;
+  alone.ParallelFor(5, [&](int) { ++done; });
+  EXPECT_EQ(done, 5);
+}
+
+TEST(BackgroundTask, RunsWhileTheCallerGoesOn) {
+  std::atomic<bool> may_end = false;
+  std::atomic<int> result = 0;
+  BackgroundTask task([&] {
+    may_end.wait(false);
+    result = 7;
+  });
+  EXPECT_FALSE(task.done());
+  may_end = true;
+  may_end.notify_all();
+  task.Wait();
+  EXPECT_EQ(result, 7);
+  { const BackgroundTask waited([&] { result = 8; }); }
+  EXPECT_EQ(result, 8);
+}
+
+TEST(BackgroundTask, WaitThrowsItsException) {
+  BackgroundTask task([] { throw std::runtime_error("enough"); });
+  EXPECT_THROW(task.Wait(), std::runtime_error);
+}
+
 }  // namespace
 }  // namespace upswing

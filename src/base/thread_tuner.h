@@ -27,23 +27,31 @@ class ThreadTuner {
   }
 
   /// Number of threads on which the work runs between trials.
-  int threads() const { return choices_[chosen_]; }
+  int threads() const { return current().choices[current().chosen]; }
 
  private:
+  /// The best number of threads, and the trial that finds it.
+  struct Choice {
+    std::vector<int> choices{1};  // 1, 2, 4, … threads
+    size_t chosen = 0;            // index in choices
+    double until_trial = 0;       // seconds of work before the next trial; at most 0 in a trial
+    int calls = 0;                // calls in this trial
+    double trial_seconds = 0, block_seconds = 0;
+    std::vector<double> fastest;  // seconds of the fastest block of this trial on each of choices
+
+    /// Index in choices of the number that the current block of a trial takes.
+    size_t candidate() const;
+  };
+
   void Begin();
   void End();
-  /// Index in choices_ of the number that the current block of a trial takes.
-  size_t candidate() const;
+  const Choice& current() const { return pool_ != nullptr && pool_->lent() > 0 ? lent_ : all_; }
+  Choice& current() { return pool_ != nullptr && pool_->lent() > 0 ? lent_ : all_; }
 
   ThreadPool* pool_;  // null if there is no choice
   std::function<double()> clock_;
-  std::vector<int> choices_{1};  // 1, 2, 4, … threads
-  size_t chosen_ = 0;            // index in choices_
-  double until_trial_ = 0;       // seconds of work before the next trial; at most 0 in a trial
-  int calls_ = 0;                // calls in this trial
-  double trial_seconds_ = 0, block_seconds_ = 0;
-  std::vector<double> fastest_;  // seconds of the fastest block of this trial on each of choices_
-  double begin_ = 0;             // start of the current call, s
+  Choice all_, lent_;  // with all threads of the pool, and while it has lent some
+  double begin_ = 0;   // start of the current call, s
 };
 
 }  // namespace upswing

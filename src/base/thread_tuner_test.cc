@@ -21,6 +21,8 @@ class TunedWork {
   int threads() const { return tuner_.threads(); }
   double now() const { return now_; }
   void Set(std::function<double(int)> seconds) { seconds_ = std::move(seconds); }
+  void Lend(int threads) { pool_.Lend(threads); }
+  int used() const { return pool_.used(); }
 
  private:
   double now_ = 0;
@@ -71,6 +73,22 @@ TEST(ThreadTuner, CallsOfAlternatingLengthDoNotMislead) {
       2, [&](int threads) { return (call++ % 2 == 0 ? 1e-4 : 1e-3) * (threads == 1 ? 1 : 1.5); });
   work.Run(5000);
   EXPECT_EQ(work.threads(), 1);
+}
+
+TEST(ThreadTuner, ChoosesAgainWhileThreadsAreLent) {
+  // Four threads are fastest. Of the rest, where four are lent, three are.
+  TunedWork work(7, [](int t) { return 1e-4 * (0.2 + 0.8 / t + 0.04 * t); });
+  work.Lend(4);
+  for (int i = 0; i < 20; ++i) {  // as evaluations in the background begin and end
+    work.Run(50);
+    EXPECT_LE(work.used(), 3);
+    work.Lend(0);
+    work.Run(50);
+    work.Lend(4);
+  }
+  EXPECT_EQ(work.threads(), 3);
+  work.Lend(0);
+  EXPECT_EQ(work.threads(), 4);
 }
 
 TEST(ThreadTuner, KeepsAFixedPool) {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 
@@ -19,6 +20,12 @@
 
 namespace upswing {
 namespace {
+
+/// Number of updates by an agent's metrics; 0 if they have none.
+int64_t UpdatesIn(const Metrics& metrics) {
+  const auto updates = std::ranges::find(metrics, "updates", &Metrics::value_type::first);
+  return updates == metrics.end() ? 0 : static_cast<int64_t>(updates->second);
+}
 
 /// The printed view of a training: a progress line, a line per evaluation, a summary.
 class TrainView : public TrainObserver {
@@ -131,7 +138,7 @@ class TrainView : public TrainObserver {
     const double elapsed = s.seconds - since_seconds_;
     const bool is_long = elapsed >= 0.5;
     if (elapsed <= 0 || (rates_settled_ && !is_long)) return;
-    const int64_t updates = training_.agent().updates();
+    const int64_t updates = UpdatesIn(metrics_);
     steps_per_second_ = static_cast<double>(s.steps - since_step_) / elapsed;
     updates_per_second_ = static_cast<double>(updates - since_updates_) / elapsed;
     if (!is_long) return;
@@ -148,7 +155,7 @@ class TrainView : public TrainObserver {
 
   /// The agent's metrics, such as `eps 0.05` and `loss 0.0012`.
   std::vector<std::string> AgentTexts() const {
-    const bool learned = training_.agent().updates() > 0;
+    const bool learned = UpdatesIn(metrics_) > 0;
     std::vector<std::string> texts;
     for (const auto& [name, value] : metrics_) {
       if (name == "alpha") texts.push_back(fmt::format("alpha {:.3f}", value));

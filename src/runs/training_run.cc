@@ -94,12 +94,14 @@ bool TrainingRun::Train(TrainObserver& view, const std::function<TrainRequest()>
   try {
     finished = Loop(poll);
   } catch (const Error& error) {
+    FinishEvaluationIfPossible();
     const Error failure = Failure(Concat("training stopped at step ", s.steps, ": ", error.what(),
                                          "; the checkpoint of step ", checkpoint_at_,
                                          " is kept in ", path_.string()));
     LogIfPossible(failure.what());
     throw failure;
   } catch (...) {  // from an environment in Python
+    FinishEvaluationIfPossible();
     LogIfPossible(Concat("stopped by an exception at step ", s.steps));
     throw;
   }
@@ -110,9 +112,16 @@ bool TrainingRun::Train(TrainObserver& view, const std::function<TrainRequest()>
 
 bool TrainingRun::Loop(const std::function<TrainRequest()>& poll) {
   const int64_t every = training_.config().train.checkpoint_every;
+  bool is_due = false;
   while (training_.Step()) {
     const TrainRequest request = poll();
-    if (training_.trainer().IsDue(every) || request != TrainRequest::kGoOn) SaveCheckpoint();
+    is_due |= training_.trainer().IsDue(every);
+    // A checkpoint waits for an evaluation in the background, so that both can be due together.
+    const bool is_time = is_due && !training_.trainer().is_evaluating();
+    if (is_time || request != TrainRequest::kGoOn) {
+      SaveCheckpoint();
+      is_due = false;
+    }
     if (request == TrainRequest::kStop) return training_.trainer().finished();
   }
   if (checkpoint_at_ != training_.state().steps) SaveCheckpoint();
@@ -130,6 +139,13 @@ void TrainingRun::LogIfPossible(const std::string& line) {
     folder_->Log(line);
   } catch (const Error&) {  // NOLINT(bugprone-empty-catch): the disk may be full, and the user
   }                         // sees the line anyway
+}
+
+void TrainingRun::FinishEvaluationIfPossible() {
+  try {
+    training_.FinishEvaluation();
+  } catch (...) {  // NOLINT(bugprone-empty-catch): the earlier failure is the cause
+  }
 }
 
 void TrainingRun::OnEpisode(const TrainState& s, const FinishedEpisode& episode) {

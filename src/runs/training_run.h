@@ -34,6 +34,8 @@ class TrainingRun : private TrainObserver {
                                              ForeignMaker make_foreign = {});
 
   const Training& training() const { return training_; }
+  /// Lets the training wait for each evaluation; see Trainer::WaitForEvaluations.
+  void WaitForEvaluations() { training_.WaitForEvaluations(); }
   const std::filesystem::path& path() const { return path_; }
 
   /// Trains to the end, or until `poll`, which is called after each step, requests a stop. The
@@ -45,9 +47,12 @@ class TrainingRun : private TrainObserver {
 
  private:
   TrainingRun(std::filesystem::path path, const Config& config, ForeignMaker make_foreign = {});
+  /// Trains to the end or a stop.
   bool Loop(const std::function<TrainRequest()>& poll);
   void SaveCheckpoint();
   void LogIfPossible(const std::string& line);
+  /// Takes the result of the last evaluation after a failure.
+  void FinishEvaluationIfPossible();
 
   void OnEpisode(const TrainState& s, const FinishedEpisode& episode) override;
   void OnMetrics(const TrainState& s, const Metrics& metrics) override;

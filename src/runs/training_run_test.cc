@@ -2,10 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "os/file.h"
 #include "os/testing.h"
 #include "runs/config_files.h"
@@ -61,6 +65,21 @@ class TrainingRunTest : public ::testing::Test {
     EXPECT_EQ(ReadOwnFile(a / RunFolder::kEpisodes), ReadOwnFile(b / RunFolder::kEpisodes));
   }
 
+  /// The rows of a table without the column `seconds`.
+  static std::vector<std::vector<std::string>> WithoutClock(const fs::path& table) {
+    std::vector<std::vector<std::string>> rows;
+    const std::string text = ReadOwnFile(table);
+    for (const std::string_view line : Split(text, '\n')) {
+      const std::vector<std::string_view> cells = Split(line, ',');
+      rows.emplace_back(cells.begin(), cells.end());
+    }
+    const auto clock = std::ranges::find(rows.at(0), "seconds") - rows[0].begin();
+    for (auto& row : rows) {
+      if (clock < std::ssize(row)) row.erase(row.begin() + clock);
+    }
+    return rows;
+  }
+
   TempFolder temp_;
 };
 
@@ -73,6 +92,34 @@ TEST_F(TrainingRunTest, StoppedAndResumedEqualsNeverStopped) {
   }
   EXPECT_TRUE(TrainUntil(kNever, *TrainingRun::Resume(temp_ / "parts")));
   ExpectSame(temp_ / "whole", temp_ / "parts");
+}
+
+TEST_F(TrainingRunTest, EvaluationsBesideTheTrainingChangeNoFile) {
+  EXPECT_TRUE(TrainUntil(kNever, *TrainingRun::Make(temp_ / "one", SmallConfig())));
+
+  Config config = SmallConfig();
+  config.train.threads = 3;
+  EXPECT_TRUE(TrainUntil(kNever, *TrainingRun::Make(temp_ / "three", config)));
+  ExpectSame(temp_ / "one", temp_ / "three");
+  for (const char* table : {RunFolder::kEvaluations, RunFolder::kMetrics}) {
+    EXPECT_EQ(WithoutClock(temp_ / "one" / table), WithoutClock(temp_ / "three" / table));
+  }
+
+  config.train.checkpoint_every = config.train.eval_every;  // both are due at once
+  const auto together = TrainingRun::Make(temp_ / "together", config);
+  int beside = 0;
+  TrainObserver no_view;
+  EXPECT_TRUE(together->Train(no_view, [&] {
+    if (together->training().trainer().is_evaluating()) ++beside;
+    return TrainRequest::kGoOn;
+  }));
+  EXPECT_GT(beside, 0);
+  ExpectSame(temp_ / "one", temp_ / "together");
+
+  EXPECT_FALSE(TrainUntil(404, *TrainingRun::Make(temp_ / "parts", config)));
+  EXPECT_THROW(FailAt(812, "enough", *TrainingRun::Resume(temp_ / "parts")), Error);
+  EXPECT_TRUE(TrainUntil(kNever, *TrainingRun::Resume(temp_ / "parts")));
+  ExpectSame(temp_ / "one", temp_ / "parts");
 }
 
 TEST_F(TrainingRunTest, ARunInWorkIsLockedAndNeverOverwritten) {

@@ -5,15 +5,27 @@ namespace upswing {
 
 struct ThreadPool::Workers {};
 
-ThreadPool::ThreadPool(int, bool) : threads_(1), adapts_(false), used_(1) {}
+ThreadPool::ThreadPool(int, bool) : threads_(1), adapts_(false), requested_(1), used_(1) {}
 
 void ThreadPool::Use(int) {}
+
+void ThreadPool::Lend(int) {}
 
 ThreadPool::~ThreadPool() = default;
 
 void ThreadPool::ParallelFor(int n, const std::function<void(int)>& task) {
   for (int i = 0; i < n; ++i) task(i);
 }
+
+struct BackgroundTask::Future {};
+
+BackgroundTask::BackgroundTask(const std::function<void()>& task) { task(); }
+
+BackgroundTask::~BackgroundTask() = default;
+
+bool BackgroundTask::done() const { return true; }
+
+void BackgroundTask::Wait() {}
 
 void ParallelFor(ThreadPool* /*pool*/, int n, const std::function<void(int)>& task) {
   for (int i = 0; i < n; ++i) task(i);

@@ -136,6 +136,11 @@ Evaluation Summarize(std::span<const EvaluationEpisode> episodes, const Evaluati
 class Evaluator {
  public:
   virtual ~Evaluator() = default;
+  /// Whether Evaluate and Confirm may run on another thread while the training goes on.
+  virtual bool CanRunInBackground() const { return false; }
+  /// Divides the threads between the training and the evaluation that runs in the background if
+  /// `shared`. Otherwise the one that runs has all threads.
+  virtual void ShareThreads(bool /*shared*/) {}
   /// Evaluates the policy of a step, from new start states at each step.
   virtual Evaluation Evaluate(const Policy& policy, int64_t step) = 0;
   /// A stricter and slower evaluation, whose result replaces that of Evaluate; nothing: there is

@@ -22,6 +22,16 @@ TrainState::TrainState(int num_envs, int num_terms)
       episode_terms(static_cast<size_t>(num_envs) * static_cast<size_t>(num_terms)),
       episode_length(static_cast<size_t>(num_envs)) {}
 
+TrainState TrainState::WithoutEpisodes() const {
+  TrainState copy(0, 0);
+  copy.TakeEvaluations(*this);
+  copy.steps = steps;
+  copy.episodes = episodes;
+  copy.seconds = seconds;
+  copy.recent_returns = recent_returns;
+  return copy;
+}
+
 double TrainState::mean_return() const { return MomentsOf(recent_returns).mean; }
 
 bool TrainState::Finished(const TrainConfig& config) const {
@@ -92,6 +102,7 @@ void TrainState::State(const Archive& archive) {
 }
 
 void Trainer::State(const Archive& archive) {
+  FinishEvaluation();
   agent_.State(archive.In("agent"));
   env_.State(archive.In("env"));
   state_.State(archive.In("train"));

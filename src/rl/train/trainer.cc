@@ -20,7 +20,18 @@ Trainer::Trainer(const TrainConfig& config, Agent& agent, VectorEnv& env, Evalua
       action_(result_.torque.size()) {}
 
 bool Trainer::Step() {
+  if (background_ && HasEnded(*background_)) FinishEvaluation();
   if (finished()) return false;
+  try {
+    Advance();
+  } catch (...) {
+    FinishEvaluationQuietly();  // its policy may be the best one
+    throw;
+  }
+  return true;
+}
+
+void Trainer::Advance() {
   TrainState& s = state_;
   const Stopwatch watch;
 
@@ -38,15 +49,16 @@ bool Trainer::Step() {
   // Do the work that is due: a multiple of its interval has been reached or passed.
   for (int env = 0; env < env_.num_envs(); ++env) {
     if (const std::optional<FinishedEpisode> episode = s.AddStep(result_, env)) {
-      for (TrainObserver* observer : observers_) observer->OnEpisode(s, *episode);
+      NotifyOrDefer(
+          [episode](TrainObserver& o, const TrainState& state) { o.OnEpisode(state, *episode); });
     }
   }
   if (IsDue(config_.log_every)) {
     const Metrics metrics = agent_.TakeMetrics();
-    for (TrainObserver* observer : observers_) observer->OnMetrics(s, metrics);
+    NotifyOrDefer(
+        [metrics](TrainObserver& o, const TrainState& state) { o.OnMetrics(state, metrics); });
   }
   if (IsDue(config_.eval_every) || s.steps >= config_.steps) Evaluate(IsDue(config_.eval_every));
-  return true;
 }
 
 }  // namespace upswing

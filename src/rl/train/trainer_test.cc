@@ -3,10 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <functional>
+#include <string>
 
 #include "base/error.h"
 #include "base/safetensors.h"
+#include "base/text.h"
 #include "rl/dqn/dqn.h"
 #include "rl/ppo/ppo.h"
 #include "rl/toy_env_testing.h"
@@ -154,6 +157,136 @@ TEST_F(TrainerTest, OnceSolvedABetterPolicyIsConfirmedToo) {
   EXPECT_TRUE(state.solved);
   EXPECT_EQ(confirmed_, (std::vector<int64_t>{200, 400, 500}));
   EXPECT_EQ(state.best_step, 200);
+}
+
+/// Trainings whose evaluations run beside them: an evaluation ends only after the training has gone
+/// on for some steps, or waits for it.
+class TrainerBesideTest : public TrainerTest {
+ protected:
+  bool CanRunInBackground() const override { return beside_; }
+  void ShareThreads(bool beside) override {
+    runs_beside_ = beside;
+    if (beside) ++times_beside_;
+  }
+  Evaluation Evaluate(const Policy& policy, int64_t step) override {
+    if (step == fails_at_) throw Failure("no evaluation");
+    if (runs_beside_) {
+      const int64_t enough = std::min(step + 40, config_.steps);
+      for (int64_t now = steps_; now < enough; now = steps_) steps_.wait(now);
+    }
+    return TrainerTest::Evaluate(policy, step);
+  }
+
+  void OnEpisode(const TrainState& s, const FinishedEpisode& e) override {
+    events_.push_back(Concat("episode of ", e.reward_sum, EvaluatedTo(s)));
+  }
+  void OnMetrics(const TrainState& s, const Metrics& metrics) override {
+    events_.push_back(Concat("loss ", metrics.back().second, EvaluatedTo(s)));
+  }
+  void OnBest(const TrainState& s, const Policy& policy) override {
+    events_.push_back(Concat("best of step ", *policy.info().step, EvaluatedTo(s)));
+  }
+  void OnEvaluation(const TrainState& s, const Evaluation& e) override {
+    events_.push_back(Concat("evaluation with ", e.successes, EvaluatedTo(s)));
+  }
+
+  /// Trains to the end. Returns all events.
+  std::vector<std::string> Events(bool beside) {
+    beside_ = beside;
+    events_.clear();
+    evaluations_ = 0;
+    confirmed_.clear();
+    Proceed(0);
+    Parts parts = Make();
+    while (parts.trainer.Step()) Proceed(parts.trainer.state().steps);
+    return events_;
+  }
+
+  /// Lets evaluations see the training at `step`.
+  void Proceed(int64_t step) {
+    steps_ = step;
+    steps_.notify_all();
+  }
+
+  std::vector<std::string> events_;
+  bool beside_ = true;
+  int times_beside_ = 0;
+  int64_t fails_at_ = -1;                   // step of an evaluation that throws
+  std::atomic<bool> runs_beside_ = false;  // whether the threads are shared
+
+ private:
+  /// Step, mean return and what evaluations have changed.
+  static std::string EvaluatedTo(const TrainState& s) {
+    return Concat(" at ", s.steps, " with ", s.mean_return(), ", best ", s.best_step, ", streak ",
+                  s.streak, ", last ", s.last_success_rate);
+  }
+
+  std::atomic<int64_t> steps_ = 0;  // of the training
+};
+
+TEST_F(TrainerBesideTest, EventsAreThoseOfEvaluationsThatInterrupt) {
+  for (const bool stops : {true, false}) {
+    config_.stop_when_solved = stops;
+    for (const auto& script : std::vector<std::vector<int64_t>>{
+             {0, 1, 3, 2, 4, 1}, {1, 4, 3, 4, 4}, {4, 4, 4, 4, 4, 4}}) {
+      scripted_ = script;
+      confirmations_ = {3, 4, 4, 4, 4, 4};
+      const std::vector<std::string> expected = Events(false);
+      EXPECT_EQ(times_beside_, 0);
+      EXPECT_EQ(Events(true), expected);
+      EXPECT_GE(std::exchange(times_beside_, 0), 2);
+    }
+  }
+}
+
+TEST_F(TrainerBesideTest, AnEvaluationThatMayEndTheTrainingInterruptsIt) {
+  scripted_ = {4, 4};
+  Events(true);
+  EXPECT_EQ(times_beside_, 1);
+  EXPECT_EQ(events_.back().substr(0, 17), "evaluation with 4");
+  EXPECT_NE(events_.back().find(" at 200 "), std::string::npos);
+}
+
+TEST_F(TrainerBesideTest, SavedStatesContainTheResult) {
+  scripted_ = {3};
+  Parts parts = Make();
+  while (parts.trainer.state().steps < 100) parts.trainer.Step();
+  EXPECT_EQ(parts.trainer.state().best_step, 0);  // the evaluation still runs
+  Proceed(1000);
+  Tensors saved;
+  parts.trainer.State(Archive::Saver(saved));
+  EXPECT_EQ(parts.trainer.state().best_step, 100);
+}
+
+TEST_F(TrainerBesideTest, AFailureOfTheTrainingComesAfterTheResult) {
+  scripted_ = {3};
+  Parts parts = Make();
+  while (parts.trainer.state().steps < 100) parts.trainer.Step();
+  parts.env.poison = true;
+  Proceed(1000);
+  EXPECT_THROW(parts.trainer.Step(), Error);
+  EXPECT_EQ(parts.trainer.state().best_step, 100);
+}
+
+TEST_F(TrainerBesideTest, AFailureOfAnEvaluationEndsTheTraining) {
+  fails_at_ = 200;
+  EXPECT_THROW(Events(true), Error);
+  EXPECT_FALSE(runs_beside_);  // the training has all threads again
+  EXPECT_EQ(events_.back().find(" at 300"), std::string::npos) << events_.back();
+}
+
+TEST_F(TrainerBesideTest, ATrainingMayWaitForEachEvaluation) {
+  scripted_ = {1, 2, 3};
+  Parts parts = Make();
+  parts.trainer.WaitForEvaluations();
+  while (parts.trainer.Step()) EXPECT_FALSE(parts.trainer.is_evaluating());
+  EXPECT_EQ(times_beside_, 0);
+}
+
+TEST_F(TrainerBesideTest, DeferredEventsNeedNoMemoryForRunningEpisodes) {
+  const TrainState state(1000, 3);
+  EXPECT_TRUE(state.WithoutEpisodes().episode_return.empty());
+  EXPECT_TRUE(state.WithoutEpisodes().episode_terms.empty());
 }
 
 TEST_F(TrainerTest, ReportsMetricsAtTheirIntervalAndEachEpisodeOnce) {
