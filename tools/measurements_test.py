@@ -48,7 +48,9 @@ class Results(unittest.TestCase):
 
     @unittest.skipUnless(BENCHMARKS.exists(), "needs Google Benchmark")
     def test_benchmarks_have_the_names_of_the_table(self):
-        self.assertIn("`mpc`", self.succeed("tools/results/results.py", "measure", "perf-parts", "--try"))
+        text = self.succeed("tools/results/results.py", "compare", "perf-parts", "--try")
+        self.assertRegex(text, r"\| decision of `mpc` \| [\d,.]+ \| [\d,.]+ \|")
+        self.assertIn("time [µs], here", text)
 
     @unittest.skipUnless(importlib.util.find_spec("casadi"), "needs CasADi")
     def test_the_best_known_return_is_above_its_guess(self):

@@ -5,6 +5,7 @@
   results.py check            lists the outdated tables; exit code 1 if there are any
   results.py measure ID       runs the commands of a table and rewrites docs/results/data/ID.json
   results.py measure ID --try    prints the table with few seeds and episodes; writes nothing
+  results.py compare ID       prints the table of this machine beside the documentation's
   results.py machine          adds this machine to machines.json and prints its ID
 
 docs/results/data/ID.json holds one table, as it is displayed:
@@ -614,12 +615,33 @@ def write_json(path, value):
     path.write_text(json.dumps(value, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
-def measure(table_id, few):
+def measured_rows(table_id, few):
+    """The commands, columns and rows of a table on this machine."""
     if table_id not in RECIPES:
-        raise Problem(f"measure: expected one of {', '.join(RECIPES)}, got {table_id}")
+        raise Problem(f"ID: expected one of {', '.join(RECIPES)}, got {table_id}")
     with tempfile.TemporaryDirectory(prefix="upswing-results-") as folder:
         lab = Lab(Path(folder), few)
         columns, rows = RECIPES[table_id](lab)
+    return lab.commands, columns, rows
+
+
+def compare(table_id, few):
+    """Prints the table of this machine beside that of the documentation."""
+    documented = load(table_id)
+    _, columns, rows = measured_rows(table_id, few)
+    if columns != documented["columns"]:
+        raise Problem(f"{table_id}: expected the columns {documented['columns']}, got {columns}")
+    known = {row[0]: row[1:] for row in documented["rows"]}
+    machine = documented["measured"]["machine"]
+    headings = [f"{column}, {where}" for column in columns[1:] for where in ("here", machine)]
+    missing = [NONE] * len(columns[1:])
+    beside = [[row[0], *(cell for pair in zip(row[1:], known.get(row[0], missing)) for cell in pair)]
+              for row in rows]
+    print(markdown_table([columns[0], *headings], beside), end="")
+
+
+def measure(table_id, few):
+    commands, columns, rows = measured_rows(table_id, few)
     if few:
         print(markdown_table(columns, rows), end="")
         return
@@ -631,7 +653,7 @@ def measure(table_id, few):
                 "date": datetime.date.today().strftime("%Y-%m"), "machine": machine_id(),
                 "commit": commit}
     write_json(path, {"title": old.get("title", table_id.replace("-", " ").capitalize()),
-                      "commands": lab.commands, "measured": measured, "columns": columns,
+                      "commands": commands, "measured": measured, "columns": columns,
                       "rows": rows})
 
 
@@ -641,10 +663,13 @@ def main():
     actions = parser.add_subparsers(dest="action", required=True)
     for name in ("write", "check", "machine"):
         actions.add_parser(name)
-    measuring = actions.add_parser("measure")
-    measuring.add_argument("id", help=f"one of {', '.join(RECIPES)}")
-    measuring.add_argument("--try", dest="few", action="store_true",
-                           help="few seeds and episodes; print the table, write nothing")
+    measuring = actions.add_parser("measure", help="measure a table of the documentation again")
+    comparing = actions.add_parser(
+        "compare", help="print a table of this machine beside the documentation's")
+    for action in (measuring, comparing):
+        action.add_argument("id", help=f"one of {', '.join(RECIPES)}")
+        action.add_argument("--try", dest="few", action="store_true",
+                            help="few seeds and episodes; print the table, keep the old one")
     arguments = parser.parse_args()
     try:
         match arguments.action:
@@ -656,6 +681,8 @@ def main():
                 print(machine_id())
             case "measure":
                 measure(arguments.id, arguments.few)
+            case "compare":
+                compare(arguments.id, arguments.few)
     except Problem as problem:
         print(f"results.py: {problem}", file=sys.stderr)
         return 1
