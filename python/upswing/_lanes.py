@@ -23,6 +23,9 @@ VecEnv = VectorEnv[Any, Any, Any]
 Arrays = dict[str, npt.NDArray[Any]]  # shared with the C++ code: see CallbackEnv
 
 
+OBS_TYPES = (np.dtype(np.float32), np.dtype(np.float64))  # types of an observation
+
+
 class Lanes:
     """Single environments, stepped one after the other. `once`: an environment whose episode has
     ended is not stepped again, as evaluations need only one episode of each."""
@@ -33,6 +36,7 @@ class Lanes:
         self._arrays = arrays
         self.lengths = [0] * len(envs)  # steps of the running episodes
         self._ended = [False] * len(envs)
+        self._may_hold_end = [True] * len(envs)  # whether the end of an episode may be in the arrays
         self._wheres = [f"environment {i}: expected " for i in range(len(envs))]
 
     @property
@@ -45,27 +49,40 @@ class Lanes:
             self._reset(i, env, seed)
 
     def step(self) -> None:
-        a, limit = self._arrays, self._limit.steps
+        a, limit, shape = self._arrays, self._limit.steps, self._space.obs_shape
+        obs_rows, next_obs_rows = a["obs"], a["next_obs"]
+        actions = self._space.actions_of(a["action"])
+        # Usual types are recognised here, because each check costs as much as a small environment.
         for i, env in enumerate(self._envs):
             if self._ended[i]:
                 continue
-            where = self._wheres[i]
-            returned = env.step(self._space.action_of(a["action"][i]))
-            if type(returned) is not tuple or len(returned) != 5:  # fast, as each step needs it
-                returned = unpacked(returned, STEP, where)
+            returned = env.step(actions[i])
+            if type(returned) is not tuple or len(returned) != 5:
+                returned = unpacked(returned, STEP, self._wheres[i])
             obs, reward, terminated, truncated, _ = returned
-            self._store(i, obs, "next_obs")
-            a["reward"][i] = numbers(reward, (), where + "a reward")
+            if type(obs) is not np.ndarray or obs.shape != shape or obs.dtype not in OBS_TYPES:
+                obs = numbers(obs, shape, self._wheres[i] + "observations")
+            next_obs_rows[i] = obs
+            if type(reward) is not float:
+                reward = numbers(reward, (), self._wheres[i] + "a reward")
+            a["reward"][i] = reward
+            if terminated is not False or truncated is not False:
+                terminated = bool(flags(terminated, (), self._wheres[i] + "terminated"))
+                truncated = bool(flags(truncated, (), self._wheres[i] + "truncated"))
             self.lengths[i] += 1
-            done = bool(flags(terminated, (), where + "terminated"))
-            out = bool(flags(truncated, (), where + "truncated")) and not done
+            done, out = terminated, truncated and not terminated
             if self.lengths[i] >= limit and not (done or out):
                 self._limit.note_reached()
                 out = True
-            a["terminated"][i], a["truncated"][i] = done, out
             if not (done or out):
-                a["obs"][i] = a["next_obs"][i]
-            elif self._once:
+                if self._may_hold_end[i]:
+                    a["terminated"][i] = a["truncated"][i] = False
+                    self._may_hold_end[i] = False
+                obs_rows[i] = obs
+                continue
+            a["terminated"][i], a["truncated"][i] = done, out
+            self._may_hold_end[i] = True
+            if self._once:
                 self._ended[i] = True
             else:
                 self._reset(i, env, None)

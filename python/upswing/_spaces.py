@@ -54,12 +54,6 @@ class Spaces:
             raise _upswing.InputError(
                 f"env: expected actions within ±{MOST_ACTION:g}, got {brief(action)}")
 
-    def action_of(self, row: npt.NDArray[np.float64]) -> Any:
-        """The environment's action for a row (A) of the C++ code."""
-        if self.choices:
-            return self._number(row[0])
-        return row.astype(self.action.dtype).reshape(self.action.shape)
-
     def row_of(self, action: Any) -> npt.NDArray[Any]:
         """A policy's action as a row (A) of the C++ code. Raises InputError."""
         row = np.asarray(action).ravel()
@@ -89,6 +83,11 @@ class Spaces:
         if self.choices:
             return rows[:, 0].astype(self._number)
         return rows.astype(self.action.dtype).reshape(len(rows), *(self.action.shape or ()))
+
+    def actions_of(self, rows: npt.NDArray[np.float64]) -> Any:
+        """The actions of single environments for rows (N, A) of the C++ code."""
+        actions = self.batch_of(rows)
+        return actions if self.choices else [actions[i, ...] for i in range(len(rows))]
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Spaces) and (
