@@ -105,6 +105,17 @@ class Hypotheses {
   std::vector<WeakFit> FitsOfSigns(const Hypothesis& h) const;
   std::vector<Joints> Signs(bool swapped) const;
 
+  // hypotheses_changes.cc: slips, drifts and offsets.
+  Hypothesis WithChange(const Change& change) const;
+  Hypothesis Turned(Hypothesis h) const;
+  static WeakEquations Smooth(const Change& change, const WeakEquations& equations);
+  /// The fit of a hypothesis to its equations.
+  WeakFit FitOf(const Hypothesis& h, const WeakEquations& equations) const;
+  /// The columns of a slip, drift or offset.
+  std::array<Eigen::MatrixXd, 2> ColumnsOf(const Change& change,
+                                           const WeakEquations& equations) const;
+
+  // hypotheses.cc.
   std::vector<double> UsualDelays() const;
   void ImproveDelay(Hypothesis& h) const;
   void ImproveDelays();
@@ -120,14 +131,6 @@ class Hypotheses {
   void DropIdleTorques(const TorqueReading& torques, WeakEquations& equations) const;
   Hypothesis WithAngles(const AngleReading& angles) const;
   Hypothesis WithTorques(const TorqueReading& torques, double delay) const;
-  Hypothesis WithChange(const Change& change) const;
-  Hypothesis Turned(Hypothesis h) const;
-  static WeakEquations Smooth(const Change& change, const WeakEquations& equations);
-  /// The fit of a hypothesis to its equations.
-  WeakFit FitOf(const Hypothesis& h, const WeakEquations& equations) const;
-  /// The columns of a change that there is.
-  std::array<Eigen::MatrixXd, 2> ColumnsOf(const Change& change,
-                                           const WeakEquations& equations) const;
 
   const WeakForm& form_;
   WeakForm thin_;  // some of its windows, for scans
