@@ -31,6 +31,10 @@ int HorizonOf(const ControllerConfig& config) {
   return static_cast<int>(std::lround(config.mpc.seconds / config.plant.control_period));
 }
 
+const MpcPolicy& PolicyOf(const LoadedPolicy& loaded) {
+  return dynamic_cast<const MpcPolicy&>(*loaded.policy);
+}
+
 /// The results of a sample in extras/deploy/c/mpc.c: an iteration from no torque, a call in the
 /// next state of that plan, and the cost of the regulator from near upright.
 struct SampleResult {
@@ -47,7 +51,7 @@ class Sampler {
       : loaded_(loaded),
         lqr_(SolveLqr(config.lqr, config.plant)),
         cost_(WeightsOf(config.lqr), config.lqr.torque, lqr_.P, config.mpc.angle_range),
-        optimizer_(config.plant),
+        optimizer_(config.plant, PolicyOf(loaded).planning_steps()),
         steps_(static_cast<size_t>(HorizonOf(config))) {}
 
   const Lqr& lqr() const { return lqr_; }
@@ -66,8 +70,7 @@ class Sampler {
     result.next = UprightDeviation(plan.x[1]);
     const auto seen = Observe(loaded_.plant, StateOf(plan.x[1]), loaded_.scale());
     const std::vector<float> obs(seen.begin(), seen.end());
-    const auto memory =
-        dynamic_cast<const MpcPolicy&>(*loaded_.policy).StartFrom(plan, optimizer_.gains());
+    const auto memory = PolicyOf(loaded_).StartFrom(plan, optimizer_.gains());
     loaded_.policy->Act({obs.data(), 1, static_cast<int>(obs.size())}, {&result.torques[1], 1, 1},
                         *memory);
     return result;
@@ -78,7 +81,8 @@ class Sampler {
     const Trajectory upright{std::vector<StateVector>(steps_ + 1, FromUpright({0, 0, 0, 0})),
                              std::vector<double>(steps_, 0.0), 0};
     const std::vector<Eigen::RowVector4d> K(steps_, -lqr_.K);
-    return optimizer_.Follow(cost_, FromUpright(deviation), upright, K).cost;
+    const TrajectoryOptimizer::FeedbackPlan hold{upright, K};
+    return optimizer_.Follow(cost_, FromUpright(deviation), {&hold, 1}).front().cost;
   }
 
   /// The largest change of the results, in tolerances, by what rounding adds up to. It is large
@@ -200,7 +204,8 @@ void AddPredictive(const LoadedPolicy& loaded, const ControllerConfig& config, C
   const Scale scale = TaskScaleOf(config.plant);
   const int horizon = HorizonOf(config), guesses = static_cast<int>(config.mpc.guesses);
   parts.constants.push_back({"gain", "N m/rad, N m s/rad", Floats(sampler.lqr().K)});
-  AddEquations(config.plant, config.plant.physics_steps(), parts);
+  const int planning_steps = PolicyOf(loaded).planning_steps();
+  AddEquations(config.plant, planning_steps, parts);
   parts.constants.push_back({"weights", "of q1, q2, w1, w2 and the torque, squared",
                              Floats(std::array{lqr.q1, lqr.q2, lqr.w1, lqr.w2, lqr.torque})});
   const Eigen::Matrix4d& P = sampler.lqr().P;
@@ -228,7 +233,7 @@ void AddPredictive(const LoadedPolicy& loaded, const ControllerConfig& config, C
       std::max(1, MpcPolicy::kFirstIterations * rounds / static_cast<int>(config.mpc.iterations)),
       " calls: make it before the motion, and set its torque a period before the next call. The "
       "self-test takes as long as about 8 calls, and has a state on its stack.");
-  const auto derivatives = static_cast<size_t>(4 * config.plant.physics_steps()) * T;
+  const auto derivatives = static_cast<size_t>(4 * planning_steps) * T;
   parts.work = Concat(config.mpc.iterations, " iterations, each of ", derivatives,
                       " derivatives with their own derivatives and up to ", 17 * derivatives,
                       " without; the first call takes up to ", MpcPolicy::kFirstIterations * rounds,

@@ -47,7 +47,7 @@ class MpcTest(HeaderTest):
         return [abs(torque - row["torque"]) for torque, row in zip(torques, rows, strict=True)]
 
     def test_torques(self):
-        """In 9 of 10 calls of an episode the torque is that of the program, within 0.5% of the limit. The cost
+        """In 9 of 10 calls of an episode the torque is that of the program, within 1% of the limit. The cost
         is flat along some changes of a plan; there rounding moves a few torques."""
         self.write("driver.c", DRIVER)
         for options, start in (
@@ -63,7 +63,7 @@ class MpcTest(HeaderTest):
                 period = float(re.search(r"POLICY_PERIOD (\S+)f", self.header())[1])
                 errors = sorted(self.errors(start, round(60 * period, 3), options))
                 self.assertEqual(len(errors), 60)
-                self.assertLess(errors[53], 0.005 * limit, errors[50:])
+                self.assertLess(errors[53], 0.01 * limit, errors[50:])
                 self.assertEqual(self.self_test(), 0)
 
     def test_closed_loops(self):

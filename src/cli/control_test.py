@@ -242,7 +242,7 @@ armature = 1e-6
 
     def test_a_given_time_is_that_of_the_small_plant(self):
         # The default is 4 s for the built-in plant, so 1.3 s for this one.
-        usual, given = (self.evaluate(*more)[0]["swing_up_seconds"]
+        usual, given = (self.evaluate(*more)[0]["energy_used"]
                         for more in ((), ("--tvlqr-seconds", 4)))
         self.assertNotEqual(usual, given)
 

@@ -16,8 +16,8 @@ constexpr double kTolerance = 1e-6;  // relative gain of an iteration
 
 /// The plans of some environments, and one optimiser for all of them.
 struct MpcPolicy::Plans : Memory {
-  Plans(int num_envs, const DesignPlant& plant)
-      : plans(static_cast<size_t>(num_envs)), optimizer(plant) {}
+  Plans(int num_envs, const DesignPlant& plant, int planning_steps)
+      : plans(static_cast<size_t>(num_envs)), optimizer(plant, planning_steps) {}
 
   struct Plan {
     Trajectory trajectory;
@@ -30,6 +30,7 @@ struct MpcPolicy::Plans : Memory {
 MpcPolicy::MpcPolicy(LqrConfig lqr, MpcConfig config, const DesignPlant& plant)
     : PendulumController("mpc", OptionsOfAll(lqr, config), plant),
       config_(config),
+      planning_steps_(PlanningSteps(plant)),
       lqr_(SolveLqr(lqr, plant)),
       cost_(WeightsOf(lqr), lqr.torque, lqr_.P, config.angle_range) {}
 
@@ -39,12 +40,12 @@ std::string MpcPolicy::description() const {
 }
 
 std::unique_ptr<Policy::Memory> MpcPolicy::Start(int num_envs) const {
-  return std::make_unique<Plans>(num_envs, plant());
+  return std::make_unique<Plans>(num_envs, plant(), planning_steps_);
 }
 
 std::unique_ptr<Policy::Memory> MpcPolicy::StartFrom(
     const Trajectory& plan, const std::vector<Eigen::RowVector4d>& K) const {
-  auto plans = std::make_unique<Plans>(1, plant());
+  auto plans = std::make_unique<Plans>(1, plant(), planning_steps_);
   plans->plans[0] = {plan, K};
   return plans;
 }
@@ -84,14 +85,17 @@ double MpcPolicy::Torque(const StateVector& deviation, size_t env, Memory& memor
     K.emplace_back(-lqr_.K);
     // Count full turns as the plan does.
     x = trajectory.x[0] + Difference(x, trajectory.x[0]);
-    trajectory = optimizer.Follow(cost_, x, trajectory, K);
   }
   // Take the regulator's own trajectory if it costs less. It holds the nearest upright, also one
   // that is no goal; then its cost is large.
   const Trajectory upright{std::vector<StateVector>(T + 1, x - UprightDeviation(x)),
                            std::vector<double>(T, 0.0), 0};
-  Trajectory regulated =
-      optimizer.Follow(cost_, x, upright, std::vector<Eigen::RowVector4d>(T, -lqr_.K));
+  const std::vector<Eigen::RowVector4d> regulator(T, -lqr_.K);
+  std::vector<TrajectoryOptimizer::FeedbackPlan> candidates{{upright, regulator}};
+  if (!first) candidates.push_back({trajectory, K});
+  std::vector<Trajectory> followed = optimizer.Follow(cost_, x, candidates);
+  Trajectory& regulated = followed.front();
+  if (!first) trajectory = std::move(followed.back());
   if (regulated.cost < trajectory.cost) trajectory = std::move(regulated);
   if (first) {
     optimizer.Improve(cost_, kTolerance, kFirstIterations, trajectory);

@@ -21,6 +21,7 @@ class MpcPolicy : public PendulumController {
   MpcPolicy(LqrConfig lqr, MpcConfig config, const DesignPlant& plant);
 
   std::string description() const override;
+  int planning_steps() const { return planning_steps_; }
   std::unique_ptr<Memory> Start(int num_envs) const override;
   /// Begins one environment with a plan (T) and feedback (T) about it, as if a decision had made
   /// them.
@@ -35,6 +36,7 @@ class MpcPolicy : public PendulumController {
   Trajectory FirstPlan(TrajectoryOptimizer& optimizer, const StateVector& x, size_t T) const;
 
   MpcConfig config_;
+  int planning_steps_;  // Runge-Kutta steps in a control period of a plan
   Lqr lqr_;
   QuadraticCost cost_;
 };

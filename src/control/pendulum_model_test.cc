@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numbers>
 #include <vector>
 
@@ -89,6 +90,29 @@ TEST(PendulumModel, UprightItIsTheLinearModel) {
   const LinearModel expected = Discretize(LinearizeUpright(plant), kPhysicsTimestep, kPhysicsSteps);
   EXPECT_LT((models[0].A - expected.A).norm(), 1e-8);
   EXPECT_LT((models[0].B - expected.B).norm(), 1e-8);
+}
+
+TEST(PendulumModel, PlansTakeFewStepsWhereTheyFollowTheSimulation) {
+  const DesignPlant usual;
+  EXPECT_LT(PlanningSteps(usual), usual.physics_steps());
+  DesignPlant rough;
+  rough.coulomb1 = rough.coulomb2 = 0.05;  // N·m, an arctangent that is steep at rest
+  EXPECT_GT(PlanningSteps(rough), PlanningSteps(usual));
+
+  // The error is as promised at states that the choice did not see.
+  Rng rng(4, "states");
+  std::vector<StateVector> x;
+  std::vector<double> u;
+  for (int i = 0; i < 200; ++i) {
+    x.push_back(DrawState(rng));
+    u.push_back(rng.Uniform(-5, 5));
+  }
+  std::vector<StateVector> planned = x;
+  PendulumModel(usual).Step(x, u);
+  PendulumModel(usual, PlanningSteps(usual)).Step(planned, u);
+  double squares = 0;
+  for (size_t i = 0; i < x.size(); ++i) squares += (planned[i] - x[i]).squaredNorm();
+  EXPECT_LT(std::sqrt(squares / 200), 3e-3);
 }
 
 TEST(Manipulator, EnergyChangesOnlyByWorkAndDamping) {

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "control/controller.h"
 
@@ -61,34 +62,43 @@ CostExpansion QuadraticCost::ExpandFinal(const StateVector& x) const {
 
 Trajectory TrajectoryOptimizer::Follow(const QuadraticCost& cost, const StateVector& start,
                                        const std::vector<double>& torques) {
-  return Follow(cost, start, torques.size(),
-                [&](size_t t, const StateVector&) { return torques[t]; });
+  const auto planned = [&](size_t, size_t t, const StateVector&) { return torques[t]; };
+  return std::move(Follow(cost, start, 1, torques.size(), planned).front());
 }
 
-Trajectory TrajectoryOptimizer::Follow(const QuadraticCost& cost, const StateVector& start,
-                                       const Trajectory& planned,
-                                       std::span<const Eigen::RowVector4d> K) {
-  return Follow(cost, start, planned.u.size(), [&](size_t t, const StateVector& x) {
+std::vector<Trajectory> TrajectoryOptimizer::Follow(const QuadraticCost& cost,
+                                                    const StateVector& start,
+                                                    std::span<const FeedbackPlan> plans) {
+  const size_t T = plans.empty() ? 0 : plans[0].planned.u.size();
+  return Follow(cost, start, plans.size(), T, [&](size_t i, size_t t, const StateVector& x) {
+    const auto& [planned, K] = plans[i];
     return planned.u[t] + K[t].dot(x - planned.x[t]);
   });
 }
 
 template <typename Torque>
-Trajectory TrajectoryOptimizer::Follow(const QuadraticCost& cost, const StateVector& start,
-                                       size_t steps, const Torque& torque) {
+std::vector<Trajectory> TrajectoryOptimizer::Follow(const QuadraticCost& cost,
+                                                    const StateVector& start, size_t n,
+                                                    size_t steps, const Torque& torque) {
   const double limit = model_.plant().torque_limit;
-  Trajectory result;
-  result.x.reserve(steps + 1);
-  result.u.reserve(steps);
-  result.x.push_back(start);
-  for (size_t t = 0; t < steps; ++t) {
-    StateVector x = result.x.back();
-    const double u = std::clamp(torque(t, x), -limit, limit);
-    model_.Step({&x, 1}, {&u, 1});
-    result.x.push_back(x);
-    result.u.push_back(u);
+  std::vector<Trajectory> results(n);
+  std::vector<StateVector> x(n, start);
+  std::vector<double> u(n);
+  for (Trajectory& result : results) {
+    result.x.reserve(steps + 1);
+    result.u.reserve(steps);
+    result.x.push_back(start);
   }
-  return Priced(cost, std::move(result));
+  for (size_t t = 0; t < steps; ++t) {
+    for (size_t i = 0; i < n; ++i) u[i] = std::clamp(torque(i, t, x[i]), -limit, limit);
+    model_.Step(x, u);
+    for (size_t i = 0; i < n; ++i) {
+      results[i].x.push_back(x[i]);
+      results[i].u.push_back(u[i]);
+    }
+  }
+  for (Trajectory& result : results) result = Priced(cost, std::move(result));
+  return results;
 }
 
 Trajectory TrajectoryOptimizer::Priced(const QuadraticCost& cost, Trajectory trajectory) {
@@ -156,19 +166,40 @@ bool TrajectoryOptimizer::Backward(const QuadraticCost& cost, const Trajectory& 
 
 bool TrajectoryOptimizer::Forward(const QuadraticCost& cost, Trajectory& trajectory) {
   const size_t steps = trajectory.u.size();
-  const double limit = model_.plant().torque_limit;
   trial_x_.resize((steps + 1) * kTrials);
   trial_u_.resize(steps * kTrials);
+  for (int round = 0; round < kRounds; ++round) {
+    std::array<double, kTrials> share{};  // from 1 to 5e-10
+    for (int i = 0; i < kTrials; ++i) {
+      const int trial = round * kTrials + i;
+      share[static_cast<size_t>(i)] = std::pow(1.1, -trial * trial);
+    }
+    const std::array<double, kTrials> costs = Try(cost, trajectory, share);
+    const auto best = std::ranges::min_element(costs);
+    if (!(*best < trajectory.cost)) continue;
+    const auto trial = static_cast<size_t>(best - costs.begin());
+    for (size_t t = 0; t <= steps; ++t) trajectory.x[t] = trial_x_[t * kTrials + trial];
+    for (size_t t = 0; t < steps; ++t) trajectory.u[t] = trial_u_[t * kTrials + trial];
+    trajectory.cost = *best;
+    return true;
+  }
+  return false;
+}
+
+std::array<double, TrajectoryOptimizer::kTrials> TrajectoryOptimizer::Try(
+    const QuadraticCost& cost, const Trajectory& trajectory,
+    const std::array<double, kTrials>& share) {
+  const size_t steps = trajectory.u.size();
+  const double limit = model_.plant().torque_limit;
   std::array<double, kTrials> costs{};
   std::fill_n(trial_x_.begin(), kTrials, trajectory.x[0]);
   for (size_t t = 0; t < steps; ++t) {
     StateVector* const x = trial_x_.data() + t * kTrials;
     double* const u = trial_u_.data() + t * kTrials;
-    for (int trial = 0; trial < kTrials; ++trial) {
-      const double share = std::pow(1.1, -trial * trial);  // from 1 to 5e-10
-      const double change = share * k_[t] + K_[t].dot(x[trial] - trajectory.x[t]);
+    for (size_t trial = 0; trial < kTrials; ++trial) {
+      const double change = share[trial] * k_[t] + K_[t].dot(x[trial] - trajectory.x[t]);
       u[trial] = std::clamp(trajectory.u[t] + change, -limit, limit);
-      costs[static_cast<size_t>(trial)] += cost.Running(x[trial], u[trial]);
+      costs[trial] += cost.Running(x[trial], u[trial]);
     }
     std::copy_n(x, kTrials, x + kTrials);
     model_.Step({x + kTrials, kTrials}, {u, kTrials});
@@ -177,13 +208,7 @@ bool TrajectoryOptimizer::Forward(const QuadraticCost& cost, Trajectory& traject
     costs[trial] += cost.Final(trial_x_[steps * kTrials + trial]);
     if (!std::isfinite(costs[trial])) costs[trial] = std::numeric_limits<double>::infinity();
   }
-  const auto best = std::ranges::min_element(costs);
-  if (!(*best < trajectory.cost)) return false;
-  const auto trial = static_cast<size_t>(best - costs.begin());
-  for (size_t t = 0; t <= steps; ++t) trajectory.x[t] = trial_x_[t * kTrials + trial];
-  for (size_t t = 0; t < steps; ++t) trajectory.u[t] = trial_u_[t * kTrials + trial];
-  trajectory.cost = *best;
-  return true;
+  return costs;
 }
 
 }  // namespace upswing

@@ -61,14 +61,22 @@ class QuadraticCost {
 class TrajectoryOptimizer {
  public:
   explicit TrajectoryOptimizer(const DesignPlant& plant) : model_(plant) {}
+  /// `steps`: see PendulumModel.
+  TrajectoryOptimizer(const DesignPlant& plant, int steps) : model_(plant, steps) {}
 
   /// The trajectory from `start` under torques (T), N·m, cut at the limit, and its cost.
   Trajectory Follow(const QuadraticCost& cost, const StateVector& start,
                     const std::vector<double>& torques);
 
-  /// The trajectory from `start` under the torques of `planned` with feedback K (T) about it.
-  Trajectory Follow(const QuadraticCost& cost, const StateVector& start, const Trajectory& planned,
-                    std::span<const Eigen::RowVector4d> K);
+  /// The torques of a trajectory with feedback K (T) about it.
+  struct FeedbackPlan {
+    const Trajectory& planned;
+    std::span<const Eigen::RowVector4d> K;
+  };
+  /// The trajectories from `start` under each of the plans, which have the same T. A few plans take
+  /// hardly longer than one.
+  std::vector<Trajectory> Follow(const QuadraticCost& cost, const StateVector& start,
+                                 std::span<const FeedbackPlan> plans);
 
   /// The trajectory with its cost filled in.
   static Trajectory Priced(const QuadraticCost& cost, Trajectory trajectory);
@@ -84,17 +92,22 @@ class TrajectoryOptimizer {
   PendulumModel& model() { return model_; }
 
  private:
-  /// Number of step sizes tried along the improvement, longest first; all are simulated at once.
-  static constexpr int kTrials = 16;
+  /// Number of step sizes along the improvement that are simulated at once, and of such rounds.
+  static constexpr int kTrials = 8, kRounds = 2;
 
+  /// The trajectories (n) under torque(i, t, x), N·m.
   template <typename Torque>
-  Trajectory Follow(const QuadraticCost& cost, const StateVector& start, size_t steps,
-                    const Torque& torque);
+  std::vector<Trajectory> Follow(const QuadraticCost& cost, const StateVector& start, size_t n,
+                                 size_t steps, const Torque& torque);
   /// Computes k_ and K_ about the trajectory. Returns false if the cost curves down along the
   /// torque; the caller then increases the regularisation.
   bool Backward(const QuadraticCost& cost, const Trajectory& trajectory, double regularization);
-  /// Replaces `trajectory` with the best of the trials if that costs less.
+  /// Tries step sizes in rounds, longest first. Replaces `trajectory` with the best one of the
+  /// first round that lowers its cost.
   bool Forward(const QuadraticCost& cost, Trajectory& trajectory);
+  /// Simulates the trajectory with these shares of the change k_. Returns their costs.
+  std::array<double, kTrials> Try(const QuadraticCost& cost, const Trajectory& trajectory,
+                                  const std::array<double, kTrials>& share);
 
   PendulumModel model_;
   std::vector<LinearModel> models_;    // (T) along the trajectory

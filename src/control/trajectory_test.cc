@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include "control/lqr.h"
@@ -61,6 +63,26 @@ TEST(QuadraticCost, CountsGoalsWithinTheRange) {
     EXPECT_NEAR(cost(kPi, sign * 0.9 * kPi, 0), square(0.1 * kPi), 1e-9);
     EXPECT_NEAR(cost(4, sign * 0.9 * kPi, sign * 0.2), square(0.1 * kPi) + 2 * square(0.2), 1e-9);
   }
+}
+
+TEST(Trajectory, FollowsSeveralPlansAsEachAlone) {
+  const Plant plant;
+  const QuadraticCost cost = StandardCost(LqrConfig(), plant);
+  TrajectoryOptimizer optimizer(plant);
+  const StateVector start(0.1, -0.2, 0.3, -0.4);
+  const Trajectory a = optimizer.Follow(cost, StateVector::Zero(), std::vector<double>(30, 2.0));
+  const Trajectory b = optimizer.Follow(cost, start, std::vector<double>(30, -1.0));
+  const std::vector<Eigen::RowVector4d> weak(30, {-1, 0, -0.1, 0}), strong(30, {-9, -9, -2, -1});
+  const std::array<TrajectoryOptimizer::FeedbackPlan, 2> plans{{{a, weak}, {b, strong}}};
+  const std::vector<Trajectory> both = optimizer.Follow(cost, start, plans);
+  ASSERT_EQ(both.size(), 2U);
+  for (size_t i = 0; i < 2; ++i) {
+    const Trajectory alone = std::move(optimizer.Follow(cost, start, {&plans[i], 1}).front());
+    EXPECT_EQ(both[i].u, alone.u);
+    EXPECT_EQ(both[i].x, alone.x);
+    EXPECT_EQ(both[i].cost, alone.cost);
+  }
+  EXPECT_NE(both[0].u, both[1].u);
 }
 
 TEST(Trajectory, NoChangeOfATorqueIsBetter) {
