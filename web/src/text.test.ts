@@ -1,5 +1,10 @@
 import { expect, test } from 'vitest';
-import { isCommand, printable, quoted, withMinus } from './text';
+import { isCommand, printable, quoted, sentence, withMinus } from './text';
+
+test('a message ends with one mark', () => {
+  expect(sentence('it cannot be read')).toBe('it cannot be read.');
+  expect(sentence('is there a loop without an end?')).toBe('is there a loop without an end?');
+});
 
 test('plain text stays as it is', () => {
   expect(printable('Dueling Double DQN, größer (π)')).toBe('Dueling Double DQN, größer (π)');

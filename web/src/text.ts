@@ -28,3 +28,8 @@ export function isCommand(text: string): boolean {
 export function withMinus(text: string): string {
   return text.replace(/^-(?=[^1-9]*[1-9])/, '−').replace(/^-/, '');
 }
+
+/// A message with a full stop, unless it ends with a mark of its own.
+export function sentence(text: string): string {
+  return /[.?!…]$/.test(text) ? text : `${text}.`;
+}

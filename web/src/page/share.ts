@@ -2,7 +2,7 @@ import { PERFECT } from '../disturbance';
 import type { Disturbance } from '../disturbance';
 import { GOALS, NOMINAL } from '../pendulum';
 import type { GoalName, Parameter, Plant, Range } from '../pendulum';
-import { quoted } from '../text';
+import { quoted, sentence } from '../text';
 
 /// Stands for a visitor's own policy, which no link can contain.
 export const OWN = 'own';
@@ -96,5 +96,5 @@ export function decode(
 /// A message about problems.
 export function problemText(problems: readonly string[]): string {
   const more = problems.length > 3 ? `; and ${problems.length - 3} more` : '';
-  return `Not all of the link could be used: ${problems.slice(0, 3).join('; ')}${more}.`;
+  return sentence(`Not all of the link could be used: ${problems.slice(0, 3).join('; ')}${more}`);
 }

@@ -5,7 +5,7 @@ import { nameSendButtons, send } from '../page/clipboard';
 import type { Clock } from '../page/clock';
 import { button, element, write } from '../page/dom';
 import { recall, remember } from '../page/storage';
-import { withMinus } from '../text';
+import { sentence, withMinus } from '../text';
 import type { World } from '../world';
 import type { Refusal } from './asker';
 import { decodeText, encodeText, LONGEST_TEXT } from './link';
@@ -203,7 +203,7 @@ export class WritePanel {
   private fail({ text, row }: Problem): void {
     this.leave();
     const where = row === null ? '' : `Row ${row}: `;
-    element('write-problem').textContent = `${where}${text}.`;
+    element('write-problem').textContent = sentence(`${where}${text}`);
     this.number(row);
   }
 
