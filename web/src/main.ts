@@ -1,7 +1,7 @@
 import { Agents } from './page/agents';
 import { fetchCore, fetchMujoco } from './page/boot';
 import { element } from './page/dom';
-import { focusWideFormulas, placeCharts } from './page/layout';
+import { focusWideFormulas, foldCharts, placeCharts } from './page/layout';
 import { warn } from './page/message';
 import { Page } from './page/page';
 import { showView, viewOf } from './page/views';
@@ -17,6 +17,7 @@ document.documentElement.dataset.script = 'running'; // for public/watch.js and 
 async function start(): Promise<Page> {
   showView(viewOf(location.hash));
   placeCharts();
+  foldCharts();
   focusWideFormulas();
   const progress = element<HTMLProgressElement>('progress');
   const [agents] = await Promise.all([

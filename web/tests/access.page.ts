@@ -112,9 +112,11 @@ test('at 400% the tour scrolls down, not sideways, and all of it can be reached'
         });
         if (share < 0.9) hidden.push(`${share} of ${one.textContent}`);
       }
-      const sizes = [...document.querySelectorAll('#dots button')].map((one) => {
+      const sizes = [
+        ...document.querySelectorAll('#tour-buttons > :is(button, select):not([hidden])'),
+      ].map((one) => {
         const { width, height } = one.getBoundingClientRect();
-        return Math.min(width, height);
+        return one.checkVisibility() ? Math.min(width, height) : Infinity;
       });
       return { hidden, width: document.documentElement.scrollWidth, dot: Math.min(...sizes) };
     });

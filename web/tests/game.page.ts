@@ -122,14 +122,16 @@ test('a try with the help of a hand does not count', async ({ stage: page }) => 
   await expect(page.locator('#motor-best')).toHaveText('–');
 });
 
-test('every step and view offers a film, MP4 first, with title and address', async ({
+test('the end of the tour and each view offer a film, MP4 first, with title and address', async ({
   stage: page,
 }) => {
-  for (const hash of ['tour=1', 'tour=5', 'tour=8', 'learn', 'write', 'everything']) {
+  for (const hash of ['tour=11', 'learn', 'write', 'everything']) {
     await open(page, `#${hash}`);
     await expect(page.locator('button.film:visible').first(), hash).toBeEnabled();
   }
-  await open(page, '#tour=4');
+  await open(page, '#tour=1');
+  await expect(page.locator('button.film:visible')).toHaveCount(0);
+  await open(page, '#tour=11');
   const type = await page.evaluate(() => {
     const types = ['avc1.640028', 'avc1.42E01F'].map((codec) => `video/mp4;codecs=${codec}`);
     const mp4 = [...types, 'video/mp4'].some((type) => MediaRecorder.isTypeSupported(type));
@@ -143,15 +145,15 @@ test('every step and view offers a film, MP4 first, with title and address', asy
       if (!this.canvas.isConnected) drawn.add(given[0]); // the film's canvas
       fillText.apply(this, given);
     };
-    document.querySelector<HTMLElement>('#tour-buttons .film')!.click();
+    document.querySelector<HTMLElement>('#step-end .film')!.click();
     await new Promise((resolve) => setTimeout(resolve, 500));
     CanvasRenderingContext2D.prototype.fillText = fillText;
     const now = performance.now.bind(performance);
     performance.now = () => now() + 5000; // the film ends
     return [...drawn];
   });
-  expect(await texts).toEqual(['Shove it', new URL(page.url()).host]);
+  expect(await texts).toEqual(['What you saw', new URL(page.url()).host]);
   expect((await download).suggestedFilename()).toBe(`upswing.${type}`);
-  await expect(page.locator('#tour-buttons .film')).toHaveText('Film 5 s');
+  await expect(page.locator('#step-end .film')).toHaveText('Film 5 s');
   await page.evaluate(() => delete (performance as Partial<Performance>).now);
 });

@@ -23,7 +23,7 @@ const hash = (file: Uint8Array) => createHash('sha256').update(file).digest('hex
 async function openLearn(page: Page): Promise<void> {
   await open(page, '#learn');
   await page.evaluate(() => {
-    upswing.learn.stop();
+    upswing.learn.forget();
     document.querySelector<HTMLDetailsElement>('#learn-options')!.open = true;
     for (const input of document.querySelectorAll<HTMLInputElement>('#learn-panel input')) {
       if (input.type === 'range') continue;
@@ -60,7 +60,7 @@ function filmTitle(page: Page): Promise<string[]> {
     const film = document.getElementById('learn-film')!;
     const label = film.textContent;
     film.click();
-    await globalThis.drawn();
+    while (drawn.size === 0) await globalThis.drawn();
     CanvasRenderingContext2D.prototype.fillText = fillText;
     const now = performance.now.bind(performance);
     performance.now = () => now() + 5000; // the film ends
@@ -150,7 +150,7 @@ test('an agent that learns in the tour stays, and equals that of Node and the pr
   await expect.poll(learned).toBe('d3qn');
   await page.locator('#tour-next').click();
   await expect.poll(learned).toBe('fast');
-  await page.getByRole('button', { name: 'Step 8:' }).click();
+  await page.getByRole('button', { name: 'Step 11:' }).click();
   await page.getByRole('link', { name: 'Everything, with your own agent' }).click();
   await expect(page.locator('#charts')).toBeVisible();
   await expect(page.locator('#agent')).toHaveValue('own');
@@ -352,9 +352,9 @@ test('a policy learned elsewhere takes the stage on return, and of four seeds on
   await openLearn(page);
   await page.evaluate(() => {
     const keep = upswing.keepLearned.bind(upswing);
-    upswing.keepLearned = async (file, shown) => {
-      document.body.dataset.kept = `${document.body.dataset.kept ?? ''}${file.name};`;
-      return keep(file, shown);
+    upswing.keepLearned = async (learned, shown) => {
+      document.body.dataset.kept = `${document.body.dataset.kept ?? ''}${learned.file.name};`;
+      return keep(learned, shown);
     };
   });
   await page.getByLabel('show the untrained agent too').check();
@@ -568,13 +568,16 @@ test('a race waits for a bet, trains both sides and can be shared', async ({ sta
   await expect(page.locator('#race-name-0')).toHaveText('Dueling Double DQN (balance weight 4)');
   await expect(page.locator('#race-name-1')).toHaveText('DQN');
   await expect(page.getByRole('button', { name: 'Start over' })).toBeHidden(); // only a bet starts
+  // Two pendulums on the stage, and the explanation after the race.
+  await expect(page.locator('#twin-name')).toHaveText(/^DQN, after [\d,]+ steps$/);
+  await expect(page.locator('#race-how')).toBeHidden();
   await page.evaluate(() => upswing.learn.stop());
   await expect(page.locator('#race-result')).toHaveText('The race was ended.');
   await expect(page.locator('#learn-start')).toBeHidden();
   await expect(one).toBeEnabled();
   await page.locator('#learn-rival').selectOption('');
   await expect(page.locator('#race')).toBeHidden();
-  await expect(page.locator('#learn-start')).toBeVisible();
+  await expect(page.locator('#learn-again')).toBeVisible();
 });
 
 test('an agent chosen before the first report stays', async ({ stage: page }) => {

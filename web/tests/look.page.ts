@@ -33,6 +33,9 @@ test('a noun lights its thing, under a mouse and from a tap to the next', async 
 }) => {
   await open(page);
   const lit = () => page.evaluate(() => upswing.scene.lit);
+  await page.evaluate(
+    () => (document.querySelector<HTMLDetailsElement>('#explain > details')!.open = true),
+  );
   const noun = page.locator('#explain .noun[data-thing=motor]');
   await noun.hover();
   await expect.poll(lit).toBe('motor');

@@ -120,7 +120,7 @@ test('a plant with a parameter of 0 is refused, and the charts go on', async ({ 
     await bring(page, ofPlant({ [name]: 0 }));
     await expect(page.locator('#message')).toContainText(`${name}: expected a number in [0.`);
     await expect(page.locator('#agent')).toHaveValue('d3qn');
-    await expect(page.locator('#q-value')).toHaveText(/costs \d/);
+    await expect(page.locator('#q-value')).toHaveText(/worst \d/);
   }
 });
 

@@ -112,10 +112,10 @@ async function setBack(page: Page): Promise<void> {
     localStorage.clear();
     delete document.documentElement.dataset.theme;
     for (const details of document.querySelectorAll('details')) {
-      details.open = details.matches('#explain > :first-child');
+      details.open = details.matches('#explain > :first-child, #more-charts');
     }
     delete (upswing.clock as Partial<Clock>).advance; // a test may have stopped it
-    upswing.learn.stop();
+    upswing.learn.forget();
     upswing.router.laboratoryHash = '';
     await upswing.agents.forgetOwn();
     scrollTo({ top: 0, behavior: 'instant' });
@@ -205,7 +205,12 @@ export function largestDifference(rows: number[][], others: number[][]): number 
 
 /// Sets a slider like a visitor's hand.
 export async function slide(page: Page, id: string, value: number): Promise<void> {
-  await page.locator(`#${id}`).fill(String(value));
+  const slider = page.locator(`#${id}`);
+  await slider.evaluate((one) => {
+    const details = one.closest('details');
+    if (details) details.open = true;
+  });
+  await slider.fill(String(value));
 }
 
 /// Place of a point of the pendulum's plane (m) on the screen.

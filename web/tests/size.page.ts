@@ -40,7 +40,7 @@ for (const id of ['d3qn', 'sac', 'any-pose', 'mpc']) {
 
 test('one slider sets the size, and all values are true ones', async ({ stage: page }) => {
   await open(page, '#agent=d3qn');
-  const size = page.getByLabel('Size', { exact: true });
+  const size = page.locator('#size');
   await expect(page.locator(text('size'))).toHaveText('1 m, a guitar');
   await slide(page, 'mass2', 1.2);
   await size.focus();
@@ -65,7 +65,7 @@ test('one slider sets the size, and all values are true ones', async ({ stage: p
 
 test('a link keeps the size, and Reset sliders sets it back', async ({ stage: page }) => {
   await open(page, '#agent=d3qn');
-  await page.getByLabel('Size', { exact: true }).focus();
+  await page.locator('#size').focus();
   await page.keyboard.press('End');
   await slide(page, 'mass1', 1.5);
   await expect(page).toHaveURL(/#agent=d3qn&size=10&mass1=1.5|#agent=d3qn&mass1=1.5&size=10/);

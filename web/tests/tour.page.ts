@@ -6,7 +6,7 @@ import { readPolicy } from './program';
 /// The guided tour: ways into it and out of it, and the truth of its sentences.
 
 // The numbers of the steps.
-const [MOTOR, LEARN, SHOVE, BET, VALUES, MAP] = [2, 3, 4, 5, 6, 7];
+const [MOTOR, LEARN, SHOVE, CHANGE, BET, POSE, VALUES, MAP] = [2, 3, 4, 6, 5, 8, 9, 10];
 
 /// Opens the page for a new visitor, or at a step of the tour.
 async function visit(page: Page, hash = ''): Promise<void> {
@@ -53,11 +53,16 @@ test('a new visitor gets the tour, which swings up before its agent and MuJoCo h
   expect(await page.evaluate(() => upswing.world.state)).toEqual(before);
   expect(await page.evaluate(() => upswing.world.agentOn)).toBe(true);
 
-  await expect(heading(page)).toHaveText('Two links, one motor');
+  await expect(heading(page)).toContainText('It learns to stand up in your browser');
   await expect(page.locator('#charts')).toBeHidden();
-  await advance(page, 8);
+  await advance(page, 6);
   await expect(page.locator('#badge')).toHaveText(/balanced/);
   await expect(answer(page)).toContainText('Balanced, after 80 minutes of practice');
+  // Then something happens: a shove, which it catches.
+  await advance(page, 4);
+  expect(await page.evaluate(() => upswing.world.shoved)).not.toBeNull();
+  await expect(answer(page)).toContainText('even when it is shoved');
+  expect(await balanced(page)).toBeGreaterThan(5);
   const text = Buffer.from(readPolicy('d3qn')).toString('latin1');
   const steps = Number(/"step":"(\d+)"/.exec(text)![1]);
   expect(Math.abs((steps * 0.02) / 4800 - 1)).toBeLessThan(0.1);
@@ -76,7 +81,7 @@ test('from step to step, by buttons, numbers and address, and back', async ({ st
   await visit(page);
   const steps = await page.locator('.step h2').allTextContents();
   for (const title of steps.slice(1)) {
-    await page.getByRole('button', { name: 'Next' }).click();
+    await page.locator('#tour-next').click();
     await expect(heading(page)).toHaveText(title);
     await expect(heading(page)).toBeFocused();
   }
@@ -292,7 +297,7 @@ test('the bars show the expected reward, and the highest is taken', async ({ sta
     return [(high - low) / policy!.rewardScale, high / policy!.rewardScale];
   });
   await expect(page.locator('#q-value')).toHaveText(
-    `the worst torque costs ${cost!.toFixed(1)} of ${all!.toFixed(0)} points`,
+    `best ${all!.toFixed(0)} points, worst ${cost!.toFixed(1)} less`,
   );
   await expect(page.locator('#q-value')).toBeVisible();
 
@@ -439,14 +444,16 @@ test('with reduced motion, every step waits for a button', async ({ stage: page 
   const count = await page.locator('.step').count();
   await visit(page, '#tour=1');
   for (let step = 1; step <= count; ++step) {
-    if (step > 1) await page.getByRole('button', { name: 'Next' }).click();
+    if (step > 1) await page.locator('#tour-next').click();
     const state = () => page.evaluate(() => upswing.world.state);
     const hanging = { q1: 0, q2: 0, w1: 0, w2: 0 };
     await expect.poll(state, `step ${step}`).toEqual(hanging); // once its agents have loaded
     await run(page, 1);
     expect(await state(), `step ${step}`).toEqual(hanging);
     const start = page.locator('#tour-start');
-    await expect(start).toBeVisible({ visible: [SHOVE, VALUES, MAP, count].includes(step) });
+    await expect(start).toBeVisible({
+      visible: [SHOVE, CHANGE, POSE, VALUES, MAP, count].includes(step),
+    });
     if (!(await start.isVisible())) continue;
     await start.click();
     await expect(start).toBeHidden();
@@ -469,10 +476,11 @@ test('at any size, pendulum, words, control and buttons are on one screen', asyn
   const count = await page.locator('.step').count();
   for (let step = 1; step <= count; ++step) {
     if (step > 1) await page.locator('#tour-next').click();
+    if (step === POSE) await expect(page.locator('#goals')).toBeVisible(); // its agent has loaded
     for (const [width, height] of SIZES) {
       await page.setViewportSize({ width, height });
       const bars = step === VALUES ? ['#q'] : [];
-      const tall = height >= 640 ? { [VALUES]: ['#neurons'], [LEARN]: ['#learn-curve'] }[step] : [];
+      const tall = height >= 1000 ? { [VALUES]: ['#neurons'] }[step] : [];
       const seen = await page.evaluate(
         async (others) => {
           scrollTo({ top: 0, behavior: 'instant' });
@@ -481,7 +489,7 @@ test('at any size, pendulum, words, control and buttons are on one screen', asyn
           const now = '.step:not([inert])';
           const groups = [
             ...[one('#scene'), one(`#tour-next, ${now} #tour-end`), one(`${now} h2`)],
-            one(`${now} fieldset, [data-step="map"] #map`),
+            one(`${now} fieldset, [data-step="map"] #map, [data-step="pose"] #goals`),
             ...others.map(one),
           ];
           const shares = new Promise<number[]>((resolve) => {

@@ -5,7 +5,7 @@ import type { Session } from './session';
 const LEFT = 42; // px
 const RIGHT = 42;
 const BOTTOM = 16;
-const MOST = 8; // reward per step, at least at the top of the chart
+const MOST = 4; // reward per step, at least at the top of the chart
 
 /// Chart of trainings over their steps: reward per step of trials and success at evaluations. The chosen
 /// training is in front, with a mark at the policy on the stage.

@@ -18,6 +18,11 @@ export class Lesson {
     button('lesson-next', () => this.next());
   }
 
+  /// Whether there is a question.
+  get asks(): boolean {
+    return this.asked !== null;
+  }
+
   /// Call after each change. `rewardScale`: factor of the rewards in the agent's values.
   show(session: Session | null, rewardScale: number): void {
     if (session !== this.session) {
@@ -62,10 +67,10 @@ export class Lesson {
     const { update, torque, guess, reward, next } = this.asked;
     write(
       element('lesson-guess'),
-      `Update ${whole(update)} looks at a step that the agent remembers. It turned with ` +
-        `${signed(torque)}\u00a0N·m and guessed that ${points(guess)} points follow. Its next few ` +
-        `steps brought ${points(reward)}, and from there it expects ${points(next)} more. Will its ` +
-        `guess go up or down?`,
+      `Update ${whole(update)} looks at a remembered step. The agent turned with ` +
+        `${signed(torque)}\u00a0N·m and guessed ${points(guess)} points. Then it got ` +
+        `${points(reward)}, and from there it expects ${points(next)} more. Will its guess go up ` +
+        `or down?`,
     );
     this.arrange(false);
   }

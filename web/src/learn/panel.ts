@@ -1,6 +1,8 @@
 import { addressOf } from '../page/address';
 import { send } from '../page/clipboard';
 import { CONTROL_PERIOD } from '../pendulum';
+import type { Learned } from '../page/laboratory';
+import { sentence as asSentence } from '../text';
 import type { Scene } from '../view/scene';
 import { button, element } from '../page/dom';
 import { note } from '../page/message';
@@ -22,6 +24,7 @@ import { RewardPanel } from './reward';
 import { decodeRecipe, encodeRecipe, LARGEST_SEED } from './recipe';
 import { Scrubber } from './scrubber';
 import type { LearnStage } from './scrubber';
+import { nameInRace, SecondPendulum } from './second_pendulum';
 import { Session } from './session';
 
 /// The panel of a training. Its agent learns in this page while the stage shows its attempts. The
@@ -38,6 +41,13 @@ const PROOFS = [
   [DOWN + UP, 'for a second'],
   [DOWN, 'for a moment'],
 ] as const;
+
+/// A visitor's own training, set aside.
+interface Aside {
+  readonly sessions: Session[];
+  readonly rival: string | undefined;
+  readonly course: Course | null;
+}
 
 /// A training's progress in words.
 export interface Story {
@@ -57,7 +67,7 @@ export interface LearnPage extends LearnStage {
   /// Called when a training has begun.
   learned(): void;
   /// Keeps a policy of a training as the visitor's own. True if it is on the stage now.
-  keepLearned(file: File, shown: boolean): Promise<boolean>;
+  keepLearned(learned: Learned, shown: boolean): Promise<boolean>;
 }
 
 export class LearnPanel {
@@ -75,6 +85,8 @@ export class LearnPanel {
   private readonly reward = new RewardPanel(() => this.start());
   private readonly slow = element<HTMLInputElement>('learn-slow');
   private rival: string | undefined; // of the race that is shown
+  private readonly second: SecondPendulum;
+  private aside: Aside | null = null; // the visitor's own training, while another reward is tried
   private sessions: Session[] = [];
   private recording: Recording | null = null; // null: not requested
   private readonly taken = new WeakSet<Session>(); // policy taken over already
@@ -86,6 +98,7 @@ export class LearnPanel {
   constructor(page: LearnPage, recorded: string) {
     this.page = page;
     this.strip = new Filmstrip(page.world);
+    this.second = new SecondPendulum(page.twin);
     this.race = new RacePanel(
       () => this.start(this.race.rival),
       () => this.offerRace(),
@@ -135,7 +148,7 @@ export class LearnPanel {
   /// Starts a training with the chosen seed and settings, or a race against a rival. If a value is
   /// invalid, shows the reason and lets the current training go on.
   start(rival: Rival | null = null): void {
-    if (!this.knobs.check()) return;
+    if (!this.knobs.check() || !this.reward.check()) return;
     for (const session of this.sessions) session.stop();
     const count = rival ? RACE_SEEDS : this.four.checked ? SEEDS_AT_ONCE : 1;
     const largest = LARGEST_SEED - (count - 1);
@@ -152,6 +165,30 @@ export class LearnPanel {
     this.rival = rival?.id;
     this.race.begun();
     this.choose(this.sessions[0]!);
+  }
+
+  /// Trains an agent with another reward. The visitor's own training waits, and goes on if it has not
+  /// ended.
+  tryReward(reward: string): void {
+    if (this.aside) for (const session of this.sessions) session.stop();
+    this.aside ??= { sessions: this.sessions, rival: this.rival, course: this.scrubber.course };
+    const recipe = { agent: LEARNERS[0]!, seed: 1, settings: { reward } };
+    this.sessions = [new Session(recipe, () => this.news())];
+    this.rival = undefined;
+    this.choose(this.sessions[0]!);
+  }
+
+  /// Ends a training with another reward, and goes back to the one before it.
+  endTry(): void {
+    const { aside } = this;
+    if (!aside) return;
+    for (const session of this.sessions) session.stop();
+    this.sessions = aside.sessions;
+    this.rival = aside.rival;
+    this.aside = null;
+    this.scrubber.back(aside.course);
+    this.listCourses();
+    this.draw();
   }
 
   /// The changed settings.
@@ -199,6 +236,20 @@ export class LearnPanel {
     return problems;
   }
 
+  /// Trains the agent of a tour's address, for a visitor who has none.
+  learnFor(hash: string): void {
+    const fields = new URLSearchParams(hash.replace(/^#/, ''));
+    if (!fields.has('learn') || this.sessions.length > 0) return;
+    if (this.page.agents.ownName !== null) return;
+    fields.delete('tour');
+    const { recipe } = decodeRecipe(fields.toString(), LEARNERS, (agent) =>
+      this.knobs.settingsOf(agent),
+    );
+    if (!recipe) return;
+    this.sessions = [new Session(recipe, () => this.news())];
+    this.choose(this.sessions[0]!);
+  }
+
   /// The shown training as the part of an address after #; without a training, only the view.
   get address(): string {
     const { session, rival, race } = this;
@@ -211,6 +262,17 @@ export class LearnPanel {
   /// Ends all trainings.
   stop(): void {
     for (const session of this.sessions) session.stop();
+    this.draw();
+  }
+
+  /// Ends and forgets all trainings, as for a new visitor.
+  forget(): void {
+    for (const session of this.sessions) session.stop();
+    this.sessions = [];
+    this.rival = undefined;
+    this.aside = null;
+    this.scrubber.back(null);
+    this.listCourses();
     this.draw();
   }
 
@@ -280,6 +342,11 @@ export class LearnPanel {
     return session?.running && scrubber.follows ? session.poses : [];
   }
 
+  /// Whether there is an update of the network to ask about.
+  get asks(): boolean {
+    return this.lesson.asks;
+  }
+
   /// Whether a training runs now.
   get running(): boolean {
     return this.sessions.some((session) => session.running);
@@ -342,7 +409,9 @@ export class LearnPanel {
   /// Once a training has solved the task, keeps its best policy as the visitor's own, unless that
   /// would replace a file that the visitor brought.
   private async takeOver(): Promise<void> {
-    const { session, scrubber } = this;
+    const { aside, scrubber } = this;
+    // A tried reward leaves the visitor's own agent as it is.
+    const session = aside ? aside.sessions.find((one) => one === aside.course) : this.session;
     if (!session?.last?.solved || session.state !== 'finished' || this.taken.has(session)) return;
     this.taken.add(session);
     const { ownName, ownIsLearned } = this.page.agents;
@@ -350,7 +419,8 @@ export class LearnPanel {
     const { newest } = session;
     const file = newest && fileOf(session, newest);
     if (!file) return;
-    const shown = await this.page.keepLearned(file, scrubber.follows && scrubber.onStage);
+    const isShown = !aside && scrubber.follows && scrubber.onStage;
+    const shown = await this.page.keepLearned({ file, recipe: encodeRecipe(session) }, isShown);
     if (shown) scrubber.again();
   }
 
@@ -361,7 +431,8 @@ export class LearnPanel {
     const { ownName, ownIsLearned } = this.page.agents;
     const question = `This replaces your own policy, ${ownName}, in this browser. Replace it?`;
     if (!file || (ownName !== null && !ownIsLearned && !confirm(question))) return;
-    if (await this.page.keepLearned(file, true)) this.scrubber.again();
+    const recipe = this.recipeOfShown;
+    if (await this.page.keepLearned({ file, recipe }, true)) this.scrubber.again();
     this.draw();
     note('It stays in this browser. The lists of agents mark it with "(yours)".');
   }
@@ -388,6 +459,13 @@ export class LearnPanel {
   private file(): File | null {
     const { session, shown } = this;
     return session && shown ? fileOf(session, shown) : null;
+  }
+
+  /// The recipe of the policy on the stage; empty for one on the way, which no recipe gives.
+  private get recipeOfShown(): string {
+    const { session, shown } = this;
+    const isLast = session?.state === 'finished' && shown?.step === session.newest?.step;
+    return isLast ? encodeRecipe(session) : '';
   }
 
   /// Whether the policy on the stage is the visitor's own already.
@@ -439,10 +517,18 @@ export class LearnPanel {
         onStage ? scrubber.step : null,
       );
     this.race.show(sides);
+    if (onStage) this.second.show(sides?.[1][0] ?? null);
+    if (sides && onStage) {
+      const [first] = sides[0];
+      element('first-name').textContent = nameInRace(first!, scrubber.step);
+    }
     this.reward.show(session);
     this.lesson.show(sides ? null : session, page.world.policy?.rewardScale ?? 1);
     element('learn-figure').toggleAttribute('data-race', sides !== null);
     this.strip.show(session?.state === 'finished' ? session : null);
+    // Of the built-in reward and task; tests of the recording are longer than trials.
+    const isUsual = session !== null && !Object.keys(session.settings).some(changesRewards);
+    element('learn-best').hidden = course !== null && !isUsual;
     const running = this.active.length > 0;
     const label = this.paused ? 'Resume training' : running ? 'Pause training' : 'Learn';
     element('learn-start').textContent = label;
@@ -450,6 +536,9 @@ export class LearnPanel {
     const races = this.race.rival !== null;
     element('learn-start').hidden = races && !running;
     element('learn-again').hidden = races || this.sessions.length === 0;
+    // A training that has ended is not learned again by the same button.
+    if (this.sessions.length > 0 && !running) element('learn-start').hidden = true;
+    document.documentElement.toggleAttribute('data-begun', this.sessions.length > 0 || !!course);
     const has = session !== null && session.policy !== null;
     element<HTMLButtonElement>('learn-save').disabled = !has;
     element<HTMLButtonElement>('learn-keep').disabled = !has || this.isKept;
@@ -493,7 +582,7 @@ export class LearnPanel {
     write('steps', count(now ? session.steps : scrubber.step));
     write('trials', count(after?.trials));
     write('updates', count(after?.updates));
-    write('rate', now ? session.updatesPerSecond.toFixed(0) : '–');
+    write('rate', now && session.running ? session.updatesPerSecond.toFixed(0) : '–');
     write('time', after ? `${after.seconds.toFixed(1)} s` : '–');
     write('success', success === undefined ? '–' : `${(100 * success).toFixed(0)}%`);
     const where = now ? 'as it is now' : `after ${count(scrubber.step)} steps`;
@@ -550,13 +639,17 @@ function milestone(session: Session): string {
     return `It passes ${Math.round(100 * success)} of 100 tests${steady}`;
   }
   // With another reward or goal, returns prove nothing.
-  if (Object.keys(settings).some((name) => /reward|_weight$|any_pose/.test(name)))
-    return 'Learning …';
+  if (Object.keys(settings).some(changesRewards)) return 'Learning …';
   for (const [proof, long] of PROOFS) {
     const trial = episodes.findIndex(({ reward }) => reward > proof);
     if (trial >= 0) return `Upright ${long}: trial ${trial + 1}.`;
   }
   return 'Learning …';
+}
+
+/// Whether returns with this setting cannot be compared with the usual ones.
+function changesRewards(setting: string): boolean {
+  return /reward|_weight$|any_pose/.test(setting);
 }
 
 /// The policy on the stage, which is not the newest one.
@@ -567,7 +660,11 @@ function earlier(session: Session, step: number): string {
 
 function sentence(session: Session): string {
   const { state, last, reason, seconds, settings } = session;
-  if (state === 'failed') return `Training failed: ${reason}.`;
+  if (state === 'failed') {
+    // The editor of the reward shows the whole message.
+    if (reason.startsWith('reward:')) return 'The reward cannot be used: see the message below it.';
+    return asSentence(`Training failed: ${reason}`);
+  }
   if (state === 'paused') return 'Paused.';
   if (state === 'stopped') return 'Ended.';
   if (state !== 'finished' || !last) return 'Learning …';

@@ -44,7 +44,6 @@ export class RacePanel {
     if (!rival) return;
     this.bets[0]!.textContent = own;
     this.bets[1]!.textContent = rival.name;
-    element('race-how').hidden = !isFamily([agent, rival.agent]);
   }
 
   /// Call when other trainings have begun.
@@ -60,7 +59,8 @@ export class RacePanel {
     const goesOn = runs.some(({ active }) => active);
     for (const bet of this.bets) bet.disabled = goesOn;
     const ended = runs.length > 0 && runs.every(({ state }) => state === 'finished');
-    element('race-why').hidden = !ended || !isFamily(runs.map(({ agent }) => agent));
+    const explained = ended && isFamily(runs.map(({ agent }) => agent));
+    for (const id of ['race-how', 'race-why']) element(id).hidden = !explained;
     sides?.forEach(([first], side) => {
       write(element(`race-name-${side}`), nameOf(first!.agent, first!.settings));
     });

@@ -1,5 +1,6 @@
 import { element, write } from '../page/dom';
-import { withMinus } from '../text';
+import { warn } from '../page/message';
+import { sentence, withMinus } from '../text';
 import { Canvas } from '../view/canvas';
 import type { Session } from './session';
 
@@ -9,6 +10,7 @@ import type { Session } from './session';
 /// The built-in reward as an expression.
 export const USUAL_REWARD =
   'energy: E; height: h; balance: 5*inverted; calm: -0.01*inverted*(w1^2 + w2^2); effort: -(0.01 + 0.04*inverted)*tau^2';
+const EMPTY = 'The reward is empty. Write a term, such as h, or go back to the first one.';
 const ROW = 18; // px
 const NAME = 96; // px, of a name at the left
 const VALUE = 52; // px, of a number at the right
@@ -17,12 +19,25 @@ const VALUE = 52; // px, of a number at the right
 export class RewardPanel {
   private readonly text = element<HTMLTextAreaElement>('reward-text');
   private readonly canvas = new Canvas('reward-terms');
+  private refused = false; // because it is empty
 
   /// `learn`: starts a training.
   constructor(learn: () => void) {
     this.set(undefined);
     element('reward-learn').addEventListener('click', learn);
+    this.text.addEventListener('input', () => (this.refused = false));
     element('reward-reset').addEventListener('click', () => this.set(undefined));
+  }
+
+  /// Whether there is a reward. An empty text is none: says so.
+  check(): boolean {
+    this.refused = this.text.value.trim() === '';
+    if (!this.refused) return true;
+    this.text.closest('details')!.open = true;
+    write(element('reward-problem'), EMPTY);
+    if (this.text.offsetParent) this.text.focus();
+    else warn(EMPTY); // in another view or step
+    return false;
   }
 
   /// The expression if it is not the built-in reward.
@@ -33,6 +48,7 @@ export class RewardPanel {
 
   /// Shows an expression; undefined: the built-in reward.
   set(reward: string | undefined): void {
+    this.refused = false;
     this.text.value = (reward ?? USUAL_REWARD).replace(/;\s*/g, ';\n');
     if (reward) this.text.closest('details')!.open = true;
   }
@@ -42,7 +58,7 @@ export class RewardPanel {
   show(session: Session | null): void {
     const reason = session?.state === 'failed' ? session.reason : '';
     const problems = reason.startsWith('reward:') ? [reason] : (session?.last?.warnings ?? []);
-    write(element('reward-problem'), problems.map((problem) => `${problem}.`).join(' '));
+    write(element('reward-problem'), this.refused ? EMPTY : problems.map(sentence).join(' '));
     const sums = session ? session.terms : [];
     this.canvas.element.hidden = sums.length === 0;
     this.canvas.element.style.height = `${ROW * sums.length}px`;

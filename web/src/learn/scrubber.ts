@@ -2,6 +2,7 @@ import { BadInput } from '../bad_input';
 import { element } from '../page/dom';
 import { warn } from '../page/message';
 import { Policy } from '../policy';
+import { sentence } from '../text';
 import type { World } from '../world';
 import type { Checkpoint, Course } from './course';
 
@@ -14,7 +15,12 @@ export interface LearnStage {
   setAgentOn(on: boolean): void;
   /// Hangs the pendulum.
   reset(): void;
-  readonly twin: { show(policy: Policy | null, name: string): void };
+  readonly twin: {
+    readonly policy: Policy | null; // on the second pendulum
+    show(policy: Policy | null, name: string): void;
+    /// Gives the second pendulum another policy while it moves on.
+    change(policy: Policy, name: string): void;
+  };
 }
 
 /// Puts policies of a training on the stage, where each makes one attempt after another: the newest
@@ -59,6 +65,14 @@ export class Scrubber {
   again(): void {
     const policy = this.follows ? this.course?.newest : this.checkpoint;
     if (policy) void this.show(policy);
+  }
+
+  /// Goes back to another training, or to none, and changes nothing on the stage.
+  back(course: Course | null): void {
+    this.course = course;
+    this.given = this.checkpoint = null;
+    this.follows = true;
+    this.leave();
   }
 
   /// Leaves the stage to others until the next policy is shown.
@@ -169,7 +183,11 @@ async function policyOf({ step, file }: Checkpoint): Promise<Policy | null> {
     return new Policy(file instanceof ArrayBuffer ? file : await file());
   } catch (error) {
     if (!(error instanceof BadInput)) throw error;
-    warn(`The agent after ${step.toLocaleString('en')} steps cannot be shown: ${error.message}.`);
+    warn(
+      sentence(
+        `The agent after ${step.toLocaleString('en')} steps cannot be shown: ${error.message}`,
+      ),
+    );
     return null;
   }
 }

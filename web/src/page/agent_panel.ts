@@ -1,5 +1,5 @@
 import { BadInput } from '../bad_input';
-import { printable, quoted } from '../text';
+import { printable, quoted, sentence } from '../text';
 import { LearningCurve } from '../view/charts';
 import type { Agent, Agents } from './agents';
 import { element } from './dom';
@@ -62,10 +62,10 @@ export class AgentPanel {
     return this.load(() => this.agents.get(id), `Agent ${quoted(id)} cannot be used`);
   }
 
-  /// The same with a visitor's own file, or a policy `learned` in the page.
-  open(file: File, learned: boolean): Promise<boolean> {
+  /// The same with a visitor's own file, or a policy learned in the page by `recipe`.
+  open(file: File, recipe: string | null): Promise<boolean> {
     const refusal = `"${printable(file.name, NAME)}" cannot be used as a policy`;
-    return this.load(() => this.agents.open(file, learned), refusal);
+    return this.load(() => this.agents.open(file, recipe), refusal);
   }
 
   /// `refusal`: begins the message of a failure.
@@ -83,7 +83,7 @@ export class AgentPanel {
       if (!(error instanceof BadInput)) throw error;
       if (request !== this.requests) return false;
       this.busy = false;
-      warn(`${refusal}: ${error.message}.`);
+      warn(sentence(`${refusal}: ${error.message}`));
       this.show();
       return false;
     }
@@ -96,10 +96,11 @@ export class AgentPanel {
   show(): void {
     const { agent, agents } = this;
     const select = element<HTMLSelectElement>('agent');
-    select.replaceChildren(...agents.list.map(({ id, title }) => new Option(title, id)));
+    select.replaceChildren(...optionsOf(agents.list));
     this.listener.listed();
     element<HTMLButtonElement>('agent-on').disabled = agent === null;
     element('own').hidden = agents.ownName === null;
+    document.documentElement.toggleAttribute('data-yours', agents.ownIsLearned);
     element('own-name').textContent = agents.ownName;
     element('agent-details').hidden = agent === null;
     if (!agent) {
@@ -123,4 +124,14 @@ export class AgentPanel {
   private drawCurve(): void {
     this.curve.draw(this.agent?.curve ?? null);
   }
+}
+
+/// Options of agents: the main ones, then a group of the others.
+export function optionsOf(list: Agents['list']): HTMLElement[] {
+  const option = ({ id, title }: { id: string; title: string }) => new Option(title, id);
+  const others = list.filter(({ main }) => !main).map(option);
+  const group = document.createElement('optgroup');
+  group.label = 'more';
+  group.append(...others);
+  return [...list.filter(({ main }) => main).map(option), ...(others.length > 0 ? [group] : [])];
 }

@@ -59,6 +59,9 @@ const TITLES = new Map([
   [ANY_POSE, 'Any pose: you choose'],
 ]);
 
+/// The agents that lists show first.
+const MAIN = ['d3qn', 'fast', 'd3qn-adaptive', 'sac', ANY_POSE];
+
 /// Descriptions of the page's agents, in plain words.
 const CAN = 'It swings up and balances the pendulum that it learned with.';
 const PLAIN: ReadonlyMap<string, string> = new Map([
@@ -242,14 +245,17 @@ export class Agents {
     throw new BadInput(`${LIST} is not a list of agents`);
   }
 
-  /// All agents, by id and title.
-  get list(): { id: string; title: string }[] {
+  /// All agents, by id and title. `main`: whether lists show it before the others.
+  get list(): { id: string; title: string; main: boolean }[] {
     const list = [...this.entries.values()].map((entry) => ({
       id: entry.id,
       title: titleOf(entry),
+      main: MAIN.includes(entry.id) || !TITLES.has(entry.id), // also a run that the visitor serves
     }));
-    for (const [id, [title]] of COMPUTED) if (!this.entries.has(id)) list.push({ id, title });
-    return this.own ? [...list, { id: OWN, title: ownTitle(this.own) }] : list;
+    for (const [id, [title]] of COMPUTED) {
+      if (!this.entries.has(id)) list.push({ id, title, main: false });
+    }
+    return this.own ? [...list, { id: OWN, title: ownTitle(this.own), main: true }] : list;
   }
 
   /// Whether an agent is loaded.
@@ -313,15 +319,22 @@ export class Agents {
     return this.own?.learned ?? false;
   }
 
-  /// Reads and checks a visitor's file, or a policy `learned` in the page. Keeps it in this browser
-  /// for the next visit, if allowed. Throws BadInput.
-  async open(file: File, learned = false): Promise<Agent> {
+  /// The part of an address with which the visitor's own policy learns again; empty if it was not
+  /// learned here, or by an earlier version of the page.
+  get ownRecipe(): string {
+    return this.own?.recipe ?? '';
+  }
+
+  /// Reads and checks a visitor's file, or a policy learned in the page by `recipe` (null: not learned
+  /// here). Keeps it in this browser for the next visit, if allowed. Throws BadInput.
+  async open(file: File, recipe: string | null = null): Promise<Agent> {
     if (file.size > MAX_FILE_BYTES) throw new BadInput(`it is ${largerThan(MAX_FILE_BYTES)}`);
     const bytes = await file.arrayBuffer().catch(() => {
       throw new BadInput('it cannot be read');
     });
     if (!isSafetensors(bytes)) throw new BadInput('not a valid safetensors file');
-    const own = { name: file.name, bytes, learned };
+    const own: KeptFile = { name: file.name, bytes, learned: recipe !== null };
+    if (recipe) own.recipe = recipe;
     const agent = this.addOwn(own);
     this.own = own;
     await rememberFile(OWN, own);

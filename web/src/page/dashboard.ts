@@ -44,6 +44,11 @@ export class Dashboard {
     return [energy, height, torque, phase, decision, neurons].map((c) => c.canvas);
   }
 
+  /// Whether a chart that changes all the time is in sight.
+  get inSight(): boolean {
+    return this.canvases.some((canvas) => canvas.shown);
+  }
+
   draw(world: World, history: History): void {
     const turn = this.frame++;
     const moments = history.from(world.time - SECONDS_SHOWN);
@@ -152,7 +157,7 @@ export function decisionText(decision: Decision, rewardScale: number, shown: Sho
       const best = decision.q[decision.action]!;
       const cost = reward(best - Math.min(...decision.q));
       const all = withMinus((best / rewardScale).toFixed(0));
-      return `the worst torque costs ${cost} of ${all} points`;
+      return `best ${all} points, worst ${cost} less`;
     }
     case 'gaussian': {
       const { torque, low, high } = decision;

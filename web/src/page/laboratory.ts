@@ -1,6 +1,6 @@
 import type { History } from '../history';
 import { GOALS, PLANT_LIMITS } from '../pendulum';
-import type { GoalName, State } from '../pendulum';
+import type { GoalName, Parameter, Plant, State } from '../pendulum';
 import { quoted } from '../text';
 import { AgentPanel } from './agent_panel';
 import type { Agent, Agents } from './agents';
@@ -13,7 +13,14 @@ import { Ring } from './ring';
 import { Settings } from './settings';
 import { BEGINNING, disturbanceOf, OWN } from './share';
 import type { Shared } from './share';
+import type { Slider } from './sliders';
 import type { PendulumStage } from './stage';
+
+/// A policy that was learned in the page, and the part of an address with which it learns again.
+export interface Learned {
+  readonly file: File;
+  readonly recipe: string;
+}
 
 /// The controls of the pendulum on the stage (agent, goal, plant, sensors, motor), and its charts.
 export class Laboratory {
@@ -59,6 +66,11 @@ export class Laboratory {
     return this.map.busy || this.ring.busy;
   }
 
+  /// Whether a chart that changes all the time is in sight.
+  get chartsInSight(): boolean {
+    return this.map.canvas.shown || this.dashboard.inSight;
+  }
+
   get canvases() {
     return [this.map.canvas, ...this.dashboard.canvases];
   }
@@ -100,8 +112,8 @@ export class Laboratory {
 
   /// Changes to a visitor's own policy and to its training plant. False if it cannot be loaded or a
   /// later request replaced it.
-  async openFile(file: File, learned = false): Promise<boolean> {
-    if (!(await this.agentPanel.open(file, learned))) return false;
+  async openFile(file: File, recipe: string | null = null): Promise<boolean> {
+    if (!(await this.agentPanel.open(file, recipe))) return false;
     const { plant, trainedSize } = this.agent!.policy;
     const [low, high] = PLANT_LIMITS.size;
     this.settings.setPlant({ ...plant, size: Math.min(Math.max(trainedSize, low), high) });
@@ -111,9 +123,9 @@ export class Laboratory {
 
   /// Keeps a policy learned in the page as the visitor's own, also on the stage if `shown`. True if
   /// it is there now.
-  async keepLearned(file: File, shown: boolean): Promise<boolean> {
-    if (shown) return this.openFile(file, true);
-    await this.agents.open(file, true);
+  async keepLearned({ file, recipe }: Learned, shown: boolean): Promise<boolean> {
+    if (shown) return this.openFile(file, recipe);
+    await this.agents.open(file, recipe);
     this.agentPanel.show();
     return false;
   }
@@ -127,6 +139,16 @@ export class Laboratory {
 
   toggleAgent(): void {
     this.setAgentOn(!this.stage.world.agentOn);
+  }
+
+  /// Makes a slider of the plant with this ID.
+  plantSlider(name: Parameter | 'size', id: string): Slider {
+    return this.settings.plantSlider(name, id);
+  }
+
+  setPlant(plant: Plant): void {
+    this.settings.setPlant(plant);
+    this.stage.changed();
   }
 
   /// Sets the map's first quantity.
@@ -189,7 +211,7 @@ export class Laboratory {
   }
 
   /// Sets the pose to reach, also during a motion.
-  private setGoal(name: GoalName): void {
+  setGoal(name: GoalName): void {
     this.stage.world.goal = GOALS[name];
     this.stage.changed();
   }

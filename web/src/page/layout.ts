@@ -19,12 +19,25 @@ export function placeCharts(): void {
     else place.prepend(q);
   }
   if (view !== 'everything') beside.append(map);
-  else if (map.parentElement !== charts) element('phase-figure').before(map);
-  const grown = element('learn-figure');
-  if (view === 'tour') element('step-learn').append(grown);
-  else element('learn-view').prepend(grown);
+  else if (map.parentElement === beside) element('phase-figure').before(map);
+  const [grown, question] = [element('learn-figure'), element('lesson-question')];
+  const editor = element('reward-details');
+  if (view === 'tour') {
+    element('learn-now').append(grown);
+    element('learn-ask').append(question);
+    element('step-reward').append(editor);
+  } else {
+    element('learn-view').prepend(grown);
+    element('lesson').append(question);
+    element('learn-words-meaning').after(editor);
+  }
 }
 wide.addEventListener('change', placeCharts);
+
+/// Folds the charts where they are not next to the pendulum.
+export function foldCharts(): void {
+  element<HTMLDetailsElement>('more-charts').open = wide.matches;
+}
 
 /// Opens the explanations of reward, DQN, Double and Dueling, and scrolls to them.
 export function explain(): void {
@@ -61,4 +74,30 @@ function showStage(): void {
   const stage = element('stage');
   stage.focus({ preventScroll: true });
   stage.scrollIntoView({ block: 'start', behavior: prefersStill() ? 'instant' : 'smooth' });
+}
+
+/// Keeps the pendulum in sight while a slider is dragged: it moves to the end of the screen where the
+/// slider is not.
+export function keepStageInSight(): void {
+  const stage = element('stage');
+  const cell = element('stage-cell');
+  const root = document.documentElement;
+  const ends = ['pointerup', 'pointercancel'] as const;
+  const drop = () => {
+    delete root.dataset.dragged;
+    cell.style.minHeight = '';
+    for (const end of ends) removeEventListener(end, drop);
+  };
+  element('plant-settings')
+    .closest('aside')!
+    .addEventListener('pointerdown', ({ target }) => {
+      if (!(target instanceof HTMLInputElement) || target.type !== 'range') return;
+      const { top, bottom } = stage.getBoundingClientRect();
+      const isInSight = bottom - Math.max(top, 0) > innerHeight * 0.3;
+      if (isInSight) return;
+      cell.style.minHeight = `${cell.offsetHeight}px`; // the page keeps its length
+      const isBelow = target.getBoundingClientRect().top > innerHeight / 2;
+      root.dataset.dragged = isBelow ? 'below' : 'above';
+      for (const end of ends) addEventListener(end, drop);
+    });
 }

@@ -1,7 +1,7 @@
 import { core } from '../core';
 import { LearnPanel } from '../learn/panel';
 import type { Mujoco } from '../mujoco';
-import type { State } from '../pendulum';
+import type { GoalName, Parameter, Plant, State } from '../pendulum';
 import type { World } from '../world';
 import type { Agents } from './agents';
 import { nameSendButtons } from './clipboard';
@@ -10,15 +10,21 @@ import { listenToFilms } from './film';
 import { Frames } from './frames';
 import { listenToKeys } from './keys';
 import { Laboratory } from './laboratory';
+import type { Learned } from './laboratory';
 import { prefersStill } from './motion';
+import { keepStageInSight } from './layout';
 import { lightNouns } from './nouns';
 import { Router } from './router';
 import { save } from './save';
 import type { Shared } from './share';
 import { restoreOnScroll } from './sliders';
+import type { Slider } from './sliders';
 import { PendulumStage } from './stage';
 import { changeTheme, onThemeChange } from './theme';
+import { TRAIL_SECONDS } from '../view/scene';
 import { Tour } from './tour';
+
+const FADING = 250; // ms between two drawings of a trail that fades
 
 /// The page: stage, laboratory, training and tour, connected with each other.
 export class Page {
@@ -28,11 +34,9 @@ export class Page {
   readonly learn: LearnPanel;
   readonly tour: Tour;
   readonly router: Router;
-  private readonly frames = new Frames(
-    (seconds) => this.frame(seconds),
-    () => !this.stage.paused && (!this.world.resting || this.learn.running),
-    () => this.learn.running,
-  );
+  private readonly frames = new Frames(this);
+  private fadesUntil = 0; // s, in the world's time: the end of the trail that is in sight
+  private restedAt = 0; // ms, of the last drawing of a page at rest
 
   constructor(world: World, agents: Agents) {
     this.agents = agents;
@@ -56,7 +60,7 @@ export class Page {
       this.stage.history.add(moment, this.stage.world.plant.size);
       this.tour.moment(moment);
     };
-    world.onChange = () => this.frames.wake();
+    world.onChange = () => this.frames.stir();
   }
 
   // What training, tour and editor need of the stage and the laboratory.
@@ -105,8 +109,20 @@ export class Page {
     return this.laboratory.choose(id);
   }
 
-  keepLearned(file: File, shown: boolean): Promise<boolean> {
-    return this.laboratory.keepLearned(file, shown);
+  keepLearned(learned: Learned, shown: boolean): Promise<boolean> {
+    return this.laboratory.keepLearned(learned, shown);
+  }
+
+  plantSlider(name: Parameter | 'size', id: string): Slider {
+    return this.laboratory.plantSlider(name, id);
+  }
+
+  setPlant(plant: Plant): void {
+    this.laboratory.setPlant(plant);
+  }
+
+  setGoal(name: GoalName): void {
+    this.laboratory.setGoal(name);
   }
 
   setAgentOn(on: boolean): void {
@@ -166,6 +182,7 @@ export class Page {
     };
     listenToKeys(actions, () => router.keys);
     restoreOnScroll();
+    keepStageInSight();
     button('save', () => save(stage.history));
     nameSendButtons();
     listenToFilms(
@@ -201,21 +218,49 @@ export class Page {
     this.frames.wake();
   }
 
-  private frame(seconds: number): void {
-    this.stage.advance(seconds);
-    this.draw();
-    if (this.laboratory.computing) this.frames.wake();
+  // For the frames.
+
+  get moving(): boolean {
+    return !this.stage.paused && (!this.world.resting || this.learn.running);
   }
 
-  private draw(): void {
+  get learning(): boolean {
+    return this.learn.running;
+  }
+
+  get visible(): boolean {
+    const { laboratory, stage, world } = this;
+    if (stage.stirs) this.fadesUntil = world.time + TRAIL_SECONDS;
+    return stage.stirs || laboratory.chartsInSight || this.learn.running;
+  }
+
+  get sudden(): boolean {
+    return this.world.push !== null;
+  }
+
+  /// Words of a page at rest, and a trail that fades.
+  rest(): void {
+    const { tour, scene, stage, world } = this;
+    const now = performance.now();
+    const fades = world.time < this.fadesUntil && now - this.restedAt > FADING;
+    if (!fades) {
+      tour.follow(world, scene);
+      return stage.drawBadge();
+    }
+    this.restedAt = now;
+    this.draw();
+  }
+
+  draw(): void {
     const { laboratory, learn, router, scene, stage, tour, world } = this;
     const { step } = document.documentElement.dataset;
-    const hasRing = (router.learning && learn.begun) || step === 'map';
+    const hasRing = (router.learning && learn.begun && step !== 'reward') || step === 'map';
     stage.draw(laboratory.ringColors(hasRing, learn.lastTest ?? world.policy));
     tour.follow(world, scene);
     learn.follow();
     if (router.learning && !prefersStill()) scene.ghosts = learn.ghosts;
     laboratory.draw(stage.history);
     stage.drawBadge();
+    if (laboratory.computing) this.frames.wake();
   }
 }

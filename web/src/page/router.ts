@@ -94,6 +94,7 @@ export class Router {
     placeCharts();
     stage.setPaused(false);
     if (view.name === 'tour') {
+      learn.learnFor(hash);
       return tour.go(view.step, false, new URLSearchParams(hash.slice(1)).get('ghost') ?? '');
     }
     const learns = view.name === 'learn';
@@ -133,7 +134,7 @@ export class Router {
   arranged(): void {
     const { laboratory, learn } = this.parts;
     const { step } = document.documentElement.dataset;
-    this.learning_ = this.view === 'learn' || step === 'learn';
+    this.learning_ = this.view === 'learn' || step === 'learn' || step === 'reward';
     laboratory.mapAtRest = this.view !== 'everything';
     if (!this.learning) learn.leave();
   }

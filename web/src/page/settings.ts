@@ -4,6 +4,7 @@ import { NOMINAL, PLANT_LIMITS, plantProblem } from '../pendulum';
 import type { Parameter, Plant, Range } from '../pendulum';
 import type { Policy } from '../policy';
 import { quantity, sizeText } from '../quantity';
+import { sentence } from '../text';
 import type { World } from '../world';
 import { element } from './dom';
 import { warn } from './message';
@@ -136,31 +137,18 @@ function placeOf(size: number): number {
 /// The sliders of the plant, its sensors and its motor. Their values are in units of size 1; their
 /// texts are in SI units.
 export class Settings {
-  private readonly size: Slider;
-  private readonly plant = new Map<Parameter, Slider>();
+  private readonly sizes: Slider[] = []; // sliders of the size, which show the same value
+  private readonly plant = new Map<Parameter, Slider[]>();
   private readonly world: World;
+  private readonly onChange: () => void;
   private readonly disturbance = new Map<keyof Disturbance, Slider>();
   private strongest = 0; // N·m, of the agent
 
   constructor(world: World, onChange: () => void) {
     this.world = world;
-    this.size = this.makeSize(onChange);
-    for (const row of PLANT) {
-      const { name, unit } = row;
-      const format = (value: number) => quantity(value, world.units.of(name), unit);
-      const spec = { ...row, format, limits: PLANT_LIMITS[name], initial: NOMINAL[name] };
-      const slider = new Slider(spec, (value) => {
-        const plant = { ...world.plant, [name]: value };
-        const problem = plantProblem(plant);
-        if (problem) {
-          slider.value = world.plant[name];
-          return warn(`${problem}.`);
-        }
-        world.plant = plant;
-        onChange();
-      });
-      this.plant.set(name, slider);
-      element('plant-sliders').append(slider.element);
+    this.onChange = onChange;
+    for (const name of ['size', ...PLANT.map(({ name }) => name)] as const) {
+      element('plant-sliders').append(this.plantSlider(name, name).element);
     }
     for (const row of DISTURBANCE) {
       const spec = { ...row, format: (value: number) => row.format(value, world) };
@@ -173,25 +161,50 @@ export class Settings {
     }
   }
 
-  private makeSize(onChange: () => void): Slider {
+  /// Makes a slider of the plant with this ID. All sliders of the same quantity show the same value.
+  plantSlider(name: Parameter | 'size', id: string): Slider {
+    if (name === 'size') return this.makeSize(id);
+    const { world } = this;
+    const row = PLANT.find((one) => one.name === name)!;
+    const format = (value: number) => quantity(value, world.units.of(name), row.unit);
+    const spec = { ...row, name: id, format, limits: PLANT_LIMITS[name], initial: NOMINAL[name] };
+    const slider = new Slider(spec, (value) => {
+      const plant = { ...world.plant, [name]: value };
+      const problem = plantProblem(plant);
+      if (problem) {
+        slider.value = world.plant[name];
+        return warn(sentence(problem));
+      }
+      world.plant = plant;
+      for (const other of this.plant.get(name)!) if (other !== slider) other.value = value;
+      this.onChange();
+    });
+    this.plant.set(name, [...(this.plant.get(name) ?? []), slider]);
+    return slider;
+  }
+
+  private makeSize(id: string): Slider {
     const { world } = this;
     const [low, high] = PLANT_LIMITS.size;
     const limits = [Math.log10(low), Math.log10(high)] as const;
     const format = (place: number) => sizeText(sizeAt(place));
-    const spec = { ...SIZE, name: 'size', label: 'Size', unit: 'm', limits, initial: 0, format };
+    const spec = { ...SIZE, name: id, label: 'Size', unit: 'm', limits, initial: 0, format };
     const slider = new Slider(spec, (place) => {
       world.plant = { ...world.plant, size: sizeAt(place) };
+      for (const other of this.sizes) if (other !== slider) other.value = place;
       this.show();
-      onChange();
+      this.onChange();
     });
-    element('plant-sliders').append(slider.element);
+    this.sizes.push(slider);
     return slider;
   }
 
   setPlant(plant: Plant): void {
     this.world.plant = plant;
-    this.size.value = placeOf(plant.size);
-    for (const [name, slider] of this.plant) slider.value = plant[name];
+    for (const slider of this.sizes) slider.value = placeOf(plant.size);
+    for (const [name, sliders] of this.plant) {
+      for (const slider of sliders) slider.value = plant[name];
+    }
     this.show();
   }
 
@@ -202,7 +215,9 @@ export class Settings {
 
   /// Marks on each slider the policy's range in training.
   mark(policy: Policy): void {
-    for (const [name, slider] of this.plant) slider.trained = policy.trainedRange(name);
+    for (const [name, sliders] of this.plant) {
+      for (const slider of sliders) slider.trained = policy.trainedRange(name);
+    }
     this.strongest = policy.controller.strongest;
     element('trained-on').textContent = policy.isLearned ? 'range of the training' : 'design plant';
     for (const [name, slider] of this.disturbance) slider.trained = policy.trainedDisturbance(name);
@@ -214,7 +229,11 @@ export class Settings {
     const { torque } = this.world.units;
     const strongest =
       torque === 1 ? String(digits(this.strongest)) : quantity(this.strongest, torque, 'N·m');
-    this.plant.get('torque_limit')!.label = `Limit of the motor (agent: ±${strongest})`;
-    for (const slider of [...this.plant.values(), ...this.disturbance.values()]) slider.show();
+    for (const slider of this.plant.get('torque_limit')!) {
+      slider.label = `Limit of the motor (agent: ±${strongest})`;
+    }
+    for (const slider of [...this.plant.values(), ...this.disturbance.values()].flat()) {
+      slider.show();
+    }
   }
 }

@@ -86,6 +86,11 @@ export class Slider {
     return Number(this.input.value);
   }
 
+  /// Its value in words, such as "0.8 kg".
+  get text(): string {
+    return this.output.value;
+  }
+
   /// Sets a value, which may lie between two steps or beyond the ends, as links and policies allow.
   set value(value: number) {
     const { step, min } = this.spec;

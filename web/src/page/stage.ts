@@ -151,6 +151,12 @@ export class PendulumStage {
     this.listener.changed();
   }
 
+  /// Whether another drawing would show something new.
+  get stirs(): boolean {
+    const { clock, scene, twin, world } = this;
+    return scene.stirs(world, clock.state) || twin.stirs(clock);
+  }
+
   /// Draws both pendulums. `ring`: colours around the first one.
   draw(ring: readonly string[]): void {
     const { clock, history, scene, twin, world } = this;
@@ -161,10 +167,11 @@ export class PendulumStage {
     if (this.paused) this.pose.follow(world.state);
   }
 
-  /// Shows whether the pendulum is balanced, with sparks when it has been caught.
+  /// Shows whether the pendulum is balanced, with sparks when the visitor has caught it.
   drawBadge(): void {
     const { badge, scene, world } = this;
     const caught = badge.draw(world, this.paused, scene.canvas.element);
-    if (caught && !prefersStill()) scene.sparks.light();
+    // Only for the visitor's own catch.
+    if (caught && !world.agentOn && !prefersStill()) scene.sparks.light();
   }
 }

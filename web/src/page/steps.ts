@@ -1,7 +1,3 @@
-import { NOMINAL } from '../pendulum';
-import type { State } from '../pendulum';
-import type { Label } from '../view/labels';
-import type { Moment, World } from '../world';
 import { addressOf } from './address';
 import { send } from './clipboard';
 import { button, element, write } from './dom';
@@ -9,76 +5,21 @@ import { Game } from './game';
 import { prefersStill } from './motion';
 import { MotorKeys } from './motor';
 import { OWN } from './share';
-import type { Shared } from './share';
+import { ARROWS, enter, GOAL, heldFor, HELD, NOMINAL_AGENT, SMALL_AGENT, yoursOf } from './step';
+import type { Stage, Step } from './step';
+import { bet } from './step_bet';
+import { change } from './step_change';
+import { pose } from './step_pose';
+import { reward } from './step_reward';
 
 /// The steps of the tour: their actions on the page, and their answers to the visitor. Their words
 /// and controls are in index.html.
 
-/// The parts of the page that steps use.
-export interface Stage {
-  readonly world: World;
-  /// Sets agent and settings; all others get their initial values. The pendulum moves on. False if
-  /// a later request replaced this one.
-  take(shared: Partial<Shared>): Promise<boolean>;
-  /// The same as take(), and hangs the pendulum.
-  begin(shared: Partial<Shared>): Promise<boolean>;
-  /// Changes only the agent. False if it cannot be loaded or a later request replaced it.
-  choose(agent: string): Promise<boolean>;
-  readonly agents: { has(id: string): boolean; isHere(id: string): boolean };
-  setAgentOn(on: boolean): void;
-  setSpeed(speed: number): void;
-  /// Hangs the pendulum.
-  reset(): void;
-  /// Sets the map's first quantity.
-  resetMap(): void;
-  readonly learn: {
-    start(): void;
-    /// Starts, pauses or resumes the training.
-    toggle(): void;
-    show(): void;
-    readonly paused: boolean;
-    readonly story: { readonly count: string; readonly milestone: string };
-    readonly keeps: boolean;
-    readonly begun: boolean;
-  };
-}
-
-export interface Step {
-  readonly id: string; // its element is "step-ID"
-  readonly agents: readonly string[]; // needed for this step; without them it is left out
-  readonly keys?: readonly string[]; // the page's keys that it names; all others do nothing
-  readonly labels?: (world: World) => Label[]; // on the stage
-  /// Called when the step is shown. `ghost`: a try in the address; empty: none.
-  begin(ghost: string): Promise<void>;
-  /// Called when another step is shown.
-  end?(): void;
-  /// Whether its pendulum moves at once. With reduced motion it waits for a button.
-  readonly moves?: boolean;
-  /// A pendulum to draw behind the first one.
-  readonly ghost?: () => State | null;
-  /// The try in the page's address; empty: none.
-  readonly code?: () => string;
-  /// Called at each control step.
-  moment?(moment: Moment): void;
-  /// Called after a click on the map started the pendulum somewhere.
-  started?(): void;
-  /// The answer to the visitor's actions, asked for ten times a second; empty: none.
-  answer?(world: World): string;
-}
-
-const NOMINAL_AGENT = 'd3qn';
-const SMALL_AGENT = 'fast'; // a twentieth of the default agent's size
-const ADAPTIVE_AGENT = 'd3qn-adaptive';
-const LIGHT = 0.75; // kg
-const HELD = 2; // s upright that count as balanced
-const WON = 5; // s upright that win a race
-const LONGEST = 20; // s, of a race
-const ARROWS = ['ArrowLeft', 'ArrowRight'];
-const GOAL: Label = { at: 'goal', text: 'both links in here' };
-
-const heldFor = (world: World) => world.uprightFor ?? 0;
+const CALM = 5; // s balanced until the tour shoves the pendulum
+const SHOVES = 2; // at once, so that it is a push that the visitor sees
 
 function watch(stage: Stage): Step {
+  let direction: -1 | 1 = 1;
   const swingUp = () => {
     stage.setAgentOn(true);
     stage.reset();
@@ -97,10 +38,19 @@ function watch(stage: Stage): Step {
       // The small agent loads within a moment; the large one replaces it during the swing.
       if (await stage.begin({ agent: SMALL_AGENT, on })) void stage.choose(NOMINAL_AGENT);
     },
-    answer: (world) =>
-      heldFor(world) > HELD
-        ? 'Balanced, after 80 minutes of practice. Can you do that? Press Next and try it.'
-        : '',
+    moment() {
+      const { world } = stage;
+      const calm = Math.min(heldFor(world), world.time - (world.shoved?.at ?? -Infinity));
+      if (prefersStill() || world.push || calm < CALM) return;
+      for (let k = 0; k < SHOVES; ++k) world.shoveTo(direction);
+      direction = direction === 1 ? -1 : 1;
+    },
+    answer(world) {
+      if (heldFor(world) < HELD) return '';
+      return world.shoved
+        ? 'Balanced, even when it is shoved. Now see how that is learned: press Start.'
+        : 'Balanced, after 80 minutes of practice, computed in seconds. Press Start.';
+    },
   };
 }
 
@@ -137,26 +87,50 @@ function motor(stage: Stage): Step {
   };
 }
 
+const NAMED = 2000; // ms that the ring has a label
+
 function learn(stage: Stage): Step {
+  let ringSince = 0; // ms; 0: there is no ring
+  let asks = false; // whether the visitor guesses an update
   const start = button('tour-learn', () => {
-    if (stage.learn.paused) stage.learn.toggle();
+    const { running, paused } = stage.learn;
+    if (running || paused) stage.learn.toggle();
     else stage.learn.start();
   });
+  const ask = button('tour-ask', () => (asks = !asks));
+  const buttonName = () => {
+    const { running, paused, story } = stage.learn;
+    if (paused) return 'Resume';
+    if (running) return 'Pause';
+    return story.milestone === '' ? 'Learn' : 'Start over';
+  };
   return {
     id: 'learn',
     agents: [NOMINAL_AGENT],
-    labels: () => (stage.learn.begun ? [{ at: 'goal', text: 'expected points' }] : []),
+    labels() {
+      if (!stage.learn.begun) ringSince = 0;
+      else if (ringSince === 0) ringSince = performance.now();
+      const isNew = ringSince > 0 && performance.now() - ringSince < NAMED;
+      return isNew ? [{ at: 'ring', text: 'expected points' }] : [];
+    },
     async begin() {
+      asks = false;
       const learned = stage.learn.keeps;
       const on = learned && !prefersStill();
       if (!(await stage.begin({ agent: learned ? OWN : NOMINAL_AGENT, on }))) return;
       stage.learn.show();
     },
     answer() {
-      const { count, milestone } = stage.learn.story;
-      start.textContent = stage.learn.paused ? 'Resume' : milestone === '' ? 'Learn' : 'Start over';
-      write(element('tour-count'), count);
-      return milestone;
+      const { story, asks: canAsk } = stage.learn;
+      asks &&= canAsk;
+      write(start, buttonName());
+      ask.style.visibility = canAsk ? '' : 'hidden'; // its place stays, so that nothing moves
+      ask.ariaPressed = String(asks);
+      write(ask, asks ? 'Back to the curve' : 'Guess an update');
+      element('learn-ask').hidden = !asks;
+      element('step-learn').toggleAttribute('data-asks', asks);
+      write(element('tour-count'), story.count);
+      return story.milestone;
     },
   };
 }
@@ -171,9 +145,10 @@ function shove(stage: Stage): Step {
     id: 'shove',
     agents: [NOMINAL_AGENT],
     moves: true,
+    yours: true,
     keys: ARROWS,
     async begin() {
-      await enter(stage, { agent: NOMINAL_AGENT, on: true });
+      await enter(stage, { agent: yoursOf(stage), on: true });
       shoved = 0;
       fell = false;
     },
@@ -193,64 +168,6 @@ function shove(stage: Stage): Step {
   };
 }
 
-/// A race of two agents with a pendulum that is new to one of them.
-function bet(stage: Stage): Step {
-  let onMany = false; // the visitor's bet
-  let decided = '';
-  let begun = 0; // s, in the world's time
-  const race = { agent: NOMINAL_AGENT, twin: ADAPTIVE_AGENT, plant: { ...NOMINAL, mass2: LIGHT } };
-  const choices = [
-    [button('bet-one', () => void run(false)), false],
-    [button('bet-many', () => void run(true)), true],
-  ] as const;
-
-  /// Hangs both pendulums, and starts them if there is a bet.
-  const begin = async (on: boolean) => {
-    if (!(await stage.begin({ ...race, on }))) return;
-    decided = '';
-    begun = stage.world.time;
-  };
-  const run = (many: boolean) => {
-    onMany = many;
-    for (const [choice, of] of choices) choice.ariaPressed = String(of === many);
-    return begin(true);
-  };
-  return {
-    id: 'bet',
-    agents: [NOMINAL_AGENT, ADAPTIVE_AGENT],
-    labels: () => [{ at: 'link2', text: `${LIGHT} kg` }],
-    async begin() {
-      for (const [choice] of choices) choice.ariaPressed = 'false';
-      await begin(false);
-    },
-    answer(world) {
-      write(element('first-name'), 'learned on one');
-      write(element('twin-name'), 'learned on many');
-      if (!world.agentOn || !world.twin) return '';
-      const [one, many] = [heldFor(world), heldFor(world.twin)];
-      decided ||= verdictOf(onMany, one, many, world.time - begun);
-      return decided || 'Both try …';
-    },
-  };
-}
-
-/// The result of the race for a bet on the agent of many pendulums, or on the other; empty while it
-/// goes on. `one` and `many`: how long (s) each has balanced; `raced`: duration (s).
-function verdictOf(onMany: boolean, one: number, many: number, raced: number): string {
-  if (many > WON && one < HELD) return `${onMany ? RIGHT : LOST}: ${MANY_HOLDS}`;
-  if (one > WON && many < HELD) return `${onMany ? LOST : RIGHT}: ${ONE_HOLDS}`;
-  if (one > WON && many > WON) return BOTH_HOLD;
-  return raced > LONGEST && one < HELD && many < HELD ? NONE_HOLDS : '';
-}
-
-const RIGHT = 'You were right';
-export const LOST = 'You lost';
-const MANY_HOLDS =
-  'only the agent that learned on many balances it: it estimates the mass from the motion.';
-const ONE_HOLDS = 'only the agent that learned on one balances it.';
-const BOTH_HOLD = 'A draw: both balance it.';
-const NONE_HOLDS = `A draw: neither balances it within ${LONGEST} s.`;
-
 function values(stage: Stage): Step {
   const speed = element<HTMLInputElement>('tour-speed');
   const show = () => {
@@ -262,11 +179,12 @@ function values(stage: Stage): Step {
     id: 'values',
     agents: [NOMINAL_AGENT],
     moves: true,
+    yours: true,
     keys: ARROWS,
     async begin() {
       speed.value = '1';
       element('tour-speed-value').textContent = '1×';
-      await stage.begin({ agent: NOMINAL_AGENT, on: !prefersStill() });
+      await stage.begin({ agent: yoursOf(stage), on: !prefersStill() });
     },
     answer: (world) =>
       heldFor(world) > HELD
@@ -281,10 +199,11 @@ function map(stage: Stage): Step {
     id: 'map',
     agents: [NOMINAL_AGENT],
     moves: true,
+    yours: true,
     async begin() {
       clicked = false;
       stage.resetMap();
-      await enter(stage, { agent: NOMINAL_AGENT, on: true });
+      await enter(stage, { agent: yoursOf(stage), on: true });
     },
     started() {
       clicked = true;
@@ -306,10 +225,10 @@ function end(stage: Stage): Step {
     id: 'end',
     agents: [NOMINAL_AGENT],
     moves: true,
+    yours: true,
     async begin() {
-      const agent = stage.learn.keeps ? OWN : NOMINAL_AGENT;
-      await stage.begin({ agent, on: !prefersStill() });
-      element('tour-end').textContent = stage.learn.keeps
+      await stage.begin({ agent: yoursOf(stage), on: !prefersStill() });
+      element('tour-end').textContent = stage.agents.ownIsLearned
         ? 'Everything, with your own agent'
         : 'Everything at once';
     },
@@ -318,11 +237,8 @@ function end(stage: Stage): Step {
 
 const INVITATION = 'A double pendulum learns to stand up, in your browser. Can you do it by hand?';
 
-/// Swings at once; with reduced motion the pendulum hangs and waits.
-function enter(stage: Stage, shared: Partial<Shared>): Promise<boolean> {
-  return prefersStill() ? stage.begin({ ...shared, on: false }) : stage.take(shared);
-}
-
 export function makeSteps(stage: Stage): Step[] {
-  return [watch, motor, learn, shove, bet, values, map, end].map((make) => make(stage));
+  return [watch, motor, learn, shove, bet, change, reward, pose, values, map, end].map((make) =>
+    make(stage),
+  );
 }

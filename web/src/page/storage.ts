@@ -28,6 +28,7 @@ export interface KeptFile {
   name: string;
   bytes: ArrayBuffer;
   learned: boolean; // in the page, so the page's next policy may replace it
+  recipe?: string | undefined; // part of an address with which it learns again
 }
 
 function openDatabase(): Promise<IDBDatabase> {
@@ -66,9 +67,12 @@ function tolerant<T>(work: () => Promise<T>): Promise<T | null> {
 
 /// A kept file, perhaps from an earlier version of the page; null if it is not one of ours.
 function asKeptFile(value: unknown): KeptFile | null {
-  const { name, bytes, learned } = (value ?? {}) as Partial<Record<keyof KeptFile, unknown>>;
+  const given = (value ?? {}) as Partial<Record<keyof KeptFile, unknown>>;
+  const { name, bytes, learned } = given;
   if (typeof name !== 'string' || !(bytes instanceof ArrayBuffer)) return null;
-  return bytes.byteLength > MAX_FILE_BYTES ? null : { name, bytes, learned: learned === true };
+  if (bytes.byteLength > MAX_FILE_BYTES) return null;
+  const recipe = typeof given.recipe === 'string' ? given.recipe : undefined;
+  return { name, bytes, learned: learned === true, recipe };
 }
 
 export async function recallFile(key: string): Promise<KeptFile | null> {

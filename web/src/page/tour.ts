@@ -1,8 +1,11 @@
 import type { Moment, World } from '../world';
 import { button, element, write } from './dom';
 import { prefersStill } from './motion';
-import { LOST, makeSteps } from './steps';
-import type { Stage, Step } from './steps';
+import { note } from './message';
+import { yoursOf } from './step';
+import type { Stage, Step } from './step';
+import { makeSteps } from './steps';
+import { LOST } from './verdict';
 import type { Scene } from '../view/scene';
 
 const FRAMES = 6; // between two calls of a step's answer
@@ -13,7 +16,10 @@ export class Tour {
   private readonly dots: HTMLButtonElement[];
   private readonly onStep: () => void;
   private readonly start: HTMLButtonElement; // shown for reduced motion
+  private readonly list = element<HTMLSelectElement>('tour-list'); // in place of the dots
   private readonly twin: Scene;
+  private readonly stage: Stage;
+  private isYours = false; // whether the shown step began with the visitor's own agent
   private now: Step | null = null;
   private frame = 0;
   private last = 1; // number of the step shown last
@@ -25,17 +31,23 @@ export class Tour {
     onStep: () => void,
   ) {
     this.onStep = onStep;
+    this.stage = stage;
     this.twin = stage.twin.scene;
     this.steps = makeSteps(stage).filter(({ agents }) => agents.every(has));
     this.dots = this.steps.map((step, i) => {
       const dot = document.createElement('button');
       dot.type = 'button';
       dot.textContent = String(i + 1);
-      dot.ariaLabel = `Step ${i + 1}: ${heading(step).textContent}`;
+      dot.ariaLabel = `Step ${i + 1}: ${plain(heading(step))}`;
       dot.addEventListener('click', () => void this.go(i + 1, true));
       return dot;
     });
     element('dots').append(...this.dots);
+    this.steps.forEach((step, i) => {
+      const text = `${i + 1} of ${this.steps.length}: ${plain(heading(step))}`;
+      this.list.append(new Option(text, String(i + 1)));
+    });
+    this.list.addEventListener('change', () => void this.go(Number(this.list.value), true));
     button('tour-back', () => void this.go(this.number - 1, true));
     button('tour-next', () => void this.go(this.number + 1, true));
     this.start = button('tour-start', () => {
@@ -53,12 +65,14 @@ export class Tour {
   get address(): string {
     if (!this.now) return '';
     const code = this.now.code?.() ?? '';
-    return `tour=${this.number}${code && `&ghost=${code}`}`;
+    // The visitor's agent learns again where the link is opened.
+    const recipe = this.now.yours ? this.stage.agents.ownRecipe : '';
+    return `tour=${this.number}${code && `&ghost=${code}`}${recipe && `&${recipe}`}`;
   }
 
   /// The shown step's heading.
   get title(): string {
-    return this.now ? heading(this.now).textContent : '';
+    return this.now ? plain(heading(this.now)) : '';
   }
 
   /// The keys that the shown step names; null outside of the tour.
@@ -77,8 +91,10 @@ export class Tour {
     this.last = i + 1;
     for (const step of this.steps) section(step).inert = step !== now;
     this.dots.forEach((dot, k) => (dot.ariaCurrent = k === i ? 'step' : null));
+    this.list.value = String(i + 1);
     element<HTMLButtonElement>('tour-back').disabled = i === 0;
     element('tour-next').hidden = i === this.steps.length - 1;
+    element('tour-next').textContent = i === 0 ? 'Start' : 'Next';
     this.start.hidden = !(now.moves && prefersStill());
     section(now).append(this.start);
     document.documentElement.dataset.step = now.id;
@@ -90,6 +106,7 @@ export class Tour {
       heading(now).focus({ preventScroll: true });
     }
     this.onStep();
+    this.isYours = this.stage.agents.ownIsLearned;
     await now.begin(ghost);
   }
 
@@ -116,7 +133,18 @@ export class Tour {
     scene.ghosts = ghost ? [ghost.q1, ghost.q2] : [];
     const labels = this.now?.labels?.(world) ?? [];
     scene.labels = this.twin.labels = labels.filter(({ at }) => at !== 'ghost' || ghost);
-    if (this.now && this.frame++ % FRAMES === 0) this.say(this.now.answer?.(world) ?? '');
+    if (!this.now || this.frame++ % FRAMES !== 0) return;
+    this.say(this.now.answer?.(world) ?? '');
+    this.takeYours();
+  }
+
+  /// Gives the step the visitor's agent once that has learned.
+  private takeYours(): void {
+    const { agents, world } = this.stage;
+    if (!this.now?.yours || this.isYours || !agents.ownIsLearned || world.twin) return;
+    this.isYours = true;
+    note('Your agent has learned, and takes over.');
+    void this.stage.choose(yoursOf(this.stage));
   }
 
   private say(text: string): void {
@@ -133,4 +161,9 @@ function section({ id }: Step): HTMLElement {
 
 function heading(step: Step): HTMLElement {
   return section(step).querySelector('h2')!;
+}
+
+/// The words of an element in one line.
+function plain({ textContent }: HTMLElement): string {
+  return textContent.replace(/\s+/g, ' ').trim();
 }

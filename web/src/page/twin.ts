@@ -1,10 +1,11 @@
 import { History } from '../history';
 import { BadInput } from '../bad_input';
 import type { Policy } from '../policy';
-import { quoted } from '../text';
+import { quoted, sentence } from '../text';
 import { Scene, TRAIL_SECONDS } from '../view/scene';
 import type { Simulator } from '../simulator';
 import { World } from '../world';
+import { optionsOf } from './agent_panel';
 import type { Agents } from './agents';
 import type { Clock } from './clock';
 import { situation } from './dashboard';
@@ -34,10 +35,13 @@ export class Twin {
     this.list();
   }
 
+  get policy(): Policy | null {
+    return this.world.policy;
+  }
+
   /// Lists the agents for the choice.
   list(): void {
-    const options = this.agents.list.map(({ id, title }) => new Option(title, id));
-    this.select.replaceChildren(new Option('none', ''), ...options);
+    this.select.replaceChildren(new Option('none', ''), ...optionsOf(this.agents.list));
     this.select.value = this.id ?? '';
   }
 
@@ -52,7 +56,7 @@ export class Twin {
     } catch (error) {
       if (!(error instanceof BadInput)) throw error;
       if (request !== this.requests) return;
-      warn(`Agent ${quoted(id!)} cannot be used: ${error.message}.`);
+      warn(sentence(`Agent ${quoted(id!)} cannot be used: ${error.message}`));
     }
     this.select.value = this.id ?? '';
     this.place(this.agents.list.find((one) => one.id === this.id)?.title ?? '');
@@ -65,6 +69,13 @@ export class Twin {
     this.select.value = '';
     this.world.policy = policy;
     this.place(name);
+  }
+
+  /// Gives it another policy outside the list while it moves on.
+  change(policy: Policy, name: string): void {
+    if (!this.world.policy) return this.show(policy, name);
+    this.world.policy = policy;
+    write(element('twin-name'), name);
   }
 
   /// Begins in the state of the first one, if there is a policy.
@@ -87,6 +98,12 @@ export class Twin {
   /// Drops the history after a new start.
   restarted(): void {
     this.history.clear();
+  }
+
+  /// Whether another drawing would show something new.
+  stirs(clock: Clock): boolean {
+    const state = clock.twinState;
+    return state !== null && this.scene.stirs(this.world, state);
   }
 
   draw(clock: Clock, still: boolean): void {

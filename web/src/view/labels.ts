@@ -2,7 +2,7 @@ import type { Canvas } from './canvas';
 
 /// A word next to a thing on the stage.
 export interface Label {
-  at: 'motor' | 'goal' | 'link2' | 'ghost';
+  at: 'motor' | 'goal' | 'link2' | 'ghost' | 'ring';
   text: string;
 }
 

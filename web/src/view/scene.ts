@@ -25,6 +25,16 @@ const PIVOT: Vec = { x: 0, z: 0 };
 const CIRCLE = 0.86; // radius of the tip's reach, in shorter sides of the box
 const LARGEST_ARC = (150 / 180) * Math.PI; // at the torque limit
 
+const VISIBLE = 0.5; // px, smallest motion that is drawn
+const VISIBLE_CALM = 2; // px, the same while the pendulum only sways
+const CALM = 1; // rad/s, of both joints
+const CALM_AFTER = 1; // s in the goal
+
+/// Whether the pendulum only sways in its goal. Its motor dithers there, too fast for the eye.
+function isCalm({ uprightFor }: Shown, { w1, w2 }: State): boolean {
+  return (uprightFor ?? 0) > CALM_AFTER && Math.abs(w1) + Math.abs(w2) < CALM;
+}
+
 /// The parts of a world that a scene draws.
 export type Shown = Pick<
   World,
@@ -50,6 +60,35 @@ export class Scene {
 
   constructor(id: string) {
     this.canvas = new Canvas(id);
+  }
+
+  /// What the last drawing showed: places of elbow and tip [px of the canvas], and words.
+  private drawn: { places: readonly number[]; words: string; ring: readonly string[] } | null =
+    null;
+
+  /// Whether another drawing would show something new.
+  stirs(world: Shown, state: State): boolean {
+    const { drawn } = this;
+    if (!drawn || this.sparks.fly || this.ghosts.length > 0 || this.isPushed(world)) return true;
+    if (drawn.ring !== this.ring || drawn.words !== this.words) return true;
+    const least = isCalm(world, state) ? VISIBLE_CALM : VISIBLE;
+    return this.placesOf(world, state).some((at, i) => Math.abs(at - drawn.places[i]!) > least);
+  }
+
+  /// Whether a hand, a shove or its fading arrow is in sight.
+  private isPushed({ push, drag, shoved, time }: Shown): boolean {
+    return push !== null || drag !== null || (shoved !== null && time - shoved.at < FADING);
+  }
+
+  private get words(): string {
+    return this.labels.map(({ text }) => text).join();
+  }
+
+  private placesOf({ plant }: Shown, state: State): number[] {
+    const { length1, length2 } = plant;
+    const elbow = pointOn(plant, state, 1, length1).position;
+    const tip = pointOn(plant, state, 2, length2).position;
+    return [...this.at(elbow), ...this.at(tip)];
   }
 
   /// A place on the canvas in the pendulum's plane (m).
@@ -91,6 +130,11 @@ export class Scene {
     const reach = plant.length1 + plant.length2;
     this.fit(Math.max(1, reach));
     if (!(this.scale > 0)) return; // hidden
+    this.drawn = {
+      places: this.placesOf(world, state),
+      words: this.words,
+      ring: this.ring,
+    };
     canvas.clear();
     drawReach(canvas, this.at(PIVOT), this.scale * reach);
     this.drawGoal(world);
@@ -113,7 +157,7 @@ export class Scene {
     this.drawLink(elbow, tip, 'link2', plant.mass2);
     drawHub(canvas, this.at(PIVOT), size, state.q1);
     drawJoint(canvas, this.at(elbow), 0.55 * size);
-    this.drawTorque(world.torque / plant.torque_limit);
+    if (!isCalm(world, state)) this.drawTorque(world.torque / plant.torque_limit);
     this.drawPush(world, state);
     this.sparks.draw(canvas, ...this.at(elbow), 0.75 * this.scale);
     const letters = Math.max(canvas.letters, 0.036 * this.scale);
@@ -185,6 +229,12 @@ export class Scene {
     if (what === 'goal') {
       const [x, y] = this.at({ x: 0.6, z: 1 });
       return { x, y, nx: 0, ny: -1, gap: 2 };
+    }
+    if (what === 'ring') {
+      // In a lower corner, at the side where the tip is not.
+      const side = tip.x > 0 ? -1 : 1;
+      const [x, y] = this.at({ x: 4 * side, z: -1.1 });
+      return { x, y, nx: 0, ny: -1, gap: 0 };
     }
     if (what === 'ghost') {
       const [q1, q2] = [this.ghosts[0]!, this.ghosts[1]!];

@@ -11,6 +11,10 @@ export class Sparks {
     this.begun = performance.now();
   }
 
+  get fly(): boolean {
+    return performance.now() - this.begun < 1000 * SECONDS;
+  }
+
   /// Around (x, y), thrown up to `reach` pixels.
   draw(canvas: Canvas, x: number, y: number, reach: number): void {
     const t = (performance.now() - this.begun) / 1000 / SECONDS;
