@@ -7,9 +7,9 @@ struct ThreadPool::Workers {};
 
 ThreadPool::ThreadPool(int, bool) : threads_(1), adapts_(false), requested_(1), used_(1) {}
 
-void ThreadPool::Use(int) {}
+void ThreadPool::Use(int threads) { requested_ = threads; }
 
-void ThreadPool::Lend(int) {}
+void ThreadPool::Lend(int threads) { lent_ = threads; }
 
 ThreadPool::~ThreadPool() = default;
 
