@@ -3,10 +3,11 @@ import { addresses } from './build/addresses.ts';
 import { mujoco } from './build/mujoco.ts';
 import { offline } from './build/offline.ts';
 import { single } from './build/single.ts';
+import { whitespace } from './build/whitespace.ts';
 
 export default defineConfig({
   base: './', // served from any folder
-  plugins: [mujoco(), addresses(), offline(), single()],
+  plugins: [mujoco(), addresses(), whitespace(), offline(), single()],
   server: { fs: { allow: ['..'] } }, // build/wasm/core.wasm
   optimizeDeps: { exclude: ['@mujoco/mujoco'] },
   build: {

@@ -75,7 +75,7 @@ class PythonDriver final : public TrainObserver {
     events_.emplace_back("best", Row{{"step", s.steps}});
   }
 
-  /// Tells the events that came after the last Poll, such as those of the last evaluation.
+  /// Tells the events after the last Poll, such as the last evaluation.
   void TellRest() {
     if (!events_.empty() && !error_) Poll();
   }

@@ -5,6 +5,13 @@
 
 namespace upswing {
 
+/// Whether programs of this kind can have threads. A page's core has one.
+#if defined(__wasm__)
+inline constexpr bool kHasThreads = false;
+#else
+inline constexpr bool kHasThreads = true;
+#endif
+
 /// Threads that wait for work. The caller counts as one thread, so a pool of one thread starts
 /// none.
 class ThreadPool {

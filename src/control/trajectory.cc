@@ -76,7 +76,6 @@ std::vector<Trajectory> TrajectoryOptimizer::Follow(const QuadraticCost& cost,
   });
 }
 
-template <typename Torque>
 std::vector<Trajectory> TrajectoryOptimizer::Follow(const QuadraticCost& cost,
                                                     const StateVector& start, size_t n,
                                                     size_t steps, const Torque& torque) {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <functional>
 #include <limits>
 #include <span>
 #include <vector>
@@ -95,8 +96,9 @@ class TrajectoryOptimizer {
   /// Number of step sizes along the improvement that are simulated at once, and of such rounds.
   static constexpr int kTrials = 8, kRounds = 2;
 
-  /// The trajectories (n) under torque(i, t, x), N·m.
-  template <typename Torque>
+  /// The torque of trajectory i at step t in state x, N·m.
+  using Torque = std::function<double(size_t i, size_t t, const StateVector& x)>;
+  /// The trajectories (n) under these torques.
   std::vector<Trajectory> Follow(const QuadraticCost& cost, const StateVector& start, size_t n,
                                  size_t steps, const Torque& torque);
   /// Computes k_ and K_ about the trajectory. Returns false if the cost curves down along the

@@ -65,7 +65,7 @@ TEST(QuadraticCost, CountsGoalsWithinTheRange) {
   }
 }
 
-TEST(Trajectory, FollowsSeveralPlansAsEachAlone) {
+TEST(Trajectory, FollowsSeveralPlansAsOneByOne) {
   const Plant plant;
   const QuadraticCost cost = StandardCost(LqrConfig(), plant);
   TrajectoryOptimizer optimizer(plant);

@@ -94,7 +94,7 @@ TEST_F(TrainingRunTest, StoppedAndResumedEqualsNeverStopped) {
   ExpectSame(temp_ / "whole", temp_ / "parts");
 }
 
-TEST_F(TrainingRunTest, EvaluationsBesideTheTrainingChangeNoFile) {
+TEST_F(TrainingRunTest, EvaluationsInTheBackgroundChangeNoFile) {
   EXPECT_TRUE(TrainUntil(kNever, *TrainingRun::Make(temp_ / "one", SmallConfig())));
 
   Config config = SmallConfig();
@@ -107,13 +107,13 @@ TEST_F(TrainingRunTest, EvaluationsBesideTheTrainingChangeNoFile) {
 
   config.train.checkpoint_every = config.train.eval_every;  // both are due at once
   const auto together = TrainingRun::Make(temp_ / "together", config);
-  int beside = 0;
+  int in_background = 0;
   TrainObserver no_view;
   EXPECT_TRUE(together->Train(no_view, [&] {
-    if (together->training().trainer().is_evaluating()) ++beside;
+    if (together->training().trainer().is_evaluating()) ++in_background;
     return TrainRequest::kGoOn;
   }));
-  EXPECT_GT(beside, 0);
+  EXPECT_GT(in_background, 0);
   ExpectSame(temp_ / "one", temp_ / "together");
 
   EXPECT_FALSE(TrainUntil(404, *TrainingRun::Make(temp_ / "parts", config)));

@@ -5,7 +5,7 @@
   results.py check            lists the outdated tables; exit code 1 if there are any
   results.py measure ID       runs the commands of a table and rewrites docs/results/data/ID.json
   results.py measure ID --try    prints the table with few seeds and episodes; writes nothing
-  results.py compare ID       prints the table of this machine beside the documentation's
+  results.py compare ID       prints the table of this machine next to the documented one
   results.py machine          adds this machine to machines.json and prints its ID
 
 docs/results/data/ID.json holds one table, as it is displayed:
@@ -626,7 +626,7 @@ def measured_rows(table_id, few):
 
 
 def compare(table_id, few):
-    """Prints the table of this machine beside that of the documentation."""
+    """Prints the table of this machine next to the documented one."""
     documented = load(table_id)
     _, columns, rows = measured_rows(table_id, few)
     if columns != documented["columns"]:
@@ -635,9 +635,9 @@ def compare(table_id, few):
     machine = documented["measured"]["machine"]
     headings = [f"{column}, {where}" for column in columns[1:] for where in ("here", machine)]
     missing = [NONE] * len(columns[1:])
-    beside = [[row[0], *(cell for pair in zip(row[1:], known.get(row[0], missing)) for cell in pair)]
+    pairs = [[row[0], *(cell for pair in zip(row[1:], known.get(row[0], missing)) for cell in pair)]
               for row in rows]
-    print(markdown_table([columns[0], *headings], beside), end="")
+    print(markdown_table([columns[0], *headings], pairs), end="")
 
 
 def measure(table_id, few):
@@ -665,7 +665,7 @@ def main():
         actions.add_parser(name)
     measuring = actions.add_parser("measure", help="measure a table of the documentation again")
     comparing = actions.add_parser(
-        "compare", help="print a table of this machine beside the documentation's")
+        "compare", help="print a table of this machine next to the documented one")
     for action in (measuring, comparing):
         action.add_argument("id", help=f"one of {', '.join(RECIPES)}")
         action.add_argument("--try", dest="few", action="store_true",

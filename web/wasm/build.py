@@ -52,7 +52,7 @@ LAYERS = ["base", "nn", "pendulum", "rl", "control", "agents"]
 # Sources compiled for speed, because trainings spend their time there. All others are compiled for
 # size.
 FAST = ["nn/linear", "nn/product", "pendulum/closed_form", "control/trajectory", "control/pendulum_model", "rl/replay/replay", "rl/replay/sum_tree",
-        "rl/replay/n_step", "rl/sac/sac_update"]
+        "rl/sac/sac_update"]
 
 # The needed sources of muParser.
 PARSER = ["", "Base", "Bytecode", "Callback", "Error", "TokenReader"]

@@ -41,7 +41,7 @@ void Trainer::Evaluate(bool scheduled) {
   const bool training_waits = waits_ || may_solve || is_last || !evaluator_.CanRunInBackground();
   const auto task = std::make_shared<EvaluationTask>(EvaluationTask{
       state_.WithoutEpisodes(), agent_.ExportPolicy(info_), scheduled, training_waits});
-  if (!training_waits && StartInBackground(task)) return;
+  if (kHasThreads && !training_waits && StartInBackground(task)) return;
   task->training_waits = true;
   Run(*task);
   TakeResult(*task);
@@ -99,7 +99,7 @@ void Trainer::TakeResult(EvaluationTask& task) {
 bool Trainer::HasEnded(const EvaluationTask& task) { return task.thread->done(); }
 
 void Trainer::FinishEvaluation() {
-  if (!background_) return;
+  if (!kHasThreads || !background_) return;
   const std::shared_ptr<EvaluationTask> task = std::move(background_);
   std::exception_ptr failure;
   try {
@@ -125,7 +125,7 @@ void Trainer::FinishEvaluationQuietly() {
 }
 
 void Trainer::NotifyOrDefer(const Event& event) {
-  if (background_) {
+  if (kHasThreads && background_) {
     background_->deferred.push_back({state_.WithoutEpisodes(), event});
     return;
   }

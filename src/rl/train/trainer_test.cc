@@ -159,18 +159,18 @@ TEST_F(TrainerTest, OnceSolvedABetterPolicyIsConfirmedToo) {
   EXPECT_EQ(state.best_step, 200);
 }
 
-/// Trainings whose evaluations run beside them: an evaluation ends only after the training has gone
-/// on for some steps, or waits for it.
-class TrainerBesideTest : public TrainerTest {
+/// Trainings whose evaluations run in the background: an evaluation ends only after the training
+/// has gone on for some steps.
+class TrainerBackgroundTest : public TrainerTest {
  protected:
-  bool CanRunInBackground() const override { return beside_; }
-  void ShareThreads(bool beside) override {
-    runs_beside_ = beside;
-    if (beside) ++times_beside_;
+  bool CanRunInBackground() const override { return may_be_in_background_; }
+  void ShareThreads(bool shared) override {
+    in_background_ = shared;
+    if (shared) ++times_in_background_;
   }
   Evaluation Evaluate(const Policy& policy, int64_t step) override {
     if (step == fails_at_) throw Failure("no evaluation");
-    if (runs_beside_) {
+    if (in_background_) {
       const int64_t enough = std::min(step + 40, config_.steps);
       for (int64_t now = steps_; now < enough; now = steps_) steps_.wait(now);
     }
@@ -191,8 +191,8 @@ class TrainerBesideTest : public TrainerTest {
   }
 
   /// Trains to the end. Returns all events.
-  std::vector<std::string> Events(bool beside) {
-    beside_ = beside;
+  std::vector<std::string> Events(bool background) {
+    may_be_in_background_ = background;
     events_.clear();
     evaluations_ = 0;
     confirmed_.clear();
@@ -209,13 +209,13 @@ class TrainerBesideTest : public TrainerTest {
   }
 
   std::vector<std::string> events_;
-  bool beside_ = true;
-  int times_beside_ = 0;
-  int64_t fails_at_ = -1;                   // step of an evaluation that throws
-  std::atomic<bool> runs_beside_ = false;  // whether the threads are shared
+  bool may_be_in_background_ = true;
+  int times_in_background_ = 0;
+  int64_t fails_at_ = -1;                    // step of an evaluation that throws
+  std::atomic<bool> in_background_ = false;  // whether the threads are shared
 
  private:
-  /// Step, mean return and what evaluations have changed.
+  /// Step, mean return, and the results of evaluations.
   static std::string EvaluatedTo(const TrainState& s) {
     return Concat(" at ", s.steps, " with ", s.mean_return(), ", best ", s.best_step, ", streak ",
                   s.streak, ", last ", s.last_success_rate);
@@ -224,7 +224,7 @@ class TrainerBesideTest : public TrainerTest {
   std::atomic<int64_t> steps_ = 0;  // of the training
 };
 
-TEST_F(TrainerBesideTest, EventsAreThoseOfEvaluationsThatInterrupt) {
+TEST_F(TrainerBackgroundTest, EventsAreThoseOfEvaluationsThatInterrupt) {
   for (const bool stops : {true, false}) {
     config_.stop_when_solved = stops;
     for (const auto& script : std::vector<std::vector<int64_t>>{
@@ -232,22 +232,22 @@ TEST_F(TrainerBesideTest, EventsAreThoseOfEvaluationsThatInterrupt) {
       scripted_ = script;
       confirmations_ = {3, 4, 4, 4, 4, 4};
       const std::vector<std::string> expected = Events(false);
-      EXPECT_EQ(times_beside_, 0);
+      EXPECT_EQ(times_in_background_, 0);
       EXPECT_EQ(Events(true), expected);
-      EXPECT_GE(std::exchange(times_beside_, 0), 2);
+      EXPECT_GE(std::exchange(times_in_background_, 0), 2);
     }
   }
 }
 
-TEST_F(TrainerBesideTest, AnEvaluationThatMayEndTheTrainingInterruptsIt) {
+TEST_F(TrainerBackgroundTest, AnEvaluationThatMayEndTheTrainingInterruptsIt) {
   scripted_ = {4, 4};
   Events(true);
-  EXPECT_EQ(times_beside_, 1);
+  EXPECT_EQ(times_in_background_, 1);
   EXPECT_EQ(events_.back().substr(0, 17), "evaluation with 4");
   EXPECT_NE(events_.back().find(" at 200 "), std::string::npos);
 }
 
-TEST_F(TrainerBesideTest, SavedStatesContainTheResult) {
+TEST_F(TrainerBackgroundTest, SavedStatesContainTheResult) {
   scripted_ = {3};
   Parts parts = Make();
   while (parts.trainer.state().steps < 100) parts.trainer.Step();
@@ -258,7 +258,7 @@ TEST_F(TrainerBesideTest, SavedStatesContainTheResult) {
   EXPECT_EQ(parts.trainer.state().best_step, 100);
 }
 
-TEST_F(TrainerBesideTest, AFailureOfTheTrainingComesAfterTheResult) {
+TEST_F(TrainerBackgroundTest, AFailureOfTheTrainingComesAfterTheResult) {
   scripted_ = {3};
   Parts parts = Make();
   while (parts.trainer.state().steps < 100) parts.trainer.Step();
@@ -268,22 +268,22 @@ TEST_F(TrainerBesideTest, AFailureOfTheTrainingComesAfterTheResult) {
   EXPECT_EQ(parts.trainer.state().best_step, 100);
 }
 
-TEST_F(TrainerBesideTest, AFailureOfAnEvaluationEndsTheTraining) {
+TEST_F(TrainerBackgroundTest, AFailureOfAnEvaluationEndsTheTraining) {
   fails_at_ = 200;
   EXPECT_THROW(Events(true), Error);
-  EXPECT_FALSE(runs_beside_);  // the training has all threads again
+  EXPECT_FALSE(in_background_);  // the training has all threads again
   EXPECT_EQ(events_.back().find(" at 300"), std::string::npos) << events_.back();
 }
 
-TEST_F(TrainerBesideTest, ATrainingMayWaitForEachEvaluation) {
+TEST_F(TrainerBackgroundTest, ATrainingMayWaitForEachEvaluation) {
   scripted_ = {1, 2, 3};
   Parts parts = Make();
   parts.trainer.WaitForEvaluations();
   while (parts.trainer.Step()) EXPECT_FALSE(parts.trainer.is_evaluating());
-  EXPECT_EQ(times_beside_, 0);
+  EXPECT_EQ(times_in_background_, 0);
 }
 
-TEST_F(TrainerBesideTest, DeferredEventsNeedNoMemoryForRunningEpisodes) {
+TEST_F(TrainerBackgroundTest, DeferredEventsNeedNoMemoryForRunningEpisodes) {
   const TrainState state(1000, 3);
   EXPECT_TRUE(state.WithoutEpisodes().episode_return.empty());
   EXPECT_TRUE(state.WithoutEpisodes().episode_terms.empty());

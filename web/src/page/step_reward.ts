@@ -29,7 +29,7 @@ const PRESETS: readonly Preset[] = [
     id: 'height',
     reward: 'height: h',
     found: (_, height) =>
-      height > 0.7 ? 'It stays high, but it need not stand still: nobody pays for that.' : '',
+      height > 0.7 ? 'It stays high, but it need not stand still: no points for that.' : '',
   },
   {
     id: 'lazy',

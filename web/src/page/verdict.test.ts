@@ -10,7 +10,7 @@ test('an agent that is upright has not lost yet', () => {
   expect(verdictOf(3, 0, 20)).toBeNull(); // until it falls or stays
 });
 
-test('a verdict says who was right, and what has changed since', () => {
+test('a verdict says who was right, and names later changes', () => {
   const many = { one: false, many: true };
   expect(textOf(many, true)).toMatch(/^You were right: only the agent that learned on many/);
   expect(textOf(many, false)).toMatch(/^You lost/);

@@ -32,7 +32,7 @@ export function textOf({ one, many }: Verdict, onMany: boolean): string {
   return `${result}: only the agent that learned on many balances it. It estimates the mass from the motion.`;
 }
 
-/// What has changed since the verdict, so that it agrees with the pendulums; empty: nothing.
+/// The change since the verdict, so that it agrees with the pendulums; empty: none.
 export function laterOf(verdict: Verdict, one: number, many: number): string {
   if ((!verdict.one && one > HELD) || (!verdict.many && many > HELD)) {
     return ' Later the other one got up, too.';
