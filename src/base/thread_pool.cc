@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <atomic>
 #include <cassert>
-#include <chrono>
 #include <cstdint>
 #include <exception>
-#include <future>
 #include <limits>
 #include <mutex>
 #include <thread>
@@ -152,20 +150,35 @@ void ThreadPool::ParallelFor(int n, const std::function<void(int)>& task) {
   for (int i = 0; i < n; ++i) task(i);  // no need to wake a thread
 }
 
+/// The thread of a task, and its outcome.
 struct BackgroundTask::Future {
-  std::future<void> result;
+  std::atomic<bool> done{false};
+  std::exception_ptr error;
+  std::thread thread;  // the last member: it uses the others
 };
 
 BackgroundTask::BackgroundTask(const std::function<void()>& task)
-    : future_(std::make_unique<Future>(std::async(std::launch::async, task))) {}
-
-BackgroundTask::~BackgroundTask() = default;  // the future's destructor waits for the task
-
-bool BackgroundTask::done() const {
-  return future_->result.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+    : future_(std::make_unique<Future>()) {
+  future_->thread = std::thread([task, &future = *future_] {
+    try {
+      task();
+    } catch (...) {
+      future.error = std::current_exception();
+    }
+    future.done = true;
+  });
 }
 
-void BackgroundTask::Wait() { future_->result.get(); }
+BackgroundTask::~BackgroundTask() {
+  if (future_->thread.joinable()) future_->thread.join();
+}
+
+bool BackgroundTask::done() const { return future_->done; }
+
+void BackgroundTask::Wait() {
+  future_->thread.join();
+  if (future_->error) std::rethrow_exception(future_->error);
+}
 
 void ParallelFor(ThreadPool* pool, int n, const std::function<void(int)>& task) {
   if (pool != nullptr) return pool->ParallelFor(n, task);
