@@ -94,14 +94,14 @@ bool TrainingRun::Train(TrainObserver& view, const std::function<TrainRequest()>
   try {
     finished = Loop(poll);
   } catch (const Error& error) {
-    FinishEvaluationIfPossible();
+    training_.FinishEvaluationQuietly();
     const Error failure = Failure(Concat("training stopped at step ", s.steps, ": ", error.what(),
                                          "; the checkpoint of step ", checkpoint_at_,
                                          " is kept in ", path_.string()));
     LogIfPossible(failure.what());
     throw failure;
   } catch (...) {  // from an environment in Python
-    FinishEvaluationIfPossible();
+    training_.FinishEvaluationQuietly();
     LogIfPossible(Concat("stopped by an exception at step ", s.steps));
     throw;
   }
@@ -139,13 +139,6 @@ void TrainingRun::LogIfPossible(const std::string& line) {
     folder_->Log(line);
   } catch (const Error&) {  // NOLINT(bugprone-empty-catch): the disk may be full, and the user
   }                         // sees the line anyway
-}
-
-void TrainingRun::FinishEvaluationIfPossible() {
-  try {
-    training_.FinishEvaluation();
-  } catch (...) {  // NOLINT(bugprone-empty-catch): the earlier failure is the cause
-  }
 }
 
 void TrainingRun::OnEpisode(const TrainState& s, const FinishedEpisode& episode) {

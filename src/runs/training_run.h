@@ -51,8 +51,6 @@ class TrainingRun : private TrainObserver {
   bool Loop(const std::function<TrainRequest()>& poll);
   void SaveCheckpoint();
   void LogIfPossible(const std::string& line);
-  /// Takes the result of the last evaluation after a failure.
-  void FinishEvaluationIfPossible();
 
   void OnEpisode(const TrainState& s, const FinishedEpisode& episode) override;
   void OnMetrics(const TrainState& s, const Metrics& metrics) override;

@@ -45,6 +45,8 @@ class Trainer {
   /// Waits for the evaluation in the background, if there is one, and takes its result. Throws what
   /// the evaluation has thrown.
   void FinishEvaluation();
+  /// The same after another failure, which counts more: throws nothing.
+  void FinishEvaluationQuietly();
   /// Whether an evaluation runs in the background.
   bool is_evaluating() const { return background_ != nullptr; }
 
@@ -72,8 +74,6 @@ class Trainer {
   /// Evaluates the current policy. An unscheduled final evaluation does not count towards `solved`.
   void Evaluate(bool scheduled);
   static bool HasEnded(const EvaluationTask& task);
-  /// The same as FinishEvaluation after another failure, which counts more.
-  void FinishEvaluationQuietly();
   /// Starts the evaluation in the background. Returns whether the system has a thread for it.
   bool StartInBackground(const std::shared_ptr<EvaluationTask>& task);
   /// Runs the evaluation, and the stricter one if that is due.

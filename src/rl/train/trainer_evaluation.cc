@@ -6,7 +6,6 @@
 #include <system_error>
 #include <utility>
 
-#include "base/error.h"
 #include "base/thread_pool.h"
 #include "nn/network_policy.h"
 #include "rl/train/trainer.h"
@@ -120,7 +119,7 @@ void Trainer::FinishEvaluation() {
 void Trainer::FinishEvaluationQuietly() {
   try {
     FinishEvaluation();
-  } catch (const Error&) {  // NOLINT(bugprone-empty-catch): the earlier failure is the cause
+  } catch (...) {  // NOLINT(bugprone-empty-catch): the earlier failure is the cause
   }
 }
 
