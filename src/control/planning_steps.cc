@@ -10,52 +10,61 @@
 namespace upswing {
 namespace {
 
-/// Random states within `range` of upright (rad, rad/s), each with a torque up to `torque` (N·m).
-struct PlannedStates {
-  std::vector<StateVector> x;
-  std::vector<double> u;
-
-  PlannedStates(const StateVector& range, double torque) {
-    constexpr int kStates = 1000;
+/// Motions of a control period from random states within `range` of upright (rad, rad/s), each
+/// under a torque up to `torque` (N·m).
+class PlannedMotions {
+ public:
+  PlannedMotions(const DesignPlant& plant, const StateVector& range, double torque)
+      : plant_(plant) {
+    constexpr int kMotions = 1000;
     Rng rng(0, "states of planned motions");
-    for (int i = 0; i < kStates; ++i) {
+    for (int i = 0; i < kMotions; ++i) {
       StateVector state(std::numbers::pi, 0, 0, 0);
       for (int k = 0; k < 4; ++k) state[k] += rng.Uniform(-range[k], range[k]);
-      x.push_back(state);
-      u.push_back(rng.Uniform(-torque, torque));
+      begin_.push_back(state);
+      torque_.push_back(rng.Uniform(-torque, torque));
     }
+    simulated_ = EndsWith(plant.physics_steps());
   }
 
-  /// The states after a control period of this many steps.
-  std::vector<StateVector> After(const DesignPlant& plant, int steps) const {
-    std::vector<StateVector> after = x;
-    PendulumModel(plant, steps).Step(after, u);
-    return after;
+  /// Error of this many Runge-Kutta steps against the simulation: rms, in rad and natural velocity.
+  double ErrorOf(int steps) const {
+    const double velocity = TaskScaleOf(plant_).velocity();
+    const StateVector unit(1, 1, velocity, velocity);
+    const std::vector<StateVector> planned = EndsWith(steps);
+    double squares = 0;
+    for (size_t i = 0; i < planned.size(); ++i) {
+      squares += (planned[i] - simulated_[i]).cwiseQuotient(unit).squaredNorm();
+    }
+    return std::sqrt(squares / static_cast<double>(planned.size()));
   }
+
+ private:
+  std::vector<StateVector> EndsWith(int steps) const {
+    std::vector<StateVector> end = begin_;
+    PendulumModel(plant_, steps).Step(end, torque_);
+    return end;
+  }
+
+  const DesignPlant& plant_;
+  std::vector<StateVector> begin_, simulated_;
+  std::vector<double> torque_;
 };
 
 }  // namespace
 
 int PlanningSteps(const DesignPlant& plant) {
-  constexpr double kTolerance = 3e-3;  // rms error of a control period, rad and natural velocity
-  const double velocity = TaskScaleOf(plant).velocity();
-  const StateVector unit(1, 1, velocity, velocity);
-  const int most = plant.physics_steps();
-  const auto error_of = [&](int steps, const PlannedStates& states) {
-    const std::vector<StateVector> x = states.After(plant, steps),
-                                   exact = states.After(plant, most);
-    double squares = 0;
-    for (size_t i = 0; i < x.size(); ++i) {
-      squares += (x[i] - exact[i]).cwiseQuotient(unit).squaredNorm();
-    }
-    return std::sqrt(squares / static_cast<double>(x.size()));
-  };
+  constexpr double kTolerance = 3e-3;                     // rad and natural velocity
   constexpr double kPi = std::numbers::pi, kNear = 0.02;  // rad
-  const PlannedStates swinging({kPi, kPi, 10 * velocity, 20 * velocity}, plant.torque_limit);
+  const double velocity = TaskScaleOf(plant).velocity();
+  const int most = plant.physics_steps();
+  if (most == 1) return 1;
+  const PlannedMotions swinging(plant, {kPi, kPi, 10 * velocity, 20 * velocity},
+                                plant.torque_limit);
   // Dry friction is steepest near rest, where a plan holds the links.
-  const PlannedStates held({kNear, kNear, kNear * velocity, kNear * velocity}, 0);
+  const PlannedMotions held(plant, {kNear, kNear, kNear * velocity, kNear * velocity}, 0);
   int steps = 1;
-  while (steps < most && std::max(error_of(steps, swinging), error_of(steps, held)) > kTolerance) {
+  while (steps < most && std::max(swinging.ErrorOf(steps), held.ErrorOf(steps)) > kTolerance) {
     steps *= 2;
   }
   return steps;
