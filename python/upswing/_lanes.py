@@ -89,12 +89,10 @@ class Lanes:
 
     def _reset(self, i: int, env: Env, seed: int | None) -> None:
         returned = env.reset(seed=seed) if seed is not None else env.reset()
-        self._store(i, unpacked(returned, RESET, self._wheres[i])[0], "obs")
+        obs = unpacked(returned, RESET, self._wheres[i])[0]
+        self._arrays["obs"][i] = numbers(obs, self._space.obs_shape,
+                                         self._wheres[i] + "observations")
         self.lengths[i] = 0
-
-    def _store(self, i: int, obs: Any, name: str) -> None:
-        self._arrays[name][i] = numbers(obs, self._space.obs_shape,
-                                        self._wheres[i] + "observations")
 
 
 WANTED = ("env: expected a vector environment with AutoresetMode.SAME_STEP, or with a reset that knows "
