@@ -1,3 +1,4 @@
+import { CONTROL_PERIOD } from '../pendulum';
 import { button, element, write } from './dom';
 import { NOMINAL_AGENT } from './step';
 import type { Stage, Step } from './step';
@@ -64,7 +65,7 @@ export function reward(stage: Stage): Step {
     },
     end: () => stage.learn.endTry(),
     moment({ state: { w1 }, height: now }) {
-      const share = 1 / (SEEN * 50); // of a control step in the running means
+      const share = CONTROL_PERIOD / SEEN; // of a control step in the running means
       speed += share * (w1 - speed);
       height += share * ((now + 1) / 2 - height);
     },
