@@ -22,6 +22,7 @@ import type { Rival } from './rivals';
 import { RacePanel } from './race_panel';
 import { RewardPanel } from './reward';
 import { decodeRecipe, encodeRecipe, LARGEST_SEED } from './recipe';
+import type { Recipe } from './recipe';
 import { Scrubber } from './scrubber';
 import type { LearnStage } from './scrubber';
 import { nameInRace, SecondPendulum } from './second_pendulum';
@@ -149,7 +150,7 @@ export class LearnPanel {
   /// invalid, shows the reason and lets the current training go on.
   start(rival: Rival | null = null): void {
     if (!this.knobs.check() || !this.reward.check()) return;
-    for (const session of this.sessions) session.stop();
+    this.endAll();
     const count = rival ? RACE_SEEDS : this.four.checked ? SEEDS_AT_ONCE : 1;
     const largest = LARGEST_SEED - (count - 1);
     const first = Math.min(Math.max(Math.round(Number(this.seed.value)) || 0, 0), largest);
@@ -167,22 +168,32 @@ export class LearnPanel {
     this.choose(this.sessions[0]!);
   }
 
+  /// Ends the trainings; the panel does not show it yet.
+  private endAll(): void {
+    for (const session of this.sessions) session.stop();
+  }
+
+  /// Starts one training in place of all others.
+  private train(recipe: Recipe): void {
+    this.sessions = [new Session(recipe, () => this.news())];
+    this.choose(this.sessions[0]!);
+  }
+
   /// Trains an agent with another reward. The visitor's own training waits, and goes on if it has not
   /// ended.
   tryReward(reward: string): void {
-    if (this.aside) for (const session of this.sessions) session.stop();
+    if (this.aside) this.endAll();
     this.aside ??= { sessions: this.sessions, rival: this.rival, course: this.scrubber.course };
     const recipe = { agent: LEARNERS[0]!, seed: 1, settings: { reward } };
-    this.sessions = [new Session(recipe, () => this.news())];
     this.rival = undefined;
-    this.choose(this.sessions[0]!);
+    this.train(recipe);
   }
 
   /// Ends a training with another reward, and goes back to the one before it.
   endTry(): void {
     const { aside } = this;
     if (!aside) return;
-    for (const session of this.sessions) session.stop();
+    this.endAll();
     this.sessions = aside.sessions;
     this.rival = aside.rival;
     this.aside = null;
@@ -246,8 +257,7 @@ export class LearnPanel {
       this.knobs.settingsOf(agent),
     );
     if (!recipe) return;
-    this.sessions = [new Session(recipe, () => this.news())];
-    this.choose(this.sessions[0]!);
+    this.train(recipe);
   }
 
   /// The shown training as the part of an address after #; without a training, only the view.
@@ -261,13 +271,13 @@ export class LearnPanel {
 
   /// Ends all trainings.
   stop(): void {
-    for (const session of this.sessions) session.stop();
+    this.endAll();
     this.draw();
   }
 
   /// Ends and forgets all trainings, as for a new visitor.
   forget(): void {
-    for (const session of this.sessions) session.stop();
+    this.endAll();
     this.sessions = [];
     this.rival = undefined;
     this.aside = null;
