@@ -31,25 +31,22 @@ async function held(page: Page, seconds: number): Promise<number> {
   return balanced(page);
 }
 
-test('a new visitor gets the tour, which swings up before its agent and MuJoCo have loaded', async ({
-  page,
-}) => {
+test('a new visitor gets the tour, which swings up before MuJoCo has loaded', async ({ page }) => {
   let arrive = () => {};
   const arrived = new Promise<void>((resolve) => (arrive = resolve));
-  await page.route(/mujoco.*\.wasm$|d3qn\.safetensors$/, async (route) => {
+  await page.route(/mujoco.*\.wasm$/, async (route) => {
     await arrived;
     await route.continue();
   });
   await page.goto('./');
   await page.waitForFunction(() => Math.abs(globalThis.upswing?.world.state.q1 ?? 0) > 0.5);
-  await expect(page.locator('#agent')).toHaveValue('fast');
   const before = await page.evaluate(() => {
     upswing.clock.advance = () => true; // time stands still
     return upswing.world.state;
   });
   arrive();
   await page.waitForFunction(() => upswing.isComplete);
-  await expect(page.locator('#agent')).toHaveValue('d3qn');
+  await expect(page.locator('#agent')).toHaveValue('fast');
   expect(await page.evaluate(() => upswing.world.state)).toEqual(before);
   expect(await page.evaluate(() => upswing.world.agentOn)).toBe(true);
 
@@ -57,15 +54,15 @@ test('a new visitor gets the tour, which swings up before its agent and MuJoCo h
   await expect(page.locator('#charts')).toBeHidden();
   await advance(page, 6);
   await expect(page.locator('#badge')).toHaveText(/balanced/);
-  await expect(answer(page)).toContainText('Balanced, after 80 minutes of practice');
+  await expect(answer(page)).toContainText('Balanced, after 70 minutes of practice');
   // Then something happens: a shove, which it catches.
   await advance(page, 4);
   expect(await page.evaluate(() => upswing.world.shoved)).not.toBeNull();
   await expect(answer(page)).toContainText('even when it is shoved');
   expect(await balanced(page)).toBeGreaterThan(5);
-  const text = Buffer.from(readPolicy('d3qn')).toString('latin1');
+  const text = Buffer.from(readPolicy('fast')).toString('latin1');
   const steps = Number(/"step":"(\d+)"/.exec(text)![1]);
-  expect(Math.abs((steps * 0.02) / 4800 - 1)).toBeLessThan(0.1);
+  expect(Math.abs((steps * 0.02) / 4200 - 1)).toBeLessThan(0.1);
 });
 
 test('nothing moves by itself with reduced motion', async ({ stage: page }) => {

@@ -258,11 +258,6 @@ export class Agents {
     return this.own ? [...list, { id: OWN, title: ownTitle(this.own), main: true }] : list;
   }
 
-  /// Whether an agent is loaded.
-  isHere(id: string): boolean {
-    return this.loaded.has(id);
-  }
-
   /// Whether an agent has this ID.
   has(id: string): boolean {
     return this.entries.has(id) || COMPUTED.has(id) || (id === OWN && this.own !== null);

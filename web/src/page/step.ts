@@ -20,7 +20,6 @@ export interface Stage {
   choose(agent: string): Promise<boolean>;
   readonly agents: {
     has(id: string): boolean;
-    isHere(id: string): boolean;
     /// Whether the visitor's own agent was learned in this page.
     readonly ownIsLearned: boolean;
     /// The part of an address with which that agent learns again; empty if it is unknown.
@@ -81,7 +80,8 @@ export interface Step {
 }
 
 export const NOMINAL_AGENT = 'd3qn';
-export const SMALL_AGENT = 'fast'; // a twentieth of the default agent's size
+/// The first screen's agent. Its file is a twentieth of the default agent's.
+export const SMALL_AGENT = 'fast';
 export const ADAPTIVE_AGENT = 'd3qn-adaptive';
 export const ANY_POSE_AGENT = 'any-pose';
 export const HELD = 2; // s upright that count as balanced

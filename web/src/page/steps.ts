@@ -27,16 +27,12 @@ function watch(stage: Stage): Step {
   const again = button('watch-again', swingUp);
   return {
     id: 'watch',
-    agents: [NOMINAL_AGENT],
+    agents: [SMALL_AGENT],
     labels: () => [GOAL, { at: 'motor', text: 'the motor' }],
     async begin() {
       const on = !prefersStill();
       again.textContent = on ? 'Swing up again' : 'Swing up';
-      const { agents } = stage;
-      if (agents.isHere(NOMINAL_AGENT) || !agents.has(SMALL_AGENT))
-        return void (await stage.begin({ agent: NOMINAL_AGENT, on }));
-      // The small agent loads within a moment; the large one replaces it during the swing.
-      if (await stage.begin({ agent: SMALL_AGENT, on })) void stage.choose(NOMINAL_AGENT);
+      await stage.begin({ agent: SMALL_AGENT, on });
     },
     moment() {
       const { world } = stage;
@@ -49,7 +45,7 @@ function watch(stage: Stage): Step {
       if (heldFor(world) < HELD) return '';
       return world.shoved
         ? 'Balanced, even when it is shoved. Now see how that is learned: press Start.'
-        : 'Balanced, after 80 minutes of practice, computed in seconds. Press Start.';
+        : 'Balanced, after 70 minutes of practice, computed in seconds. Press Start.';
     },
   };
 }
@@ -71,7 +67,9 @@ function motor(stage: Stage): Step {
     ],
     async begin(ghost) {
       keys.enabled = true;
-      if (await stage.begin({ agent: NOMINAL_AGENT, on: false })) game.open(ghost);
+      if (!(await stage.begin({ agent: SMALL_AGENT, on: false }))) return;
+      game.open(ghost);
+      void stage.choose(NOMINAL_AGENT); // The large agent loads while the visitor plays.
     },
     end() {
       keys.enabled = false;
