@@ -118,6 +118,15 @@ test('a reward that prefers a side is learned, and leaves the own training as it
   await page.evaluate(() => upswing.learn.stop());
 });
 
+test('the lazy agent is judged by its motion, not by how it begins', async ({ stage: page }) => {
+  await open(page, `#tour=${REWARD}`);
+  await page.getByRole('button', { name: 'Be lazy' }).click();
+  // It hangs at rest before it has tried anything.
+  await expect(page.locator('#reward-count')).toHaveText(/^Trial \d/);
+  await expect(answer(page)).toHaveText('It tries …');
+  await expect(answer(page)).toHaveText(/^It hangs and rests/);
+});
+
 test('an empty reward is refused', async ({ stage: page }) => {
   await open(page, '#learn');
   await page.locator('#reward-details > summary').click();

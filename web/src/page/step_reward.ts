@@ -5,7 +5,7 @@ import type { Stage, Step } from './step';
 
 /// A step of the tour: three rewards, and what an agent makes of them.
 
-const SEEN = 3; // s of turning or rest until the answer says so
+const MEMORY = 3; // s that the means remember
 const FAST = 4; // rad/s
 const SLOW = 0.3; // rad/s
 
@@ -13,30 +13,39 @@ interface Preset {
   readonly id: string;
   readonly reward: string;
   /// What the agent does once it has learned its reward; empty before.
-  readonly found: (speed: number, height: number) => string;
+  readonly found: (seen: Seen) => string;
 }
 
-/// `speed`: mean velocity of the upper link, rad/s; `height`: mean height of the tip, 0 hanging to 1.
+/// Running means of a motion.
+interface Seen {
+  turning: number; // velocity of the upper link, rad/s
+  moving: number; // its size, rad/s
+  height: number; // of the tip, 0 hanging to 1
+}
+
+/// Means that no agent has learned: they change to those of the motion.
+const UNSEEN: Readonly<Seen> = { turning: 0, moving: FAST, height: 0.5 };
+
 const PRESETS: readonly Preset[] = [
   {
     id: 'spin',
     reward: 'spin: 0.2*w1',
-    found: (speed) =>
-      speed > FAST
-        ? `It spins, ${(speed / (2 * Math.PI)).toFixed(1)} turns a second. Why stand still? That earns nothing.`
+    found: ({ turning }) =>
+      turning > FAST
+        ? `It spins, ${(turning / (2 * Math.PI)).toFixed(1)} turns a second. Why stand still? That earns nothing.`
         : '',
   },
   {
     id: 'height',
     reward: 'height: h',
-    found: (_, height) =>
+    found: ({ height }) =>
       height > 0.7 ? 'It stays high, but it need not stand still: no points for that.' : '',
   },
   {
     id: 'lazy',
     reward: 'balance: 5*inverted; lazy: -0.4*tau^2',
-    found: (speed, height) =>
-      Math.abs(speed) < SLOW && height < 0.1
+    found: ({ moving, height }) =>
+      moving < SLOW && height < 0.1
         ? 'It hangs and rests. Each effort costs points at once, and it never finds out what standing brings.'
         : '',
   },
@@ -44,14 +53,14 @@ const PRESETS: readonly Preset[] = [
 
 export function reward(stage: Stage): Step {
   let chosen: Preset | null = null;
-  let speed = 0;
-  let height = 0;
+  let seen: Seen = UNSEEN;
   let found = '';
   const buttons = PRESETS.map((preset) => button(`reward-${preset.id}`, () => run(preset)));
   const mark = () => buttons.forEach((one, i) => (one.ariaPressed = String(PRESETS[i] === chosen)));
   const run = (preset: Preset) => {
     chosen = preset;
-    [speed, height, found] = [0, 0, ''];
+    seen = UNSEEN;
+    found = '';
     mark();
     stage.learn.tryReward(preset.reward);
   };
@@ -64,15 +73,19 @@ export function reward(stage: Stage): Step {
       await stage.begin({ agent: NOMINAL_AGENT, on: false });
     },
     end: () => stage.learn.endTry(),
-    moment({ state: { w1 }, height: now }) {
-      const share = CONTROL_PERIOD / SEEN; // of a control step in the running means
-      speed += share * (w1 - speed);
-      height += share * ((now + 1) / 2 - height);
+    moment({ state: { w1 }, height }) {
+      const share = CONTROL_PERIOD / MEMORY; // of a control step in the running means
+      const mean = (before: number, now: number) => before + share * (now - before);
+      seen = {
+        turning: mean(seen.turning, w1),
+        moving: mean(seen.moving, Math.abs(w1)),
+        height: mean(seen.height, (height + 1) / 2),
+      };
     },
     answer() {
       write(element('reward-count'), chosen ? stage.learn.story.count : '');
       if (!chosen) return '';
-      found = chosen.found(speed, height) || found;
+      found = chosen.found(seen) || found;
       return found || 'It tries …';
     },
   };
