@@ -201,12 +201,13 @@ TorqueIntegral::TorqueIntegral(const MachineLog& log, const TorqueReading& readi
   }
 }
 
-Joints TorqueIntegral::At(double time) const {
+Joints TorqueIntegral::At(double time) {
   if (time <= time_.front()) return {};
   if (time >= time_.back()) return integral_.back();
-  const auto k = std::ranges::upper_bound(time_, time) - time_.begin();
-  const double share = (time - time_[k - 1]) / (time_[k] - time_[k - 1]);
-  const Joints &a = integral_[k - 1], &b = integral_[k];
+  while (next_ > 1 && time_[next_ - 1] > time) --next_;
+  while (time_[next_] <= time) ++next_;
+  const double share = (time - time_[next_ - 1]) / (time_[next_] - time_[next_ - 1]);
+  const Joints &a = integral_[next_ - 1], &b = integral_[next_];
   return {a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])};
 }
 
@@ -372,7 +373,7 @@ void WeakForm::SetTorques(const TorqueReading& torques, double delay,
   }
   for (int row = 0; row < windows(); ++row) {
     const Window& window = windows_[row];
-    const TorqueIntegral& integral = integrals[window.piece];
+    TorqueIntegral& integral = integrals[window.piece];
     Joints sum{};
     Joints last = integral.At(window.begin - step_ / 2 - delay);
     for (int i = 0; i < weight_.size(); ++i) {
