@@ -84,7 +84,6 @@ export const NOMINAL_AGENT = 'd3qn';
 export const SMALL_AGENT = 'fast';
 export const ADAPTIVE_AGENT = 'd3qn-adaptive';
 export const ANY_POSE_AGENT = 'any-pose';
-export const HELD = 2; // s upright that count as balanced
 export const ARROWS = ['ArrowLeft', 'ArrowRight'];
 export const GOAL: Label = { at: 'goal', text: 'both links in here' };
 

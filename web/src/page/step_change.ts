@@ -1,7 +1,8 @@
 import type { Parameter } from '../pendulum';
 import { element } from './dom';
-import { enter, heldFor, HELD, NOMINAL_AGENT, yoursOf } from './step';
+import { enter, heldFor, NOMINAL_AGENT, yoursOf } from './step';
 import type { Stage, Step } from './step';
+import { HELD } from './verdict';
 
 /// A step of the tour: the visitor changes the pendulum until its agent fails. It begins with one
 /// slider; the others appear after its first use.

@@ -1,6 +1,7 @@
 import { GOALS } from '../pendulum';
-import { ANY_POSE_AGENT, enter, heldFor, HELD } from './step';
+import { ANY_POSE_AGENT, enter, heldFor } from './step';
 import type { Stage, Step } from './step';
+import { HELD } from './verdict';
 
 /// A step of the tour: an agent for every pose.
 export function pose(stage: Stage): Step {

@@ -5,12 +5,13 @@ import { Game } from './game';
 import { prefersStill } from './motion';
 import { MotorKeys } from './motor';
 import { OWN } from './share';
-import { ARROWS, enter, GOAL, heldFor, HELD, NOMINAL_AGENT, SMALL_AGENT, yoursOf } from './step';
+import { ARROWS, enter, GOAL, heldFor, NOMINAL_AGENT, SMALL_AGENT, yoursOf } from './step';
 import type { Stage, Step } from './step';
 import { bet } from './step_bet';
 import { change } from './step_change';
 import { pose } from './step_pose';
 import { reward } from './step_reward';
+import { HELD } from './verdict';
 
 /// The steps of the tour: their actions on the page, and their answers to the visitor. Their words
 /// and controls are in index.html.

@@ -2,7 +2,7 @@
 
 const WON = 5; // s upright that win a race
 const LONGEST = 20; // s, of a race
-const HELD = 2; // s upright that count as balanced
+export const HELD = 2; // s upright that count as balanced
 
 /// Who balances: one of both, both, or none.
 export interface Verdict {
