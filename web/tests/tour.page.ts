@@ -200,7 +200,7 @@ test('a bet: only the agent of many pendulums balances the light link', async ({
   await expect(page.locator('#twin-scene')).toBeVisible();
   await expect(page.locator('#first-name')).toHaveText('learned on one');
   await expect(page.locator('#twin-name')).toHaveText('learned on many');
-  expect(await page.evaluate(() => upswing.world.twin!.plant.mass2)).toBe(0.75);
+  expect(await page.evaluate(() => upswing.world.twin!.plant.mass2)).toBe(0.65);
   await advance(page, 2); // nothing moves before the bet
   expect(await page.evaluate(() => upswing.world.state.q1)).toBe(0);
   await expect(answer(page)).toHaveText('');
@@ -233,7 +233,7 @@ test('a bet that both agents win or lose is a draw', async ({ stage: page }) => 
     [{ torque_limit: 0.5 }, 'A draw: neither balances it within 20 s.'],
   ] as const) {
     await page.getByRole('button', { name: 'Learned on many' }).click();
-    await expect.poll(() => page.evaluate(() => upswing.world.plant.mass2)).toBe(0.75);
+    await expect.poll(() => page.evaluate(() => upswing.world.plant.mass2)).toBe(0.65);
     await expect.poll(() => page.evaluate(() => upswing.world.agentOn)).toBe(true);
     await page.evaluate((change) => {
       upswing.world.plant = { ...upswing.world.plant, ...change };

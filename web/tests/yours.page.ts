@@ -81,6 +81,15 @@ test('a lighter link: one slider first, then the others, and the answer says whe
   await advance(page, 5);
   await expect(answer(page)).toHaveText('Still up with 0.95 kg. Go on!');
   await mass.fill('0.5');
+  const until = (upright: boolean) =>
+    page.evaluate(async (upright) => {
+      const { world } = upswing;
+      while ((world.uprightFor ?? 0) > 0 !== upright) world.advance();
+      for (let k = 0; k < 12; ++k) await new Promise(requestAnimationFrame); // two answers
+    }, upright);
+  await until(false);
+  await until(true); // whirls past upright
+  await expect(answer(page)).toHaveText('It fell, and tries again …');
   await advance(page, 14);
   await expect(answer(page)).toHaveText(/^It fails with 0\.5 kg/);
   // The laboratory's slider shows the same value.
@@ -125,6 +134,7 @@ test('the lazy agent is judged by its motion, not by how it begins', async ({ st
   await expect(page.locator('#reward-count')).toHaveText(/^Trial \d/);
   await expect(answer(page)).toHaveText('It tries …');
   await expect(answer(page)).toHaveText(/^It hangs and rests/);
+  await expect(page.locator('#badge')).toBeHidden(); // the goal is another one
 });
 
 test('an empty reward is refused', async ({ stage: page }) => {

@@ -7,7 +7,7 @@ import type { Verdict } from './verdict';
 
 /// A step of the tour: a race of two agents with a pendulum that is new to one of them.
 
-const LIGHT = 0.75; // kg
+const LIGHT = 0.65; // kg
 
 export function bet(stage: Stage): Step {
   let onMany = false; // the visitor's bet

@@ -21,6 +21,7 @@ const CHOICES: readonly (readonly [Parameter | 'size', string])[] = [
 
 export function change(stage: Stage): Step {
   let changedAt = 0; // s, in the world's time; 0: nothing has changed
+  let fell = false; // since the change
   let told = ''; // the value that was changed last, such as "0.8 kg"
   const choice = element('change-choice');
   const rows = CHOICES.map(([name, text]) => {
@@ -47,6 +48,7 @@ export function change(stage: Stage): Step {
     if (text === told) return;
     told = text;
     changedAt = stage.world.time;
+    fell = false;
     choice.style.visibility = '';
   };
   return {
@@ -64,9 +66,14 @@ export function change(stage: Stage): Step {
     answer(world) {
       if (changedAt === 0 || !world.agentOn) return '';
       const tried = (world.time - changedAt) * world.units.time;
-      if (heldFor(world) > HELD && tried > HELD) return `Still up with ${told}. Go on!`;
+      const held = heldFor(world);
+      if (held > HELD && tried > HELD) {
+        fell = false;
+        return `Still up with ${told}. Go on!`;
+      }
       if (tried > PATIENCE) return `It fails with ${told}: it never met such a pendulum.`;
-      return heldFor(world) > 0 ? 'It holds on …' : 'It fell, and tries again …';
+      if (held === 0) fell = true;
+      return fell ? 'It fell, and tries again …' : 'It holds on …';
     },
   };
 }

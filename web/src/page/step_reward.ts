@@ -39,7 +39,9 @@ const PRESETS: readonly Preset[] = [
     id: 'height',
     reward: 'height: h',
     found: ({ height }) =>
-      height > 0.7 ? 'It stays high, but it need not stand still: no points for that.' : '',
+      height > 0.7
+        ? 'It stays up: nowhere else is as high. You did not have to ask for balance.'
+        : '',
   },
   {
     id: 'lazy',

@@ -1,3 +1,4 @@
+import { CONTROL_PERIOD } from '../pendulum';
 import { addressOf } from './address';
 import { send } from './clipboard';
 import { button, element, write } from './dom';
@@ -167,7 +168,11 @@ function shove(stage: Stage): Step {
   };
 }
 
+const SMALL_TORQUE = 1; // N·m
+const MEMORY = 0.5; // s that the mean torque remembers
+
 function values(stage: Stage): Step {
+  let effort = 0; // running mean of the torque's size, N·m
   const speed = element<HTMLInputElement>('tour-speed');
   const show = () => {
     element('tour-speed-value').textContent = `${speed.value}×`;
@@ -185,10 +190,15 @@ function values(stage: Stage): Step {
       element('tour-speed-value').textContent = '1×';
       await stage.begin({ agent: yoursOf(stage), on: !prefersStill() });
     },
-    answer: (world) =>
-      heldFor(world) > HELD
-        ? 'Upright, small torques are best. Drag the pendulum and watch the bars.'
-        : '',
+    moment({ torque }) {
+      effort += (CONTROL_PERIOD / MEMORY) * (Math.abs(torque) - effort);
+    },
+    answer(world) {
+      if (heldFor(world) <= HELD) return '';
+      const what =
+        effort < SMALL_TORQUE ? 'small torques are best' : 'it pushes now left, now right';
+      return `Upright, ${what}. Drag the pendulum and watch the bars.`;
+    },
   };
 }
 
