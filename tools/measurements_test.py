@@ -3,6 +3,7 @@
 for a second, and without the other libraries."""
 
 import importlib.util
+import json
 import os
 import re
 import subprocess
@@ -17,6 +18,7 @@ BENCHMARKS = UPSWING.with_name("benchmarks")
 sys.dont_write_bytecode = True
 sys.path[:0] = [str(ROOT / "tools/peers"), str(ROOT / "tools/results")]
 import actors  # noqa: E402  pylint: disable=wrong-import-position
+import results  # noqa: E402  pylint: disable=wrong-import-position
 
 # Settings whose defaults do not matter here: of features that are off, of schedules that are constant.
 NEUTRAL = {"sac": {"priority_exponent", "importance_exponent",
@@ -45,6 +47,17 @@ class Results(unittest.TestCase):
     def test_recipes(self):
         for table, words in (("first-training", "steps"), ("perf-c", "`d3qn`")):
             self.assertIn(words, self.succeed("tools/results/results.py", "measure", table, "--try"))
+
+    def test_trainings_for_the_swing_up_of_realaigym(self):
+        """Their settings are accepted, and the policy of a training acts every 2 ms."""
+        with tempfile.TemporaryDirectory(prefix="upswing-") as folder:
+            for robot in results.REALAIGYM_REWARDS:
+                slow, fast = (f"{folder}/{robot}-{ms}ms" for ms in (20, 2))
+                settings = [UPSWING, "train", *results.swing_up_settings(robot)]
+                actors.run([*settings, "--steps", "64", "--out", slow])
+                actors.run([*settings, "--start-policy", slow, *results.EVERY_2_MS, "--out", fast])
+                info = json.loads(actors.run([UPSWING, "info", f"{fast}/policy.safetensors", "--json"]))
+                self.assertEqual(info["control_period"], 0.002)
 
     @unittest.skipUnless(BENCHMARKS.exists(), "needs Google Benchmark")
     def test_benchmarks_have_the_names_of_the_table(self):

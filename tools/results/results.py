@@ -585,6 +585,62 @@ def machine_held_out(lab):
             "C.1 model 1.0, adapted to run 01", "shipped twin", "C.1 model 1.0"], rows
 
 
+REALAIGYM_REWARDS = {
+    "pendubot": "E+h+5*inverted+5*(h>0.95); -0.03*min(w1^2+w2^2,300)-10*max(E-1.05,0); "
+                "-0.15*tau^2-(upright>0.4)*2*min(tau^2,1); -0.5*dtau^2/(1+2*abs(dtau))",
+    "acrobot": "E+h+5*inverted+5*(h>0.95); -0.015*min(w1^2+w2^2,400)-10*max(E-1.05,0); "
+               "-0.15*tau^2-(upright>0.4)*2*min(tau^2,1); -0.5*dtau^2/(1+2*abs(dtau))"}
+REALAIGYM_STEPS = {"pendubot": 250000, "acrobot": 400000}
+REALAIGYM_FLAGS = {"pendubot": ["--gamma", "0.985"],
+                   "acrobot": ["--actuated-joint", "2", "--gamma", "0.99"]}
+REALAIGYM_SETTINGS = (
+    "--agent sac --plant realaigym --hidden 64,64 --batch 128 --replay 1000000 --n-step 5 "
+    "--no-prioritized --no-mirror --reward-centering 0 --envs 64 --threads 1 "
+    "--no-stop-when-solved --eval-every 1000000 --eval-episodes 1 --start-noise 0.01 "
+    "--start-noise-end 0.01 --episode-seconds 2 --random-start-share 0.7 --learning-starts 5000 "
+    "--updates-per-step 0.15 --target-entropy -2").split()
+# Training with a learning rate of 0 only hands the policy on to another control period.
+EVERY_2_MS = "--control-period 0.002 --steps 64 --learning-rate 0 --learning-rate-end 0".split()
+
+
+def swing_up_settings(robot):
+    """Settings of the trainings for version 2 of RealAIGym, without steps and seed."""
+    return [*REALAIGYM_SETTINGS, *REALAIGYM_FLAGS[robot], "--reward", REALAIGYM_REWARDS[robot]]
+
+
+def swing_up_scores(lab, robot, seed):
+    """S and R of a training every 20 ms, then of the same policy every 2 ms."""
+    settings = [*swing_up_settings(robot), "--seed", seed]
+    steps = REALAIGYM_STEPS[robot]
+    slow, fast = (lab.folder / f"{robot}{period}-seed{seed}" for period in ("", "-2ms"))
+    lab.run("train", *settings, "--steps", 6400 if lab.few else steps, "--learning-rate-steps",
+            steps, "--out", slow)
+    lab.run("train", *settings, "--start-policy", slow, *EVERY_2_MS, "--out", fast)
+    scores = []
+    for run in (slow, fast):
+        report = lab.json("realaigym", "score", run, "--score-version", 2)
+        scores += [report["performance"]["score"], report["robustness"]["score"]]
+    return scores
+
+
+@recipe("realaigym-swing-up")
+def realaigym_swing_up(lab):
+    """Version 2 of RealAIGym: five trainings for each robot, at two control periods."""
+    rows = []
+    for seed in range(21, 22 if lab.few else 26):
+        row = []
+        for robot in REALAIGYM_REWARDS:
+            row += swing_up_scores(lab, robot, seed)
+        rows.append(row)
+    lab.commands = ["./upswing realaigym score runs/ROBOT-2ms-seedSEED --score-version 2"]
+    table = [[str(21 + k), *(f"{score:.3f}" for score in row)] for k, row in enumerate(rows)]
+    if not lab.few:
+        table.append(["mean ± deviation", *(f"{statistics.mean(x):.3f} ± {statistics.stdev(x):.3f}"
+                                            for x in zip(*rows))])
+    return ["training seed", *(f"{robot}, {name}, every {period} ms" for robot in REALAIGYM_REWARDS
+                               for period in (20, 2) for name in ("S", "R"))], table
+
+
 def this_machine():
     """This machine: processor, cores, memory and system."""
     text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
