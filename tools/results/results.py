@@ -22,9 +22,11 @@ backticks; COLUMN is an index or a header. A page can also show the table of the
 """
 
 import argparse
+import csv
 import datetime
 import functools
 import json
+import math
 import os
 import platform
 import re
@@ -467,6 +469,43 @@ def time_to_solve(lab):
                      spread(group["solve_steps"], lambda x: f"{x:,.0f}")])
     return ["agent", "solved", "time to solve [s]: median (range)",
             "steps to solve: median (range)"], rows
+
+
+@recipe("price-of-return")
+def price_of_return(lab):
+    """What four times the steps bring after the task is solved, on five seeds of each agent."""
+    best = best_known_returns()
+
+    def trained(agent, seed, name, *more):
+        """A training's last step, and its policy's share of the best known return [%]."""
+        out = lab.folder / f"{agent}-seed{seed}{name}"
+        lab.run("train", "--agent", agent, "--seed", seed, *more, "--out", out)
+        evaluations = list(csv.DictReader((out / "evals.csv").open(encoding="utf-8")))
+        report = lab.json("eval", out, "--episodes", len(best))
+        share = 100 * report["return"]["mean"] / statistics.mean(best)
+        return int(evaluations[-1]["step"]), share
+
+    rows = []
+    for agent in ("fast",) if lab.few else ("fast", "d3qn", "sac", "ppo"):
+        first, last, price = [], [], []
+        for seed in range(21, 22 if lab.few else 26):
+            few = ["--steps", 20000] if lab.few else []
+            steps, solved = trained(agent, seed, "", *few)
+            _, longer = trained(agent, seed, "-longer", "--no-stop-when-solved", "--steps", 4 * steps)
+            first.append(solved)
+            last.append(longer)
+            price.append(3 * steps / (longer - solved) if longer > solved else math.inf)
+        cheap, dear = min(price), max(price)
+        rows.append([f"`{agent}`", *(f"{statistics.median(x):.1f}% ({min(x):.1f} to {max(x):.1f}%)"
+                                     for x in (first, last)),
+                     f"{steps_text(statistics.median(price))} ({steps_text(cheap)} to {steps_text(dear)})"])
+    return ["agent", "return / best known when solved: median (range)", "after four times the steps",
+            "more steps for 1%"], rows
+
+
+def steps_text(steps):
+    """Steps in thousands, or that no number of them was enough."""
+    return "no gain" if math.isinf(steps) else f"{1000 * round(steps / 1000):,}"
 
 
 def spread(figure, text):
