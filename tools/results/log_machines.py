@@ -22,7 +22,8 @@ def log_uniform(rng, low, high):
 
 
 def draw_plant(rng):
-    """Constants of the motion of links of 5 cm to 2 m with drawn shapes, in SI units."""
+    """Links of 5 cm to 2 m with drawn shapes, in SI units: constants of the motion, natural time, and the links'
+    values in a plant file."""
     l1 = log_uniform(rng, 0.05, 2)
     l2 = l1 * rng.uniform(0.5, 1.5)
     m1, m2 = 2 * (l1 / 0.2) ** 2 * rng.uniform(0.15, 0.5, 2)
@@ -35,13 +36,15 @@ def draw_plant(rng):
     time = math.sqrt(inertia / (p["G1"] + p["G2"]))
     p |= {"d1": rng.uniform(0.002, 0.05) * inertia / time, "d2": rng.uniform(0.002, 0.05) * p["J2"] / time,
           "f1": rng.uniform(0, 0.04) * (p["G1"] + p["G2"]), "f2": rng.uniform(0, 0.04) * p["G2"]}
-    return p, time
+    links = {"mass1": m1, "mass2": m2, "length1": l1, "length2": l2, "center1": c1, "center2": c2,
+             "inertia1": i1, "inertia2": i2}
+    return p, time, links
 
 
 def draw_machine(seed, number, drive):
     """A machine with its motion: plant, natural time T [s], rate, drive, signal and start. `seed`: list of numbers."""
     rng = np.random.default_rng([*seed, number])
-    plant, time = draw_plant(rng)
+    plant, time, links = draw_plant(rng)
     if drive == "free":
         plant["f1"] /= 3
         plant["f2"] /= 3
@@ -55,7 +58,7 @@ def draw_machine(seed, number, drive):
     cycle = 1 / log_uniform(rng, slowest, max(slowest, fastest))
     rows = int(seconds / cycle)
     machine = {
-        "number": number, "plant": plant, "T": time, "cycle": cycle, "rows": rows, "drive": drive,
+        "number": number, "plant": plant, "links": links, "T": time, "cycle": cycle, "rows": rows, "drive": drive,
         "substeps": max(1, math.ceil(cycle / (0.02 * time))), "limit": limit, "start": start,
         "gravity": gravity, "signal": SIGNALS[rng.integers(3)],
         "sines": (rng.uniform(0.3, 1.6, (2, 3)) / time, rng.uniform(0, 2 * math.pi, (2, 3))),

@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
 """Judges `machine check` by logs whose truth is known: false alarms, and damage that it names.
 
-    logs.py [--machines N] [--seed S] [--good N] [--kind TITLE] [--verbose] [--keep FOLDER]
+    logs.py [--machines N] [--seed S] [--good N] [--kind TITLE] [--identify] [--verbose] [--keep FOLDER]
 
 Draws machines of 5 cm to 2 m with drawn shapes and friction, which move by both motors, by one or by none. Draws
 for each a logger: 50 Hz to 2 kHz, encoders of 512 to 2^20 counts, 3 to 9 printed digits, conventions that a file of
 columns declares, lost rows and jitter. Prints the false alarms on undamaged logs. For each kind of damage it prints
 on how many machines check names it, blames something else, says that no reading explains the motion, or finds
-nothing.
+nothing. `--identify` fits a twin to each log in which check finds nothing, from the machine's masses, lengths and
+shapes without friction. It prints for how many the twin is distrusted: it does not explain the log, has a value that
+no machine has, or contradicts the lengths. The others are silent: neither check nor identify says a word.
 
 A usable log is 60 to 200 natural times of the machine long, with four rows and more in each. Both joints move by
 1 rad and more, by less than 1 rad between two rows, and half of the natural times have motion.
@@ -22,6 +24,7 @@ import re
 import subprocess
 import sys
 import tempfile
+import tomllib
 from collections import Counter
 from pathlib import Path
 
@@ -153,6 +156,36 @@ def findings_of(program, arguments):
             for f in found if f["severity"] != "note"]
 
 
+def distrust_of(program, arguments, machine, logger):
+    """Why a twin that is identified from a log is not to be trusted; None if it is."""
+    log = Path(arguments[0])
+    plant, twin = log.with_suffix(".plant.toml"), log.with_suffix(".twin.toml")
+    limit = max(machine["limit"].max(), 1e-3 * machine["gravity"][0])
+    plant.write_text("[plant]\n" + "".join(f"{k} = {v!r}\n" for k, v in machine["links"].items())
+                     + f"torque_limit = {float(limit)!r}\n")
+    if logger["torques"] == "measured":  # identify drives its model by commands
+        columns = log.with_suffix(".identify.toml")
+        columns.write_text(commands_from_measured(Path(arguments[2]).read_text() if len(arguments) > 1 else ""))
+        arguments = [arguments[0], "--columns", str(columns)]
+    done = subprocess.run([*program, "machine", "identify", *arguments, "--plant", str(plant), "--folds", "0",
+                           "--threads", "1", "--out", str(twin), "--overwrite"], stdout=subprocess.PIPE,
+                          stderr=subprocess.PIPE, encoding="utf-8", check=False)
+    if done.returncode > 1:
+        return "refused: " + done.stderr.strip()
+    if done.returncode == 0:
+        return None
+    return tomllib.loads(twin.read_text())["distrust"]
+
+
+def commands_from_measured(toml):
+    """A file of columns that names the measured torques as commands."""
+    if toml:
+        return re.sub(r"^measured([12])", r"commanded\1", toml, flags=re.MULTILINE)
+    keys = {"time": "time"} | {f"{key}{j}": f"{REALAIGYM[key]}{j}" for key in ("angle",) for j in (1, 2)}
+    keys |= {f"commanded{j}": f"{REALAIGYM['measured']}{j}" for j in (1, 2)}
+    return "".join(f'{key} = "{column}"\n' for key, column in keys.items())
+
+
 def verdict_of(kind, log, findings):
     """`named`, `another`, `unexplained` or `nothing`, of the findings about a damaged log."""
     faults = [f for f in findings if f.startswith("fault")]
@@ -170,8 +203,8 @@ def verdict_of(kind, log, findings):
 class Judge:
     """Draws, damages, writes and checks logs."""
 
-    def __init__(self, program, seed, folder):
-        self.program, self.seed, self.folder = program, seed, folder
+    def __init__(self, program, seed, folder, identifies):
+        self.program, self.seed, self.folder, self.identifies = program, seed, folder, identifies
         self.folder.mkdir(parents=True, exist_ok=True)
 
     def logs(self, kind, count, stream):
@@ -207,6 +240,13 @@ class Judge:
             findings = findings_of(self.program, arguments)
             verdict = verdict_of(kind, log, findings) if kind else (
                 "alarm" if any(f.startswith("fault") for f in findings) else "silent")
+            if self.identifies and verdict in ("nothing", "silent"):
+                distrust = distrust_of(self.program, arguments, machine, logger)
+                if distrust:
+                    verdict = "distrusted"
+                    findings = [*findings, f"identify: {distrust}"]
+                elif kind:
+                    verdict = "silent"
             habits = {k: machine[k] for k in ("T", "cycle", "rows", "drive", "signal")} | {
                 k: logger[k] for k in ("counts", "digits", "velocity", "torques", "convention")}
             yield path, verdict, findings, habits
@@ -220,9 +260,11 @@ def main():
     parser.add_argument("--kind", help="only kinds with this text in their title")
     parser.add_argument("--program", default="./upswing --no-setup")
     parser.add_argument("--keep", type=Path, help="folder for the logs")
+    parser.add_argument("--identify", action="store_true", help="fit a twin to each log in which check finds nothing")
     parser.add_argument("--verbose", action="store_true", help="print the findings of each miss")
     arguments = parser.parse_args()
-    judge = Judge(arguments.program.split(), arguments.seed, arguments.keep or Path(tempfile.mkdtemp()))
+    judge = Judge(arguments.program.split(), arguments.seed, arguments.keep or Path(tempfile.mkdtemp()),
+                  arguments.identify)
     streams = [(None, arguments.good, 0)] if not arguments.kind else []
     streams += [(kind, arguments.machines, i + 1) for i, kind in enumerate(KINDS)
                 if not arguments.kind or arguments.kind in kind.title]
@@ -232,7 +274,7 @@ def main():
         counts = Counter()
         for path, verdict, findings, habits in judge.check(kind, count, stream):
             counts[verdict] += 1
-            if arguments.verbose and verdict not in ("named", "silent"):
+            if arguments.verbose and verdict != ("named" if kind else "silent"):
                 print(f"  {path} {verdict} {habits}\n    " + "\n    ".join(f[:220] for f in findings), flush=True)
         title = kind.title if kind else "undamaged"
         print(f"{title}: " + ", ".join(f"{n} {v}" for v, n in sorted(counts.items())), flush=True)
