@@ -252,7 +252,7 @@ void Validate(const MachineArguments& a, bool& is_doubtful) {
   }
   if (!a.csv.empty()) WriteNamedFile(a.csv, MotionCsv(logs, predictors));
   const Judgement judgement = Judge(logs, predictors.front().twins, "these logs", &pool);
-  const std::string contradiction = LengthContradiction(logs, twin);
+  const std::string contradiction = LengthContradiction(logs, twin, twin.plant.length1);
   if (!contradiction.empty()) SayError(Concat("warning: ", contradiction));
   if (!judgement.explains() || !contradiction.empty()) is_doubtful = true;
   if (!a.as_json) fmt::print("{}\n", SentenceOf(judgement));

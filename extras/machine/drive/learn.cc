@@ -278,7 +278,7 @@ class LearningSession {
       const Judgement judgement =
           Judge(logs_, PredictorOf("", twin_, logs_).twins, "the logs of the fit", pool_);
       explains_ = judgement.explains();
-      twin_.distrust = DistrustOf(judgement, twin_, logs_);
+      twin_.distrust = DistrustOf(judgement, twin_, logs_, twin_.plant.length1);
       WriteFileAtomically(out_ / "twin.toml", TwinText(twin_));
       SayTwin(fit.error);
       say_("  " + SentenceOf(judgement));

@@ -347,18 +347,19 @@ Identification Identify(std::span<const MachineLog> logs, const Twin& first,
   }
   MeasureLoop(logs, result.fit.twin);
   result.judgement = JudgeFit(result, logs, first, chosen, config.fit, pool);
-  result.fit.twin.distrust = DistrustOf(result.judgement, result.fit.twin, logs);
+  result.fit.twin.distrust =
+      DistrustOf(result.judgement, result.fit.twin, logs, first.plant.length1);
   return result;
 }
 
 std::string DistrustOf(const Judgement& judgement, const Twin& twin,
-                       std::span<const MachineLog> logs) {
+                       std::span<const MachineLog> logs, double length1) {
   const bool reports = std::ranges::any_of(
       logs, [](const MachineLog& log) { return !log.commanded.empty() && !log.measured.empty(); });
   std::vector<std::string> reasons;
   if (!judgement.explains()) reasons.push_back(SentenceOf(judgement));
   for (const std::string& line : OutsidePhysics(twin, reports)) reasons.push_back(line);
-  const std::string contradiction = LengthContradiction(logs, twin);
+  const std::string contradiction = LengthContradiction(logs, twin, length1);
   if (!contradiction.empty()) reasons.push_back(contradiction);
   return Join(reasons, "; ");
 }

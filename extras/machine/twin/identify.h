@@ -59,10 +59,11 @@ Identification Identify(std::span<const MachineLog> logs, const Twin& first,
                         const IdentifyConfig& config, ThreadPool* pool,
                         const Progress& progress = nullptr);
 
-/// Why a twin of these logs is not to be trusted, in one line: its judgement, and the values
-/// outside physics. Empty: nothing speaks against it.
+/// Why a twin of these logs is not to be trusted, in one line: its judgement, the values outside
+/// physics, and a motion that contradicts the length of link 1 as it was given, `length1` (m). (Logs
+/// without torques fit another length to a wrong clock.) Empty: nothing speaks against it.
 std::string DistrustOf(const Judgement& judgement, const Twin& twin,
-                       std::span<const MachineLog> logs);
+                       std::span<const MachineLog> logs, double length1);
 
 /// Sets the twin's loop timing, and the steps of its angles and reported torques, to those of the
 /// logs.

@@ -86,19 +86,20 @@ std::optional<LengthByMotion> FindLengthByMotion(std::span<const MachineLog> log
                         std::sqrt(1 / weight + kModelError * kModelError)};
 }
 
-std::string LengthContradiction(std::span<const MachineLog> logs, const Twin& twin) {
+std::string LengthContradiction(std::span<const MachineLog> logs, const Twin& twin,
+                                double length1) {
   constexpr double kDeviations = 3;
   constexpr double kVague = 0.06;  // a deviation above which 20% would not be seen
   const auto found = FindLengthByMotion(logs, twin);
   if (!found || found->deviation > kVague) return "";
-  const double ratio = found->length / twin.plant.length1;
+  const double ratio = found->length / length1;
   if (std::abs(std::log(ratio)) < kDeviations * found->deviation) return "";
   // A clock that runs fast by a factor makes all accelerations less by its square.
   const double clock = std::sqrt(ratio);
   return fmt::format(
       "the motion shows length1 = {:.3g} m ± {}, not {:.3g} m: is the length wrong, does the "
       "clock run {} {}, or is gravity {:.3g} m/s²?",
-      found->length, FormatPercent(found->deviation), twin.plant.length1,
+      found->length, FormatPercent(found->deviation), length1,
       FormatPercent(std::abs(clock - 1)), clock > 1 ? "fast" : "slow", twin.plant.gravity / ratio);
 }
 

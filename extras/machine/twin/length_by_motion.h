@@ -8,9 +8,8 @@
 #include "extras/machine/twin/twin.h"
 
 /// The length of link 1 that a motion shows. In the equations of motion the coupling of the links
-/// over the gravity of link 2 is length1 / g, whatever the masses, centres and torques. A fit to
-/// logs with torques takes its lengths as given, so a length or a clock that is wrong makes all its
-/// other values wrong. (Without torques length1 is fitted, and nothing contradicts it.)
+/// over the gravity of link 2 is length1 / g, whatever the masses, centres and torques. A length or
+/// a clock that is wrong makes all other values of a fit wrong.
 namespace upswing::machine {
 
 struct LengthByMotion {
@@ -22,7 +21,8 @@ struct LengthByMotion {
 std::optional<LengthByMotion> FindLengthByMotion(std::span<const MachineLog> logs,
                                                  const Twin& twin);
 
-/// A line about a motion that contradicts the twin's length1, with what may be wrong; or "".
-std::string LengthContradiction(std::span<const MachineLog> logs, const Twin& twin);
+/// A line about a motion that contradicts `length1` (m), with what may be wrong; or "". The twin has
+/// the gravity and the natural time.
+std::string LengthContradiction(std::span<const MachineLog> logs, const Twin& twin, double length1);
 
 }  // namespace upswing::machine

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "extras/machine/twin/identify.h"
 #include "extras/machine/twin/simulated_machine.h"
 #include "extras/machine/twin/testing.h"
 
@@ -38,7 +39,7 @@ std::string LineOf(double length, bool is_free, double clock, double twin_length
   twin.plant.mass1 *= 1.5;
   twin.plant.center2 = 0.4 * twin.plant.length2;
   twin.plant.length1 *= twin_length;
-  return LengthContradiction({&log, 1}, twin);
+  return LengthContradiction({&log, 1}, twin, twin.plant.length1);
 }
 
 TEST(LengthByMotion, AgreesWithTheMachine) {
@@ -69,12 +70,25 @@ TEST(LengthByMotion, AClockOrALengthThatIsWrongIsFound) {
       "run 9.9% fast, or is gravity 8.12 m/s²?");
 }
 
+TEST(LengthByMotion, AFitOfTheLengthDoesNotHideAWrongClock) {
+  Twin twin = ImageOfTestTwin(1);
+  const double given = twin.plant.length1;
+  MachineLog log = LongSwing(twin, ImageOfLength(1), /*is_free=*/true);
+  for (double& t : log.time) t *= 1.1;
+  twin.plant.length1 *= 1.21;  // what a fit finds
+  Judgement judgement;
+  judgement.explanation = Explanation::kToNoise;
+  EXPECT_EQ(DistrustOf(judgement, twin, {&log, 1}, twin.plant.length1), "");
+  EXPECT_NE(DistrustOf(judgement, twin, {&log, 1}, given).find("the motion shows length1"),
+            std::string::npos);
+}
+
 TEST(LengthByMotion, LinksThatHardlyMoveTellNothing) {
   Twin machine = ImageOfTestTwin(1);
   MachineLog log = LongSwing(machine, ImageOfLength(1), true);
   for (Joints& q : log.angle) q = {0.001 * std::sin(q[0]), 0};
   machine.plant.length1 *= 2;
-  EXPECT_EQ(LengthContradiction({&log, 1}, machine), "");
+  EXPECT_EQ(LengthContradiction({&log, 1}, machine, machine.plant.length1), "");
 }
 
 }  // namespace
