@@ -45,7 +45,7 @@ Driven DrivenJoints(Pieces pieces) {
       for (const int j : {0, 1}) squares[j] += torque[j] * torque[j];
     }
   }
-  constexpr double kShare = 0.01;  // of the larger square
+  constexpr double kShare = 3e-4;  // of the larger square
   const double least = kShare * std::max(squares[0], squares[1]);
   return {squares[0] > least, squares[1] > least};
 }
@@ -121,19 +121,31 @@ std::optional<WeakForm> FormIn(Pieces pieces, double time) {
   return form;
 }
 
+/// Bounds of the natural time, s.
+struct TimeBounds {
+  double least, most;
+};
+
+/// The bounds by two times of the motion (s). Joints that hold back and go on make its own time
+/// short, joints that turn round make it long.
+TimeBounds BoundsOf(double own, double slow) {
+  constexpr double kNear = 3, kFast = 6;  // factors; motors brake links at 8 rad in a natural time
+  if (!(own > 0)) own = slow;
+  return {std::min(own, slow) / kNear, std::max(kNear * own, kFast * slow)};
+}
+
 /// The equations in the natural time of the machine: that of the constants that fit best, whatever
-/// the zeros and signs, near a time of the motion (s). If that leaves too few windows, the time of
-/// the motion has to do. Nothing if the motion has none, or too few windows.
-std::optional<WeakForm> FormNear(Pieces pieces, double own) {
+/// the zeros and signs, from a first time (s) on. If that leaves too few windows, the first time has
+/// to do. Nothing if it has too few, too.
+std::optional<WeakForm> FormNear(Pieces pieces, double time, const TimeBounds& bounds) {
   constexpr int kRounds = 3;
-  constexpr double kNear = 3;  // largest factor between the own time and the natural time
-  const std::optional<WeakForm> first = FormIn(pieces, own);
+  const std::optional<WeakForm> first = FormIn(pieces, time);
   std::optional<WeakForm> form = first;
   for (int round = 0; form && round < kRounds; ++round) {
     const WeakEquations equations = form->Equations({}, {}, 0);
     const double found = NaturalTimeOf(FitAnyZeroAndSign(equations).constants);
     if (!(found > 0)) return first;
-    form = FormIn(pieces, std::clamp(found, own / kNear, kNear * own));
+    form = FormIn(pieces, std::clamp(found, bounds.least, bounds.most));
   }
   return form ? form : first;
 }
@@ -198,8 +210,10 @@ Verdict TryHypotheses(Pieces pieces, const WeakForm& form, Driven driven) {
 std::optional<Verdict> Judge(Pieces pieces, Driven driven) {
   constexpr double kExplained = 0.02, kOther = 1.5;  // share, factor between the times
   const double slow = SlowTime(pieces);
-  std::optional<WeakForm> form = FormNear(pieces, OwnTime(pieces));
-  if (!form) form = FormNear(pieces, slow);
+  const double own = OwnTime(pieces);
+  const TimeBounds bounds = BoundsOf(own, slow);
+  std::optional<WeakForm> form = FormNear(pieces, own, bounds);
+  if (!form) form = FormNear(pieces, slow, bounds);
   if (!form) return {};
   Verdict first = TryHypotheses(pieces, *form, driven);
   if (first.confirms() || first.tried->log().fit.left() < kExplained) return first;
@@ -223,6 +237,20 @@ void ReportNoEffect(Pieces pieces, const Hypotheses& tried, Findings& findings) 
     Reporter{findings, Aspect::kTorque, joint + 1}(
         Severity::kFault, "the commanded torques have no effect on the motion: this motor is off");
   }
+}
+
+/// Reports torques that cannot both be in N·m: those of one joint move the links by more than those
+/// of the other.
+void ReportTorqueRatio(const Hypotheses& tried, Findings& findings) {
+  const std::optional<double> ratio = tried.TorqueRatio();
+  if (!ratio) return;
+  const int strong = *ratio > 1 ? 1 : 2;
+  Reporter{findings, Aspect::kTorque}(
+      Severity::kFault,
+      fmt::format("1 N·m of torque {} moves the links like {} N·m of torque {}: suspect the unit or "
+                  "gear of a motor, or commands between -1 and 1 (keys unit, factor)",
+                  strong, FormatPlain(std::max(*ratio, 1 / *ratio), 2), 3 - strong),
+      {}, {{"ratio", *ratio}});
 }
 
 /// The share of a log's cycles that are lost, whose commands are unknown. 0 for measured torques.
@@ -264,6 +292,7 @@ void ReportUnexplained(Pieces pieces, double left, Findings& findings) {
 void CheckEquations(Pieces pieces, Findings& findings) {
   constexpr double kMoving = 0.3;     // rad
   constexpr double kFreeLeft = 0.03;  // share that a free pendulum leaves unexplained at most
+  constexpr double kBetter = 1;       // by which torques of a motor reduce the misfit
   const Joints range{AngleRange(pieces, 0), AngleRange(pieces, 1)};
   if (range[0] < kMoving || range[1] < kMoving || !(UsualCycle(pieces) > 0)) return;
   Driven driven = DrivenJoints(pieces);
@@ -277,7 +306,8 @@ void CheckEquations(Pieces pieces, Findings& findings) {
     if (moves_freely && !free && best.changes() > 0) {
       // Wrong columns of a free pendulum may look like right ones of a driven one.
       const std::optional<Verdict> with_torques = Judge(pieces, driven);
-      moves_freely = !with_torques || with_torques->tried->log().fit.left() > kFreeLeft;
+      moves_freely = !with_torques || (with_torques->tried->log().fit.left() > kFreeLeft &&
+                                       with_torques->tried->best().misfit() > best.misfit() - kBetter);
     }
     if (moves_freely) {
       driven = {false, false};
@@ -286,17 +316,22 @@ void CheckEquations(Pieces pieces, Findings& findings) {
     }
   }
   const bool in_proportion = InProportion(pieces);
-  if (in_proportion && !driven[0] && !driven[1]) return;
   if (!verdict || driven[0] || driven[1]) verdict = Judge(pieces, driven);
   if (!verdict) return;
+  if (in_proportion && !driven[0] && !driven[1]) {
+    // Other readings of the columns may explain such a motion, too. They do not change halfway.
+    const bool changes = verdict->confirms() && verdict->suspects_slip_or_drift();
+    if (!changes) return;
+  }
   const Hypotheses& tried = *verdict->tried;
   if (verdict->confirms()) {
     double seconds = 0;
     for (const MachineLog& log : pieces) seconds += log.time.back();
-    return Report(tried, seconds, in_proportion, findings);
+    return Report(tried, seconds, in_proportion && !verdict->suspects_slip_or_drift(), findings);
   }
   ReportUnexplained(pieces, tried.log().fit.left(), findings);
   ReportNoEffect(pieces, tried, findings);
+  ReportTorqueRatio(tried, findings);
 }
 
 }  // namespace upswing::machine

@@ -113,6 +113,21 @@ bool Hypotheses::HasNoEffect() const {
   return Fit(without).misfit() < log_.fit.misfit() + kMore;
 }
 
+std::optional<double> Hypotheses::TorqueRatio() const {
+  constexpr double kExplained = 0.05, kOff = 1.5;  // share, ratio that gains of motors have
+  if (!driven_[0] || !driven_[1] || log_.fit.left() > kExplained) return {};
+  if (HasNoEffect() || HasNoEffect(0) || HasNoEffect(1)) return {};
+  const double first = log_.fit.constants(weak::kTorque1);
+  const double second = log_.fit.constants(weak::kTorque2);
+  if (!(first > 0) || !(second > 0) || std::abs(std::log(first / second)) < std::log(kOff))
+    return {};
+  WeakEquations same = equations_;
+  same.A[1].col(weak::kTorque1) = equations_.A[1].col(weak::kTorque2);
+  same.A[1].col(weak::kTorque2).setZero();
+  if (FitSmallZeros(same).misfit() < log_.fit.misfit() + per_change_) return {};
+  return first / second;
+}
+
 /// Delays that motors have, s.
 std::vector<double> Hypotheses::UsualDelays() const {
   const double first = -1.5 * cycle_ - 0.04 * form_.time();
@@ -144,8 +159,24 @@ void Hypotheses::ImproveDelay(Hypothesis& h) const {
   h = Refined(found, found.delay, (usual[1] - usual[0]) / 2, 0.002 * form_.time(), with);
 }
 
+/// Whether a hypothesis changes too little to matter. A fit finds such numbers in the errors of
+/// other things.
+bool Hypotheses::IsSmall(const Hypothesis& h) const {
+  constexpr double kTurn = 0.03, kScale = 0.005, kLate = 0.01;  // rad, share, natural times
+  if (h.changes() != 1) return false;
+  if (h.angles.late != 0) return std::abs(h.angles.late) < kLate * form_.time();
+  for (const double scale : h.angles.scale) {
+    if (HasScale(scale)) return std::abs(std::abs(scale) - 1) < kScale;
+  }
+  const bool turns = h.change.kind == Change::kSlip || h.change.kind == Change::kDrift;
+  if (!turns || h.fit.constants.size() <= weak::kColumns) return false;
+  const Joints more = h.more_turn();
+  return std::abs(h.angles.turn[0] + more[0]) < kTurn &&
+         std::abs(h.angles.turn[1] + more[1]) < kTurn;
+}
+
 void Hypotheses::Offer(const Hypothesis& h) {
-  if (h.changes() == 0) return;
+  if (h.changes() == 0 || IsSmall(h)) return;
   least_cost_ = std::min(least_cost_, h.cost(per_change_));
   const auto same =
       std::ranges::find_if(offered_, [&](const Hypothesis& own) { return IsSameKind(own, h); });
@@ -194,7 +225,7 @@ bool Hypotheses::ShowsAtItsMotor(const Hypothesis& h) const {
 }
 
 /// Chooses the best hypotheses. One that explains the log to the noise of its encoders, or shows at
-/// its motor only, needs less to convince.
+/// its motor only, needs less to convince. The noise leaves nothing to other hypotheses.
 void Hypotheses::Choose() {
   using Rule = std::function<bool(const Hypothesis&)>;
   const auto find = [&](const Rule& counts, const Hypothesis* other) {
@@ -217,7 +248,7 @@ void Hypotheses::Choose() {
     best = found;
     counts = rule;
   };
-  if (best == &log_ && !ExplainsToNoise(log_.fit)) {
+  if (!ExplainsToNoise(log_.fit) && !ExplainsToNoise(best->fit)) {
     try_rule(kExactChange, [&](const Hypothesis& h) { return ExplainsToNoise(h.fit); });
   }
   if (best == &log_) try_rule(kTorqueChange, [&](const auto& h) { return ShowsAtItsMotor(h); });

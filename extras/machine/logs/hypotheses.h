@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -76,6 +77,9 @@ class Hypotheses {
   /// all joints.
   bool HasNoEffect(int joint) const;
   bool HasNoEffect() const;
+  /// The effect of 1 N·m of torque 1 over that of torque 2, by the motion. Nothing unless both are
+  /// known, and one effect for both torques explains the motion far worse.
+  std::optional<double> TorqueRatio() const;
 
  private:
   bool IsDriven() const { return driven_[0] || driven_[1]; }
@@ -119,6 +123,7 @@ class Hypotheses {
   std::vector<double> UsualDelays() const;
   void ImproveDelay(Hypothesis& h) const;
   void ImproveDelays();
+  bool IsSmall(const Hypothesis& h) const;
   void Offer(const Hypothesis& h);
   void Choose();
   Joints NoiseShares(const WeakFit& fit) const;
