@@ -135,8 +135,8 @@ TimeBounds BoundsOf(double own, double slow) {
 }
 
 /// The equations in the natural time of the machine: that of the constants that fit best, whatever
-/// the zeros and signs, from a first time (s) on. If that leaves too few windows, the first time has
-/// to do. Nothing if it has too few, too.
+/// the zeros and signs, from a first time (s) on. If that leaves too few windows, the first time
+/// has to do. Nothing if it has too few, too.
 std::optional<WeakForm> FormNear(Pieces pieces, double time, const TimeBounds& bounds) {
   constexpr int kRounds = 3;
   const std::optional<WeakForm> first = FormIn(pieces, time);
@@ -239,8 +239,8 @@ void ReportNoEffect(Pieces pieces, const Hypotheses& tried, Findings& findings) 
   }
 }
 
-/// Reports torques that cannot both be in N·m: those of one joint move the links by more than those
-/// of the other.
+/// Reports torques that cannot both be in N·m: those of one joint move the links by more than
+/// those of the other.
 void ReportTorqueRatio(const Hypotheses& tried, Findings& findings) {
   const std::optional<double> ratio = tried.TorqueRatio();
   if (!ratio) return;
@@ -306,8 +306,11 @@ void CheckEquations(Pieces pieces, Findings& findings) {
     if (moves_freely && !free && best.changes() > 0) {
       // Wrong columns of a free pendulum may look like right ones of a driven one.
       const std::optional<Verdict> with_torques = Judge(pieces, driven);
-      moves_freely = !with_torques || (with_torques->tried->log().fit.left() > kFreeLeft &&
-                                       with_torques->tried->best().misfit() > best.misfit() - kBetter);
+      if (with_torques) {
+        const Hypotheses& driven_ones = *with_torques->tried;
+        moves_freely = driven_ones.log().fit.left() > kFreeLeft &&
+                       driven_ones.best().misfit() > best.misfit() - kBetter;
+      }
     }
     if (moves_freely) {
       driven = {false, false};

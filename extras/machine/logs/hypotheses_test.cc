@@ -26,7 +26,8 @@ TorqueFunction TorquesOfBoth(double second) {
 }
 
 /// A log of the equations of motion of the default plant, with measured torques.
-MachineLog DrivenAtBothJoints(const PendulumState& start, double seconds, const TorqueFunction& torques) {
+MachineLog DrivenAtBothJoints(const PendulumState& start, double seconds,
+                              const TorqueFunction& torques) {
   const Manipulator plant = ManipulatorOf(Plant{});
   MachineLog log;
   PendulumState x = start;
@@ -49,7 +50,9 @@ void NameAsCommands(MachineLog& log) {
   log.measured.clear();
 }
 
-Findings FindingsOn(const MachineLog& log) { return CheckLog("log.csv", std::span(&log, 1)).findings; }
+Findings FindingsOn(const MachineLog& log) {
+  return CheckLog("log.csv", std::span(&log, 1)).findings;
+}
 
 std::string FaultsIn(const MachineLog& log) {
   std::string faults;

@@ -60,8 +60,8 @@ Identification Identify(std::span<const MachineLog> logs, const Twin& first,
                         const Progress& progress = nullptr);
 
 /// Why a twin of these logs is not to be trusted, in one line: its judgement, the values outside
-/// physics, and a motion that contradicts the length of link 1 as it was given, `length1` (m). (Logs
-/// without torques fit another length to a wrong clock.) Empty: nothing speaks against it.
+/// physics, and a motion that contradicts the given length of link 1, `length1` (m). (Logs without
+/// torques fit another length to a wrong clock.) Empty: nothing speaks against it.
 std::string DistrustOf(const Judgement& judgement, const Twin& twin,
                        std::span<const MachineLog> logs, double length1);
 

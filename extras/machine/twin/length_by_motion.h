@@ -21,8 +21,9 @@ struct LengthByMotion {
 std::optional<LengthByMotion> FindLengthByMotion(std::span<const MachineLog> logs,
                                                  const Twin& twin);
 
-/// A line about a motion that contradicts `length1` (m), with what may be wrong; or "". The twin has
-/// the gravity and the natural time.
-std::string LengthContradiction(std::span<const MachineLog> logs, const Twin& twin, double length1);
+/// A line about a motion that contradicts `length1` (m), with what may be wrong; or "". The twin
+/// has the gravity and the natural time.
+std::string LengthContradiction(std::span<const MachineLog> logs, const Twin& twin,
+                                double length1);
 
 }  // namespace upswing::machine
