@@ -247,9 +247,10 @@ void ReportTorqueRatio(const Hypotheses& tried, Findings& findings) {
   const int strong = *ratio > 1 ? 1 : 2;
   Reporter{findings, Aspect::kTorque}(
       Severity::kFault,
-      fmt::format("1 N·m of torque {} moves the links like {} N·m of torque {}: suspect the unit or "
-                  "gear of a motor, or commands between -1 and 1 (keys unit, factor)",
-                  strong, FormatPlain(std::max(*ratio, 1 / *ratio), 2), 3 - strong),
+      fmt::format(
+          "1 N·m of torque {} moves the links like {} N·m of torque {}: suspect the unit or "
+          "gear of a motor, or commands between -1 and 1 (keys unit, factor)",
+          strong, FormatPlain(std::max(*ratio, 1 / *ratio), 2), 3 - strong),
       {}, {{"ratio", *ratio}});
 }
 

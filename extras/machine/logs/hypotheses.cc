@@ -162,17 +162,20 @@ void Hypotheses::ImproveDelay(Hypothesis& h) const {
 /// Whether a hypothesis changes too little to matter. A fit finds such numbers in the errors of
 /// other things.
 bool Hypotheses::IsSmall(const Hypothesis& h) const {
-  constexpr double kTurn = 0.03, kScale = 0.005, kLate = 0.01;  // rad, share, natural times
+  constexpr double kSlip = 0.03, kDrift = 0.1;    // rad
+  constexpr double kScale = 0.005, kLate = 0.01;  // share, natural times
   if (h.changes() != 1) return false;
   if (h.angles.late != 0) return std::abs(h.angles.late) < kLate * form_.time();
   for (const double scale : h.angles.scale) {
     if (HasScale(scale)) return std::abs(std::abs(scale) - 1) < kScale;
   }
-  const bool turns = h.change.kind == Change::kSlip || h.change.kind == Change::kDrift;
-  if (!turns || h.fit.constants.size() <= weak::kColumns) return false;
+  const bool drifts = h.change.kind == Change::kDrift;
+  if (!drifts && h.change.kind != Change::kSlip) return false;
+  if (h.fit.constants.size() <= weak::kColumns) return false;
+  const double least = drifts ? kDrift : kSlip;
   const Joints more = h.more_turn();
-  return std::abs(h.angles.turn[0] + more[0]) < kTurn &&
-         std::abs(h.angles.turn[1] + more[1]) < kTurn;
+  return std::abs(h.angles.turn[0] + more[0]) < least &&
+         std::abs(h.angles.turn[1] + more[1]) < least;
 }
 
 void Hypotheses::Offer(const Hypothesis& h) {
