@@ -486,7 +486,7 @@ def price_of_return(lab):
         return int(evaluations[-1]["step"]), share
 
     rows = []
-    for agent in ("fast",) if lab.few else ("fast", "d3qn", "sac", "ppo"):
+    for agent in ("fast",) if lab.few else ("fast", "ppo"):
         first, last, price = [], [], []
         for seed in range(21, 22 if lab.few else 26):
             few = ["--steps", 20000] if lab.few else []
@@ -500,11 +500,11 @@ def price_of_return(lab):
                                      for x in (first, last)),
                      f"{steps_text(statistics.median(price))} ({steps_text(cheap)} to {steps_text(dear)})"])
     return ["agent", "return / best known when solved: median (range)", "after four times the steps",
-            "more steps for 1%"], rows
+            "further steps for each 1% gained"], rows
 
 
 def steps_text(steps):
-    """Steps in thousands, or that no number of them was enough."""
+    """Steps in thousands, or that the longer training brought no gain."""
     return "no gain" if math.isinf(steps) else f"{1000 * round(steps / 1000):,}"
 
 

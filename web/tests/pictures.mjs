@@ -32,8 +32,7 @@ await visit({ viewport: { width: 1400, height: 860 } }, async (page) => {
 });
 console.log('docs/figures/page.png');
 
-/// Calls record(folder), which writes pictures in a new folder and returns ffmpeg's arguments for
-/// them, and makes a film of them.
+/// Makes a film. record(folder) writes the pictures and returns ffmpeg's input arguments.
 async function film(name, width, colors, record) {
   const folder = mkdtempSync(join(tmpdir(), 'upswing-film-'));
   const pictures = await record(folder);

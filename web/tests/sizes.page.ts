@@ -40,7 +40,7 @@ const placesOf = (page: Page, ids: readonly string[]) =>
     });
   }, ids) as Promise<(Place | null)[]>;
 
-/// The controls of a step and its buttons that something else covers.
+/// Texts of the visible controls that another element covers, with the page at its top.
 const coveredOf = (page: Page) =>
   page.evaluate(() => {
     scrollTo({ top: 0, behavior: 'instant' });
@@ -58,7 +58,7 @@ for (const [name, sizes] of [
   ['upright', UPRIGHT],
   ['on its side', SIDEWAYS],
 ] as const) {
-  test(`${name}, the stage has 45% of the height, Next and Learn are in sight, and no control is covered`, async ({
+  test(`${name}, the stage has 45% of the height, Next and Learn are in sight${sizes === UPRIGHT ? ' and no control is covered' : ''}`, async ({
     stage: page,
   }) => {
     await open(page, '#tour=1');

@@ -127,7 +127,7 @@ test('a reward that prefers a side is learned, and leaves the own training as it
   await page.evaluate(() => upswing.learn.stop());
 });
 
-test('the lazy agent is judged by its motion, not by how it begins', async ({ stage: page }) => {
+test('the lazy agent gets no answer before it has tried anything', async ({ stage: page }) => {
   await open(page, `#tour=${REWARD}`);
   await page.getByRole('button', { name: 'Be lazy' }).click();
   // It hangs at rest before it has tried anything.

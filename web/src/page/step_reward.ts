@@ -23,8 +23,8 @@ interface Seen {
   height: number; // of the tip, 0 hanging to 1
 }
 
-/// Means that no agent has learned: they change to those of the motion.
-const UNSEEN: Readonly<Seen> = { turning: 0, moving: FAST, height: 0.5 };
+/// Starting values that fit no answer, so that each takes several seconds of motion.
+const START: Readonly<Seen> = { turning: 0, moving: FAST, height: 0.5 };
 
 const PRESETS: readonly Preset[] = [
   {
@@ -55,13 +55,13 @@ const PRESETS: readonly Preset[] = [
 
 export function reward(stage: Stage): Step {
   let chosen: Preset | null = null;
-  let seen: Seen = UNSEEN;
+  let seen: Seen = START;
   let found = '';
   const buttons = PRESETS.map((preset) => button(`reward-${preset.id}`, () => run(preset)));
   const mark = () => buttons.forEach((one, i) => (one.ariaPressed = String(PRESETS[i] === chosen)));
   const run = (preset: Preset) => {
     chosen = preset;
-    seen = UNSEEN;
+    seen = START;
     found = '';
     mark();
     stage.learn.tryReward(preset.reward);

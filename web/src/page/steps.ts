@@ -186,6 +186,7 @@ function values(stage: Stage): Step {
     yours: true,
     keys: ARROWS,
     async begin() {
+      effort = 0;
       speed.value = '1';
       element('tour-speed-value').textContent = '1×';
       await stage.begin({ agent: yoursOf(stage), on: !prefersStill() });
@@ -195,8 +196,7 @@ function values(stage: Stage): Step {
     },
     answer(world) {
       if (heldFor(world) <= HELD) return '';
-      const what =
-        effort < SMALL_TORQUE ? 'small torques are best' : 'it pushes now left, now right';
+      const what = effort < SMALL_TORQUE ? 'small torques are best' : 'its torques are large';
       return `Upright, ${what}. Drag the pendulum and watch the bars.`;
     },
   };
