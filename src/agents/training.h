@@ -46,6 +46,7 @@ class Training {
   void WaitForEvaluations() { trainer_.WaitForEvaluations(); }
   /// Takes the result of the last evaluation; see Trainer::FinishEvaluation.
   void FinishEvaluation() { trainer_.FinishEvaluation(); }
+  /// Takes it after another failure; throws nothing.
   void FinishEvaluationQuietly() { trainer_.FinishEvaluationQuietly(); }
   const Trainer& trainer() const { return trainer_; }
   const TrainState& state() const { return trainer_.state(); }

@@ -16,8 +16,9 @@
 namespace upswing {
 namespace {
 
-constexpr int kSamples = 512;      // states on an ellipsoid
-constexpr int kGroup = 64;         // of these, simulated together
+constexpr int kSamples = 512;  // states on an ellipsoid
+constexpr int kGroup = 64;     // states simulated together
+static_assert(kSamples % kGroup == 0);
 constexpr double kSettled = 1e-3;  // settled: the cost has fallen to this share
 constexpr double kLeastSettling = 5, kMostSettling = 40;  // s, by Scale::time
 constexpr double kLargestLean = std::numbers::pi / 3;

@@ -54,7 +54,7 @@ class PlannedMotions {
 }  // namespace
 
 int PlanningSteps(const DesignPlant& plant) {
-  constexpr double kTolerance = 3e-3;                     // rad and natural velocity
+  constexpr double kTolerance = 3e-3;  // largest rms error of a period, rad and natural velocity
   constexpr double kPi = std::numbers::pi, kNear = 0.02;  // rad
   const double velocity = TaskScaleOf(plant).velocity();
   const int most = plant.physics_steps();

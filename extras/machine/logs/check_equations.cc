@@ -239,8 +239,8 @@ void ReportNoEffect(Pieces pieces, const Hypotheses& tried, Findings& findings) 
   }
 }
 
-/// Reports torques that cannot both be in N·m: those of one joint move the links by more than
-/// those of the other. A torque that has a fault already needs no second one.
+/// Reports torques that cannot both be in N·m: 1 N·m of one moves the links more strongly
+/// than 1 N·m of the other. A torque that has a fault already needs no second one.
 void ReportTorqueRatio(const Hypotheses& tried, Findings& findings) {
   const bool is_known = std::ranges::any_of(findings, [](const Finding& finding) {
     return finding.aspect == Aspect::kTorque && finding.severity == Severity::kFault;

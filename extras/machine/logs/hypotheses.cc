@@ -114,7 +114,7 @@ bool Hypotheses::HasNoEffect() const {
 }
 
 std::optional<double> Hypotheses::TorqueRatio() const {
-  constexpr double kExplained = 0.05, kOff = 1.5;  // share, ratio that gains of motors have
+  constexpr double kExplained = 0.05, kOff = 1.5;  // share, largest ratio that right units show
   if (!driven_[0] || !driven_[1] || log_.fit.left() > kExplained) return {};
   if (HasNoEffect() || HasNoEffect(0) || HasNoEffect(1)) return {};
   const double first = log_.fit.constants(weak::kTorque1);
@@ -159,8 +159,8 @@ void Hypotheses::ImproveDelay(Hypothesis& h) const {
   h = Refined(found, found.delay, (usual[1] - usual[0]) / 2, 0.002 * form_.time(), with);
 }
 
-/// Whether a hypothesis changes too little to matter. A fit finds such numbers in the errors of
-/// other things.
+/// Whether a hypothesis changes too little to matter. Errors of the model produce such changes,
+/// too.
 bool Hypotheses::IsSmall(const Hypothesis& h) const {
   constexpr double kSlip = 0.03, kDrift = 0.1;    // rad
   constexpr double kScale = 0.005, kLate = 0.01;  // share, natural times

@@ -95,9 +95,14 @@ double RatioOfSlowSwing() {
   const Manipulator plant = ManipulatorOf(Plant{});
   double low = 0, high = 1;
   for (int i = 0; i < 40; ++i) {
-    const double ratio = (low + high) / 2, q1 = 0.1;
+    const double q1 = 0.1;
+    const double ratio = (low + high) / 2;
     const auto a = plant.Acceleration({q1, ratio * q1, 0, 0}, {0, 0});
-    (a[1] / a[0] > ratio ? high : low) = ratio;
+    if (a[1] / a[0] > ratio) {
+      high = ratio;
+    } else {
+      low = ratio;
+    }
   }
   return low;
 }

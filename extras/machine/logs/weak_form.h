@@ -58,13 +58,14 @@ class TorqueIntegral {
   /// `before`: time of the log before this piece. `seconds`: length of the whole log, s.
   TorqueIntegral(const MachineLog& log, const TorqueReading& reading, double before,
                  double seconds);
-  /// The integral from the beginning to a time (s), N·m·s. Fast for times near the one before.
+  /// The integral from the beginning to a time (s), N·m·s. Fast for times near that of the last
+  /// call.
   Joints At(double time);
 
  private:
   std::vector<double> time_;
   std::vector<Joints> integral_;
-  int next_ = 1;  // the row after the time before
+  int next_ = 1;  // first row after the time of the last call
 };
 
 /// Columns of the equations: the constants of the motion, small zeros of both encoders, and the

@@ -45,7 +45,8 @@ class Trainer {
   /// Waits for the evaluation in the background, if there is one, and takes its result. Throws what
   /// the evaluation has thrown.
   void FinishEvaluation();
-  /// The same after another failure, which counts more: throws nothing.
+  /// Finishes the evaluation after another failure. Drops its own exception, so that the first
+  /// failure is reported.
   void FinishEvaluationQuietly();
   /// Whether an evaluation runs in the background.
   bool is_evaluating() const { return background_ != nullptr; }
