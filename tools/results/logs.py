@@ -181,7 +181,7 @@ def commands_from_measured(toml):
     """A file of columns that names the measured torques as commands."""
     if toml:
         return re.sub(r"^measured([12])", r"commanded\1", toml, flags=re.MULTILINE)
-    keys = {"time": "time"} | {f"{key}{j}": f"{REALAIGYM[key]}{j}" for key in ("angle",) for j in (1, 2)}
+    keys = {"time": "time"} | {f"angle{j}": f"{REALAIGYM['angle']}{j}" for j in (1, 2)}
     keys |= {f"commanded{j}": f"{REALAIGYM['measured']}{j}" for j in (1, 2)}
     return "".join(f'{key} = "{column}"\n' for key, column in keys.items())
 

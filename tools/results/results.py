@@ -477,13 +477,12 @@ def price_of_return(lab):
     best = best_known_returns()
 
     def trained(agent, seed, name, *more):
-        """A training's last step, and its policy's share of the best known return [%]."""
+        """A training's last step, and its policy's share of the best known return."""
         out = lab.folder / f"{agent}-seed{seed}{name}"
         lab.run("train", "--agent", agent, "--seed", seed, *more, "--out", out)
         evaluations = list(csv.DictReader((out / "evals.csv").open(encoding="utf-8")))
         report = lab.json("eval", out, "--episodes", len(best))
-        share = 100 * report["return"]["mean"] / statistics.mean(best)
-        return int(evaluations[-1]["step"]), share
+        return int(evaluations[-1]["step"]), report["return"]["mean"] / statistics.mean(best)
 
     rows = []
     for agent in ("fast",) if lab.few else ("fast", "ppo"):
@@ -494,11 +493,9 @@ def price_of_return(lab):
             _, longer = trained(agent, seed, "-longer", "--no-stop-when-solved", "--steps", 4 * steps)
             first.append(solved)
             last.append(longer)
-            price.append(3 * steps / (longer - solved) if longer > solved else math.inf)
-        cheap, dear = min(price), max(price)
-        rows.append([f"`{agent}`", *(f"{statistics.median(x):.1f}% ({min(x):.1f} to {max(x):.1f}%)"
-                                     for x in (first, last)),
-                     f"{steps_text(statistics.median(price))} ({steps_text(cheap)} to {steps_text(dear)})"])
+            price.append(3 * steps / (100 * (longer - solved)) if longer > solved else math.inf)
+        rows.append([f"`{agent}`", *(spread({"median": statistics.median(values), "values": values}, text)
+                                     for values, text in ((first, percent), (last, percent), (price, steps_text)))])
     return ["agent", "return / best known when solved: median (range)", "after four times the steps",
             "further steps for each 1% gained"], rows
 
