@@ -3,7 +3,7 @@ import { printable, quoted, sentence } from '../text';
 import { LearningCurve } from '../view/charts';
 import type { Agent, Agents } from './agents';
 import { element } from './dom';
-import { hideMessage, warn } from './message';
+import { warn, withdraw } from './message';
 import { onThemeChange } from './theme';
 
 const NAME = 40; // characters of a refused file's name
@@ -25,6 +25,7 @@ export class AgentPanel {
   private readonly listener: AgentListener;
   private readonly curve = new LearningCurve();
   private requests = 0; // to drop late answers
+  private refused = ''; // the last refusal that was shown
   /// Whether an agent is loading.
   busy = false;
 
@@ -78,12 +79,13 @@ export class AgentPanel {
       if (request !== this.requests) return false; // a later request replaced it
       this.agent = agent;
       this.busy = false;
-      hideMessage();
+      withdraw(this.refused);
     } catch (error) {
       if (!(error instanceof BadInput)) throw error;
       if (request !== this.requests) return false;
       this.busy = false;
-      warn(sentence(`${refusal}: ${error.message}`));
+      this.refused = sentence(`${refusal}: ${error.message}`);
+      warn(this.refused);
       this.show();
       return false;
     }

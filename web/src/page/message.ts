@@ -28,9 +28,14 @@ export function showText(text: string): void {
   show(text, 'note');
 }
 
-export function hideMessage(): void {
+function hideMessage(): void {
   clearTimeout(timer);
   element('message').hidden = true;
+}
+
+/// Takes a warning back that no longer holds. Another message stays.
+export function withdraw(text: string): void {
+  if (element('message-text').textContent === printable(text, LONGEST)) hideMessage();
 }
 
 button('message-close', hideMessage);
