@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -47,12 +47,15 @@ class Cubics {
   /// Fits the whole pieces of the samples.
   explicit Cubics(const std::vector<double>& samples) {
     EXPECT_EQ(samples.size() % kPiece, 0);
-    Eigen::Matrix<double, kPiece, 4> powers;
-    for (int i = 0; i < kPiece; ++i) powers.row(i) = Powers(i);
-    const Eigen::ColPivHouseholderQR<decltype(powers)> qr(powers);
+    Eigen::Matrix4d products = Eigen::Matrix4d::Zero();
+    for (int i = 0; i < kPiece; ++i) products += Powers(i).transpose() * Powers(i);
+    const Eigen::Matrix4d inverse = products.inverse();
     for (size_t first = 0; first + kPiece <= samples.size(); first += kPiece) {
-      pieces_.emplace_back(
-          qr.solve(Eigen::Map<const Eigen::Vector<double, kPiece>>(&samples[first])));
+      Eigen::RowVector4d moments = Eigen::RowVector4d::Zero();
+      for (size_t i = 0; i < kPiece; ++i) {
+        moments += samples[first + i] * Powers(static_cast<double>(i));
+      }
+      pieces_.emplace_back(inverse * moments.transpose());
     }
   }
 

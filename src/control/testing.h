@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -21,20 +22,15 @@ namespace upswing {
 using EigenSolver = Eigen::EigenSolver<Eigen::MatrixXd>;
 using SymmetricEigenSolver = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>;
 
-/// Minimises ∫ x' Q x + R u² dt of ẋ = A x + B u: P = Y X⁻¹ from the stable eigenvectors [X; Y] of
-/// the Hamiltonian matrix (Laub, "A Schur method for solving algebraic Riccati equations", 1979,
-/// with eigenvectors instead of Schur vectors).
+/// Minimises ∫ x' Q x + R u² dt of ẋ = A x + B u. Newton's iteration finds the sign of the
+/// Hamiltonian matrix, which is -1 on its stable subspace [I; P] (Roberts, "Linear model reduction
+/// and solution of the algebraic Riccati equation by use of the sign function", 1980).
 inline Lqr ContinuousLqr(const LinearModel& model, const Eigen::Matrix4d& Q, double R) {
-  Eigen::Matrix<double, 8, 8> H;
-  H << model.A, -model.B * model.B.transpose() / R, -Q, -model.A.transpose();
-  const EigenSolver solver(H);
-  Eigen::Matrix<std::complex<double>, 8, 4> stable;
-  Eigen::Index found = 0;
-  for (Eigen::Index i = 0; i < 8 && found < 4; ++i) {
-    if (solver.eigenvalues()[i].real() < 0) stable.col(found++) = solver.eigenvectors().col(i);
-  }
-  const Eigen::Matrix4cd X = stable.topRows<4>(), Y = stable.bottomRows<4>();
-  const Eigen::Matrix4d P = (Y * X.inverse()).real();
+  Eigen::MatrixXd sign(8, 8);
+  sign << model.A, -model.B * model.B.transpose() / R, -Q, -model.A.transpose();
+  for (int k = 0; k < 50; ++k) sign = (sign + sign.inverse()).eval() / 2;
+  const Eigen::Matrix4d left = sign.topLeftCorner<4, 4>(), right = sign.topRightCorner<4, 4>();
+  const Eigen::Matrix4d P = -right.inverse() * (left + Eigen::Matrix4d::Identity());
   return {model.B.transpose() * P / R, P};
 }
 

@@ -310,10 +310,10 @@ std::vector<Structure> Structures(bool has_motors, bool cogging, bool one_body) 
 
 Structure Hanging(Structure structure, HangingBy cause) {
   for (auto* names : {&structure.values, &structure.of_session}) {
-    const auto zeros = std::ranges::search(*names, kZeros);
-    if (cause == HangingBy::kZeros || zeros.empty()) continue;
-    const auto after =
-        cause == HangingBy::kOffsets ? names->erase(zeros.begin(), zeros.end()) : zeros.end();
+    const auto zeros = std::search(names->begin(), names->end(), kZeros.begin(), kZeros.end());
+    if (cause == HangingBy::kZeros || zeros == names->end()) continue;
+    const auto end = zeros + std::ssize(kZeros);
+    const auto after = cause == HangingBy::kOffsets ? names->erase(zeros, end) : end;
     names->insert(after, kOffsets.begin(), kOffsets.end());
   }
   return structure;
