@@ -41,18 +41,21 @@ Factors Regressor(const JointAngles<double>& angles, const Pair& velocity,
 }
 
 MomentumRegressor MomentumRegressorOf(const JointAngles<double>& angles, const Pair& velocity) {
-  MomentumRegressor of;
-  of.momentum = FactorsOf(
-      [&](const Manipulator& unit) { return Times(dynamics::MassAt(unit, angles.c2), velocity); });
-  of.force = FactorsOf([&](const Manipulator& unit) -> Pair {
-    // The rate of M times the velocity. M is linear in cos q2, and M22 is constant.
-    const MassMatrix at0 = dynamics::MassAt(unit, 0.0), at1 = dynamics::MassAt(unit, 1.0);
-    const double rate = -angles.s2 * velocity.two;
-    const Pair moved =
-        Times({rate * (at1.M11 - at0.M11), rate * (at1.M12 - at0.M12), 0, 0}, velocity);
-    const Pair net = dynamics::NetTorque</*kFriction=*/false>(unit, angles, velocity, {0, 0});
-    return {-moved.one - net.one, -moved.two - net.two};
-  });
+  using namespace column;
+  const auto& [w1, w2] = velocity;
+  MomentumRegressor of{};
+  auto& [p1, p2] = of.momentum;
+  p1[kJ1] = w1;
+  p1[kJ2] = p2[kJ2] = w1 + w2;
+  p1[kB] = angles.c2 * (w1 + w1 + w2);
+  p2[kB] = angles.c2 * w1;
+  p2[kA] = w2;
+  auto& [force1, force2] = of.force;
+  force1[kG1] = angles.s1;
+  force1[kG2] = force2[kG2] = angles.s12();
+  force1[kD1] = w1;
+  force2[kD2] = w2;
+  force2[kB] = angles.s2 * w1 * (w1 + w2);
   return of;
 }
 
