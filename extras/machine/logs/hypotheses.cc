@@ -228,7 +228,7 @@ bool Hypotheses::ShowsAtItsMotor(const Hypothesis& h) const {
 }
 
 /// Chooses the best hypotheses. One that explains the log to the noise of its encoders, or shows at
-/// its motor only, needs less to convince. The noise leaves nothing to other hypotheses.
+/// its motor only, needs less to convince. No other hypothesis can improve a fit to the noise.
 void Hypotheses::Choose() {
   using Rule = std::function<bool(const Hypothesis&)>;
   const auto find = [&](const Rule& counts, const Hypothesis* other) {

@@ -66,6 +66,11 @@ void SlipHalfWay(MachineLog& log, int joint, double turn) {
   for (int k = log.rows() / 2; k < log.rows(); ++k) log.angle[k][joint] += turn;
 }
 
+/// Adds an angle that grows to `turn` over the whole log.
+void Drift(MachineLog& log, int joint, double turn) {
+  for (int k = 0; k < log.rows(); ++k) log.angle[k][joint] += turn * k / log.rows();
+}
+
 TEST(Hypotheses, CommandsAsSharesOfTheLimitsAreNoNewtonMetres) {
   MachineLog log = DrivenAtBothJoints({}, 16, TorquesOfBoth(1));
   NameAsCommands(log);
@@ -88,6 +93,19 @@ TEST(Hypotheses, ASmallMeasuredTorqueActsToo) {
   const std::string faults = FaultsIn(log);
   EXPECT_NE(faults.find("angle 1: suspect an encoder that slips by 0.1 rad"), std::string::npos)
       << faults;
+}
+
+TEST(Hypotheses, SmallSlipsAndDriftsAreNoFindings) {
+  const MachineLog right = DrivenAtBothJoints({}, 8, TorquesOfBoth(1));
+  const auto faults_with = [&](void (*damage)(MachineLog&, int, double), double turn) {
+    MachineLog log = right;
+    damage(log, 1, turn);
+    return FaultsIn(log);
+  };
+  EXPECT_EQ(faults_with(SlipHalfWay, 0.02), "");
+  EXPECT_NE(faults_with(SlipHalfWay, 0.05).find("slips by 0.05 rad"), std::string::npos);
+  EXPECT_EQ(faults_with(Drift, 0.08), "");
+  EXPECT_NE(faults_with(Drift, 0.2).find("drifts"), std::string::npos) << faults_with(Drift, 0.2);
 }
 
 /// The ratio of the angles in the slow swing in which both links lean to the same side.
