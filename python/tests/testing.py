@@ -8,6 +8,9 @@ import unittest
 
 import upswing
 
+# A shell that starts tests in the background lets them ignore Ctrl-C, which some of them send.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
 
 class BadInputTest(unittest.TestCase):
     def refuse(self, what, call, *arguments, **settings):
