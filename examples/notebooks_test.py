@@ -40,7 +40,7 @@ from PIL import Image  # noqa: E402
 NOTEBOOKS = sorted((ROOT / "examples/notebooks").glob("*.ipynb"))
 LARGEST = 600_000  # bytes, all notebooks together
 NEEDS = {"7-stable-baselines3": "stable_baselines3"}
-# What a test runs instead: one training of each variant shows that all cells run.
+# Texts of cells and their replacements in tests: one training of each variant runs all cells.
 SHORTER = {"3-the-posts-comparison": ("SEEDS, STEPS = (1, 2, 3)", "SEEDS, STEPS = (1,)")}
 
 
@@ -55,7 +55,7 @@ def client(notebook, folder):
 
 
 def run(path, shorter=None):
-    """A notebook with new outputs. `shorter`: a text in one of its cells and what replaces it."""
+    """A notebook with new outputs. `shorter`: a text in one of its cells, and its replacement."""
     notebook = nbformat.read(path, 4)
     if shorter:
         cell, = (cell for cell in notebook.cells if shorter[0] in cell.source)
