@@ -8,6 +8,13 @@
 namespace upswing {
 namespace {
 
+/// What a file has where a number or another type is expected. Quotes make a text of a number.
+std::string WrongTypeOf(const toml::node& node) {
+  const std::optional<std::string> text = TextOf(node);
+  if (!text) return "another type";
+  return Concat(node.is_string() ? "the text " : "", "\"", *text, "\"");
+}
+
 /// Sets one key of a section, or a key without a section if `section` is empty.
 FlagValue ApplyNode(const Options& options, const std::string& section, const std::string& key,
                     const toml::node& node, const std::string& where) {
@@ -21,8 +28,8 @@ FlagValue ApplyNode(const Options& options, const std::string& section, const st
     }
     const bool wants_text = std::holds_alternative<std::string*>(option->target);
     if (!TextOf(node) || node.is_string() != wants_text) {
-      const std::string got = TextOf(node) ? Concat("\"", setting.text, "\"") : "another type";
-      throw BadInput(Concat(setting.where, ": expected ", option->expected(), ", got ", got));
+      throw BadInput(
+          Concat(setting.where, ": expected ", option->expected(), ", got ", WrongTypeOf(node)));
     }
     option->Set(setting.text, setting.where);
   }

@@ -444,7 +444,7 @@ class RunFolderTest(SmallRunTest):
         self.write("nul.toml", 'gamma = "a\\u0000b"\n[agent]\n')
         self.refuse(["train", "--config", "nul.toml"], "nul.toml:1: gamma: ")
         self.write("nul.toml", '[agent]\ngamma = "a\\u0000b"\n')
-        self.refuse(["train", "--config", "nul.toml"], 'got "a\\x00b"')
+        self.refuse(["train", "--config", "nul.toml"], 'got the text "a\\x00b"')
 
     def test_tables_of_another_type(self):
         for text in ("[[plant]]\n", "plant = 1\n"):
