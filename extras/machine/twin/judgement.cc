@@ -239,7 +239,7 @@ std::string SentenceOf(const Judgement& j) {
     return fmt::format("{} have no motion away from upright that could judge the model", j.logs);
   }
   const std::string error = fmt::format("{:.2g} rad over {:.2g} s", j.error, j.seconds);
-  const std::string times = fmt::format("{:.2g} times the encoders' noise", j.times_noise);
+  const std::string times = FormatPlain(j.times_noise, 2) + " times the encoders' noise";
   const std::string share = FormatPercent(j.share) + " of the motion";
   constexpr double kWithoutNoise = 1e4;  // times: the logs of a simulation
   if (j.explains() && j.times_noise > kWithoutNoise) {

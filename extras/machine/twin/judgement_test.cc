@@ -74,6 +74,19 @@ TEST(Judgement, AMachineExplainsItsLogsToTheNoise) {
   }
 }
 
+TEST(Judgement, MultiplesOfTheNoiseAreWrittenWithoutAnExponent) {
+  Judgement judgement;
+  judgement.explanation = Explanation::kToMultiple;
+  judgement.logs = "the logs";
+  judgement.seconds = 1;
+  judgement.error = 0.033;
+  judgement.times_noise = 104;
+  judgement.share = 0.035;
+  EXPECT_EQ(SentenceOf(judgement),
+            "the model explains the logs to 104 times the encoders' noise: 0.033 rad over 1 s, "
+            "3.5% of the motion");
+}
+
 /// A fit to a changed log that begins 20% away from the machine.
 Identification Fitted(const LabSetup& setup, const std::function<void(MachineLog&)>& change) {
   const Twin machine = MachineOf(setup);
