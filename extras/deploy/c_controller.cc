@@ -199,27 +199,13 @@ constexpr CController kControllersInC[] = {
     {.name = "mpc", .file = "mpc.c", .state_bytes = 0, .add = AddPredictive},
 };
 
-/// Why a controller has no C code.
-struct WithoutC {
-  const char* name;
-  const char* what;
-};
-
-constexpr WithoutC kWithoutC[] = {
-    {"hybrid", "two of them; export the policy that swings up, and lqr, each by itself"},
-};
-
 /// Throws BadInput if the controller has no C code.
 const CController& CControllerCalled(const std::string& name) {
   for (const CController& controller : kControllersInC) {
     if (name == controller.name) return controller;
   }
-  std::string what = "a controller without C code";
-  for (const WithoutC& refused : kWithoutC) {
-    if (name == refused.name) what = refused.what;
-  }
   throw BadInput(Concat(name, ": expected ", Join(ControllersInC(), ", "),
-                        " or a learned policy for C, got ", what));
+                        " or a learned policy for C, got a controller without C code"));
 }
 
 /// Adds the description of a controller to the header: its file, origin, limits and plant.

@@ -194,8 +194,10 @@ class HeadersTest(HeaderTest):
             self.assertEqual(self.self_test(), 3, right)
 
     def test_controllers_that_have_no_header(self):
-        self.refuse(["export", "hybrid", "--swing-up", AGENTS / "fast.safetensors", "--c", "x.h"],
-                    "hybrid: expected lqr, energy, pfl, tvlqr, mpc", "each by itself")
+        for flags in (["--c", "x.h"], ["--onnx", "x.onnx"],
+                      ["--c", "x.h", "--swing-up", AGENTS / "fast.safetensors"]):
+            self.refuse(["export", "hybrid", *flags],
+                        "hybrid: expected a learned policy or another controller", "each by itself")
         self.refuse(["export", "lqr", "--onnx", "x.onnx"], "lqr: expected a learned policy", "--c")
 
     def test_null_pointers(self):

@@ -28,6 +28,15 @@ struct ExportArguments {
   bool overwrite = false;
 };
 
+/// Throws BadInput for the controller hybrid, which would ask for --swing-up first.
+void RefuseHybrid(const std::string& name) {
+  std::error_code error;
+  if (name != "hybrid" || fs::exists(name, error)) return;
+  throw BadInput(
+      "hybrid: expected a learned policy or another controller, got two in one; export the policy "
+      "that swings up, and lqr, each by itself");
+}
+
 /// The single policy that `flag` exports.
 LoadedPolicy SinglePolicy(const ExportArguments& a, const char* flag) {
   if (a.policies.size() != 1) {
@@ -36,6 +45,7 @@ LoadedPolicy SinglePolicy(const ExportArguments& a, const char* flag) {
   }
   PolicyArguments policy = a.controller;
   policy.name = a.policies.front();
+  RefuseHybrid(policy.name);
   return GetPolicy(policy);
 }
 
