@@ -327,6 +327,10 @@ class Documents(ProgramTest):
         self.assertEqual(re.search(r"^## \[(\d\S*)\]", text_of("CHANGELOG.md"), re.MULTILINE)[1],
                          version)
 
+    def test_the_python_page_and_the_package_name_the_same_python(self):
+        needed = re.search(r'requires-python = ">=(\S+)"', text_of("pyproject.toml"))[1]
+        self.assertEqual(re.findall(r"Python (\S+) or newer", text_of("docs/howto/python.md")), [needed])
+
     def test_security_names_every_fuzzing_target_and_tests_that_exist(self):
         text = text_of("SECURITY.md")
         self.assertEqual(set(re.findall(r"(\w+_fuzz)`", text)),
