@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import random
+import sys
 from typing import Any
 
 import upswing
@@ -115,6 +116,8 @@ def main() -> None:
     print(f"{controller.driven:.2f} s driven, {controller.upright:.2f} s upright at the end")
     if controller.stopped:
         print(f"stopped: {controller.stopped}")
+    if controller.stopped or controller.upright == 0:
+        sys.exit(1)  # as `upswing run`
 
 
 if __name__ == "__main__":

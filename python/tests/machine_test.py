@@ -118,6 +118,14 @@ class Controllers(BadInputTest):
                 self.assertGreater(np.abs(torques[:, 0]).max(), 0.1)
                 self.assertLessEqual(np.abs(torques[:, 0]).max(), 0.15)
 
+    def test_the_example_fails_if_the_links_do_not_end_upright(self):
+        example = ROOT / "examples/python/cloudpendulum.py"
+        with tempfile.TemporaryDirectory() as folder:
+            done = subprocess.run([sys.executable, "-B", example, "tvlqr", "--seconds", "0.5"], check=False,
+                                  stdout=subprocess.PIPE, encoding="utf-8", cwd=folder)
+        self.assertIn("0.00 s upright at the end", done.stdout)
+        self.assertEqual(done.returncode, 1)
+
     def test_the_motor_may_be_at_joint_2(self):
         controller = quiet("mpc", **SMALL_MPC, actuated_joint=2)
         loop = FakeControlLoop(SMALL, experiment_time=3, seed=1)
