@@ -64,6 +64,9 @@ WANTS = "foreach(wanted " + " ".join(f'"{wanted}"' for wanted in WANTED) + """)
   separate_arguments(words UNIX_COMMAND "${wanted}")
   find_package(upswing ${words} QUIET)
   message(STATUS "wants ${wanted}: ${upswing_FOUND}")
+  if(words MATCHES "physics")
+    message(STATUS "refused: ${upswing_NOT_FOUND_MESSAGE}")
+  endif()
 endforeach()
 """
 
@@ -172,6 +175,7 @@ class Library(unittest.TestCase):
     def test_package_refuses_what_it_is_not(self):
         answers = dict(re.findall(r"^-- wants (.*?): (\d)$", self.configured, re.MULTILINE))
         self.assertEqual(answers, WANTED)
+        self.assertRegex(self.configured, r"-- refused: expected components among base, .*, deploy; got physics\n")
 
     def test_installed_program(self):
         self.assertIn("MuJoCo 4.0.0",
