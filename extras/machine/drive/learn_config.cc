@@ -9,7 +9,7 @@ namespace upswing::machine {
 
 void LearnConfig::Describe(Options& o) {
   o.Section("learning");
-  o.Add(&encoder_counts, "encoder_counts", {16, 1e9}, "1/turn", "steps of the encoders; required")
+  o.Add(&encoder_counts, "encoder_counts", {16, 1e9}, "1/turn", "steps of the encoders")
       .usual = "none";
   o.Add(&hold, "hold", {1, 3600}, "s", "time of balance that ends the learning");
   o.Add(&motion, "motion", {10, 3600}, "s",
