@@ -193,6 +193,7 @@ class DemoTest(ProgramTest):
     def test_bad_input_is_refused_in_one_line(self):
         (self.work / "full").mkdir()
         (self.work / "full/file").touch()
+        (self.work / "notes.txt").write_text("mine", encoding="utf-8")
         before = snapshot(self.work)
         for arguments, *words in ((["--prot", "1"], "--prot", "--port"),
                                   (["--port"], "--port"),
@@ -206,6 +207,7 @@ class DemoTest(ProgramTest):
                                   (["--dist", "x", "--port", "1024"], "--port: expected no --dist"),
                                   (["--file", "x.html", "--dist", "x"], "--dist: expected no --file"),
                                   (["--file", "no/where.html"], "--file", "no/where.html"),
+                                  (["--file", "notes.txt"], "notes.txt: expected a new file or an older page"),
                                   (["nothing"], "nothing"),
                                   (["full"], "full"),
                                   (["lqr"], "lqr"),

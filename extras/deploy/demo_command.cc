@@ -148,6 +148,7 @@ int WriteSingle(const DemoArguments& a, const fs::path& page) {
   if (place == std::string::npos) {
     throw Failure(Concat(page.string(), ": expected \"", kPlace, "\" in single.html, found none"));
   }
+  CheckReplaceable("--file", a.file, "page", {std::string_view(html).substr(0, 40)});
   std::optional<Making> temporary;
   std::string files;
   for (const fs::path& folder : {page / "assets", AgentsOf(a, page, temporary).folder}) {

@@ -167,7 +167,7 @@ class DiskFullTest(ProgramTest):
         self.assertEqual(snapshot(self.folder), before)
 
     def test_in_the_middle_of_a_csv(self):
-        self.write("out.csv", "mine")
+        self.write("out.csv", "t,q1,q2,w1,w2\n")
         self.refuse(["simulate", "--csv", "out.csv"], "out.csv", "File too large", code=1,
                     preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (5000, 5000)))
 

@@ -343,6 +343,17 @@ class StreamTest(ProgramTest):
         self.assertIn("finished at step 2000",
                       (self.folder / "unread/log.txt").read_text(encoding="utf-8"))
 
+    def test_a_table_replaces_an_older_table_only(self):
+        commands = (["simulate", "fast", "--seconds", 0.1, "--csv"],
+                    ["eval", "fast", "--episodes", 1, "--physics", "closed-form", "--episodes-csv"],
+                    ["eval", "fast", "sac", "--episodes", 1, "--physics", "closed-form", "--episodes-csv"])
+        for number, command in enumerate(commands):
+            self.write("mine.txt", "mine")
+            self.refuse([*command, "mine.txt"], "mine.txt: expected a new file or an older table")
+            self.assertEqual((self.folder / "mine.txt").read_text(encoding="utf-8"), "mine")
+            for _ in range(2):
+                self.succeed(*command, f"table-{number}.csv")
+
     def test_a_file_that_eval_could_not_write_is_refused_before_it_evaluates(self):
         self.write("file", "")
         for path in ("nodir/x.csv", "file/x.csv", "/proc/x.csv"):

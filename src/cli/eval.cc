@@ -86,7 +86,10 @@ int RunEval(const EvalArguments& a) {
     throw BadInput(
         "--json: expected a file for --episodes-csv, got - (standard output), where the JSON goes");
   }
-  if (!a.episodes_csv.empty()) CheckWritable("--episodes-csv", a.episodes_csv);
+  if (!a.episodes_csv.empty()) {
+    CheckReplaceable("--episodes-csv", a.episodes_csv, "table of episodes",
+                     {"episode,", "policy,episode,"});
+  }
   const Comparison comparison = Evaluate(a);
   if (!a.episodes_csv.empty()) {
     WriteOutput(a.episodes_csv, EpisodesCsv(comparison.reports, a.policies.size() > 1));

@@ -79,6 +79,7 @@ int RunSimulate(const SimulateArguments& a) {
   if (!a.policy.empty() && !a.torque.empty()) {
     throw BadInput("simulate: expected a policy or --torque FILE, got both");
   }
+  CheckReplaceable("--csv", a.csv, "table of simulate", {"t,q1,q2,"});
   std::optional<LoadedPolicy> loaded;
   if (!a.policy.empty()) loaded.emplace(GetPolicyIn(a.trial, a.policy));
   RolloutConfig config = TrialEpisode(a.trial, loaded ? &*loaded : nullptr);

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 
 #include "base/error.h"
 #include "base/text.h"
@@ -54,6 +55,27 @@ void CheckNewOutput(const std::string& flag, const std::string& path, bool overw
   if (!overwrite && !IsStandardStream(path) && std::filesystem::is_regular_file(path, error)) {
     throw BadInput(Concat(flag, " ", path,
                           ": expected a new file, got one that exists; --overwrite replaces it"));
+  }
+  CheckWritable(flag, path);
+}
+
+void CheckReplaceable(const std::string& flag, const std::string& path, std::string_view what,
+                      std::initializer_list<std::string_view> beginnings) {
+  std::error_code error;
+  // A pipe would wait for a writer.
+  if (!IsStandardStream(path) && std::filesystem::is_regular_file(path, error)) {
+    std::array<char, 256> bytes;
+    std::ifstream file(path, std::ios::binary);
+    file.read(bytes.data(), bytes.size());
+    const std::string_view old(bytes.data(), static_cast<size_t>(file.gcount()));
+    bool is_replaceable = old.empty();
+    for (const std::string_view beginning : beginnings) {
+      if (old.starts_with(beginning)) is_replaceable = true;
+    }
+    if (!is_replaceable) {
+      throw BadInput(Concat(flag, " ", path, ": expected a new file or an older ", what,
+                            ", got another file"));
+    }
   }
   CheckWritable(flag, path);
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <initializer_list>
 #include <string>
 #include <string_view>
 
@@ -22,6 +23,11 @@ void CheckWritable(const std::string& flag, const std::string& path);
 
 /// Throws as CheckWritable does, and if a file is there that the user does not `overwrite`.
 void CheckNewOutput(const std::string& flag, const std::string& path, bool overwrite);
+
+/// Throws as CheckWritable does, and if a file with other content is there: it is not empty and has
+/// none of the `beginnings` of older outputs, which `what` names.
+void CheckReplaceable(const std::string& flag, const std::string& path, std::string_view what,
+                      std::initializer_list<std::string_view> beginnings);
 
 /// Writes a file as WriteNamedFile does, or writes to standard output.
 void WriteOutput(const std::string& path, std::string_view text);
