@@ -383,6 +383,13 @@ class LauncherTest(ProgramTest):
         return subprocess.run([self.folder / "upswing", *arguments], check=False,
                               capture_output=True, encoding="utf-8", **more)
 
+    def test_a_fresh_clone_tells_its_version_without_a_build(self):
+        (self.folder / "build/release/bin/upswing").unlink()
+        shutil.copy(ROOT / "CMakeLists.txt", self.folder)
+        done = self.launch("--version")
+        self.assertEqual((done.returncode, done.stdout, done.stderr),
+                         (0, self.succeed("--version"), ""))
+
     def test_an_unknown_command_is_refused_before_anything_is_built(self):
         self.assertEqual(self.launch("trian").stdout, "ran: trian\n")  # the program suggests one
         (self.folder / "build/release/bin/upswing").unlink()
