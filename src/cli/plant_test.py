@@ -206,6 +206,8 @@ class PlantTest(ProgramTest):
             self.refuse([*command, "--plant", "bad.toml"], "bad.toml:2: [plant]", "did you mean mass1?")
             self.refuse([*command, "--plant", "none"], "--plant: expected a plant file", "realaigym",
                         'got "none"')
+        for name in ("mine.toml", "my/plant"):
+            self.refuse(["simulate", "--plant", name], f'got "{name}" (no such file)')
         self.refuse(["simulate", "--plant", "other.toml"], "other.toml:1", "did you mean sensors?")
         self.refuse(["eval", "lqr", "--made-for", "bad.toml"], "bad.toml:2: [plant]")
         self.refuse(["eval", "lqr", "--made-for", "m.toml", "--made-for", "realaigym"],

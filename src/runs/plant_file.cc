@@ -95,9 +95,10 @@ PlantDocument ReadPlantDocument(const std::string& name, const std::string& flag
   if (shipped != plants.end()) return {std::string(shipped->toml), Concat("plant ", name)};
   if (!std::filesystem::exists(name)) {
     const std::vector<std::string> names = NamesOf(plants);
+    const bool names_a_file = name.ends_with(".toml") || name.find('/') != std::string::npos;
+    const std::string hint = names_a_file ? " (no such file)" : DidYouMean(name, names);
     throw BadInput(Concat(flag, ": expected ", else_taken, "a plant file (TOML) or one of ",
-                          Join(names, ", "), ", got \"", Printable(name), "\"",
-                          DidYouMean(name, names)));
+                          Join(names, ", "), ", got \"", Printable(name), "\"", hint));
   }
   return {ReadOwnFile(name, kMostPlantBytes), name};
 }
