@@ -102,7 +102,7 @@ std::string UptimeJson(const UptimeReport& report) {
 }
 
 std::string BoardCsv(const MachineLog& log) {
-  std::string csv = "time,pos_meas1,pos_meas2,vel_meas1,vel_meas2,tau_con1,tau_con2\n";
+  std::string csv(kBoardColumns);
   for (int k = 0; k < log.rows(); ++k) {
     csv += FormatNumber(std::round(log.time[k] * 1e6) / 1e6);
     for (const Joints& pair : {log.angle[k], log.velocity[k], log.commanded[k]}) {

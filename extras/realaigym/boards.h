@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/sample.h"
@@ -45,7 +46,9 @@ std::vector<UptimeRun> ScoreUptime(const MachinePolicy& policy, uint64_t seed, i
 MachineLog UptimeLog(const MachinePolicy& policy, uint64_t seed);
 std::string UptimeJson(const UptimeReport& report);
 
-/// A motion as CSV in the boards' own format.
+inline constexpr std::string_view kBoardColumns =
+    "time,pos_meas1,pos_meas2,vel_meas1,vel_meas2,tau_con1,tau_con2\n";
+/// A motion as CSV in the boards' own format, with kBoardColumns.
 std::string BoardCsv(const MachineLog& log);
 
 }  // namespace upswing::realaigym

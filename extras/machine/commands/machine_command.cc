@@ -415,7 +415,9 @@ void CheckOutputs(const MachineArguments& a) {
     CheckWritable("--figure", a.figure);
     CheckCanDraw();
   }
-  if (!a.csv.empty()) CheckWritable("--csv", a.csv);
+  if (!a.csv.empty()) {
+    CheckReplaceable("--csv", a.csv, "table of validate", {"log,time,measured 1,"});
+  }
 }
 
 /// Adds the arguments that the commands share.

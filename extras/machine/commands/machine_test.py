@@ -365,6 +365,9 @@ class Machine(ProgramTest):
         said = self.unexplained("machine", "validate", "plant.toml", "log.csv", "--against",
                             "realaigym", "--csv", "motion.csv")
         self.assertIn("written motion.csv\n", said)
+        self.write("other.csv", log())
+        self.refuse(["machine", "validate", "plant.toml", "log.csv", "--csv", "other.csv"],
+                    "other.csv: expected a new file or an older table of validate")
         rows = [row.split(",") for row in (self.folder / "motion.csv").read_text().splitlines()]
         self.assertEqual(rows[0][:6], ["log", "time", "measured 1", "measured 2", "plant 1",
                                        "plant 2"])
