@@ -117,7 +117,7 @@ def main() -> None:
     if controller.stopped:
         print(f"stopped: {controller.stopped}")
     if controller.stopped or controller.upright == 0:
-        sys.exit(1)  # as `upswing run`
+        sys.exit(1)  # the exit code of `upswing run`
 
 
 if __name__ == "__main__":

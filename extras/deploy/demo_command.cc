@@ -76,7 +76,7 @@ fs::path DistFolder(std::string dist) {
   return dist;
 }
 
-/// Mistakes in --dist and --file are reported before any file is read.
+/// Mistakes in --dist and --file are reported before the agents are read.
 void CheckPlace(const DemoArguments& a) {
   if (!a.file.empty()) CheckWritable("--file", a.file);
   if (a.dist.empty()) return;
@@ -148,7 +148,8 @@ int WriteSingle(const DemoArguments& a, const fs::path& page) {
   if (place == std::string::npos) {
     throw Failure(Concat(page.string(), ": expected \"", kPlace, "\" in single.html, found none"));
   }
-  CheckReplaceable("--file", a.file, "page", {std::string_view(html).substr(0, 40)});
+  const std::string_view beginning = std::string_view(html).substr(0, html.find("data-view"));
+  CheckReplaceable("--file", a.file, "page", {Concat(beginning, "data-view")});
   std::optional<Making> temporary;
   std::string files;
   for (const fs::path& folder : {page / "assets", AgentsOf(a, page, temporary).folder}) {

@@ -197,7 +197,7 @@ class HeadersTest(HeaderTest):
         for flags in (["--c", "x.h"], ["--onnx", "x.onnx"],
                       ["--c", "x.h", "--swing-up", AGENTS / "fast.safetensors"]):
             self.refuse(["export", "hybrid", *flags],
-                        "hybrid: expected a learned policy or another controller", "each by itself")
+                        "hybrid: expected a single policy or controller", "each by itself")
         self.refuse(["export", "lqr", "--onnx", "x.onnx"], "lqr: expected a learned policy", "--c")
 
     def test_null_pointers(self):

@@ -28,13 +28,14 @@ struct ExportArguments {
   bool overwrite = false;
 };
 
-/// Throws BadInput for the controller hybrid, which would ask for --swing-up first.
+/// Throws BadInput for the controller hybrid, which has no export. Comes before GetPolicy, which
+/// asks for --swing-up. A file or folder of that name is a policy.
 void RefuseHybrid(const std::string& name) {
   std::error_code error;
   if (name != "hybrid" || fs::exists(name, error)) return;
   throw BadInput(
-      "hybrid: expected a learned policy or another controller, got two in one; export the policy "
-      "that swings up, and lqr, each by itself");
+      "hybrid: expected a single policy or controller, got one that consists of two; export the "
+      "policy that swings up, and lqr with --c, each by itself");
 }
 
 /// The single policy that `flag` exports.

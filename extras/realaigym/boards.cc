@@ -102,7 +102,7 @@ std::string UptimeJson(const UptimeReport& report) {
 }
 
 std::string BoardCsv(const MachineLog& log) {
-  std::string csv(kBoardColumns);
+  std::string csv(kBoardHeader);
   for (int k = 0; k < log.rows(); ++k) {
     csv += FormatNumber(std::round(log.time[k] * 1e6) / 1e6);
     for (const Joints& pair : {log.angle[k], log.velocity[k], log.commanded[k]}) {

@@ -46,9 +46,10 @@ std::vector<UptimeRun> ScoreUptime(const MachinePolicy& policy, uint64_t seed, i
 MachineLog UptimeLog(const MachinePolicy& policy, uint64_t seed);
 std::string UptimeJson(const UptimeReport& report);
 
-inline constexpr std::string_view kBoardColumns =
+/// The first line of BoardCsv.
+inline constexpr std::string_view kBoardHeader =
     "time,pos_meas1,pos_meas2,vel_meas1,vel_meas2,tau_con1,tau_con2\n";
-/// A motion as CSV in the boards' own format, with kBoardColumns.
+/// A motion as CSV in the boards' own format.
 std::string BoardCsv(const MachineLog& log);
 
 }  // namespace upswing::realaigym

@@ -47,9 +47,10 @@ class Cubics {
   /// Fits the whole pieces of the samples.
   explicit Cubics(const std::vector<double>& samples) {
     EXPECT_EQ(samples.size() % kPiece, 0);
-    Eigen::Matrix4d products = Eigen::Matrix4d::Zero();
-    for (int i = 0; i < kPiece; ++i) products += Powers(i).transpose() * Powers(i);
-    const Eigen::Matrix4d inverse = products.inverse();
+    // The normal equations: the powers are those of numbers below 1, so that few digits are lost.
+    Eigen::Matrix4d gram = Eigen::Matrix4d::Zero();
+    for (int i = 0; i < kPiece; ++i) gram += Powers(i).transpose() * Powers(i);
+    const Eigen::Matrix4d inverse = gram.inverse();
     for (size_t first = 0; first + kPiece <= samples.size(); first += kPiece) {
       Eigen::RowVector4d moments = Eigen::RowVector4d::Zero();
       for (size_t i = 0; i < kPiece; ++i) {

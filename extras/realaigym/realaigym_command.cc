@@ -257,7 +257,8 @@ void ExpectUsualSize(const ScoreArguments& a, const Twin& twin) {
 
 int RunScore(const ScoreArguments& a) {
   if (a.policy.empty()) throw BadInput("realaigym score: expected a policy, got none");
-  if (!a.csv.empty()) CheckReplaceable("--csv", a.csv, "motion of score", {kBoardColumns});
+  if (!a.csv.empty())
+    CheckReplaceable("--csv", a.csv, "table of score", {std::string(kBoardHeader)});
   if (IsStandardStream(a.csv) && a.as_json) {
     throw BadInput(
         "--json: expected a file for --csv, got - (standard output), where the JSON goes");

@@ -175,7 +175,7 @@ class RealAIGym(ProgramTest):
         refuse(["realaigym", "score", "lqr", "--robot", "cartpole"], "--robot", "pendubot or acrobot")
         refuse(["realaigym", "score", "lqr", "--csv", "-", "--json"], "--json")
         self.write("log.csv", "time,pos_meas1\n")
-        refuse(["realaigym", "score", "lqr", "--csv", "log.csv"], "log.csv: expected a new file or an older motion")
+        refuse(["realaigym", "score", "lqr", "--csv", "log.csv"], "log.csv: expected a new file or an older table")
         refuse(["realaigym", "score", "lqr", "--no-pushes"], "--no-pushes", "--twin")
         for version in (2, 3):
             refuse(["realaigym", "score", "lqr", "--twin", "cloudpendulum", "--score-version", version],

@@ -8,7 +8,7 @@ import unittest
 
 import upswing
 
-# A shell that starts tests in the background lets them ignore Ctrl-C, which some of them send.
+# A shell that starts tests in the background makes them ignore Ctrl-C, which some of them send.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 

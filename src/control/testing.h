@@ -22,15 +22,16 @@ namespace upswing {
 using EigenSolver = Eigen::EigenSolver<Eigen::MatrixXd>;
 using SymmetricEigenSolver = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>;
 
-/// Minimises ∫ x' Q x + R u² dt of ẋ = A x + B u. Newton's iteration finds the sign of the
-/// Hamiltonian matrix, which is -1 on its stable subspace [I; P] (Roberts, "Linear model reduction
+/// Minimises ∫ x' Q x + R u² dt of ẋ = A x + B u by the sign S of the Hamiltonian matrix: S is -1
+/// on its stable subspace [I; P], so that P = -S12⁻¹ (S11 + I) (Roberts, "Linear model reduction
 /// and solution of the algebraic Riccati equation by use of the sign function", 1980).
 inline Lqr ContinuousLqr(const LinearModel& model, const Eigen::Matrix4d& Q, double R) {
-  Eigen::MatrixXd sign(8, 8);
-  sign << model.A, -model.B * model.B.transpose() / R, -Q, -model.A.transpose();
-  for (int k = 0; k < 50; ++k) sign = (sign + sign.inverse()).eval() / 2;
-  const Eigen::Matrix4d left = sign.topLeftCorner<4, 4>(), right = sign.topRightCorner<4, 4>();
-  const Eigen::Matrix4d P = -right.inverse() * (left + Eigen::Matrix4d::Identity());
+  constexpr int kSteps = 50;  // of Newton's iteration; some ten are enough
+  Eigen::MatrixXd S(8, 8);
+  S << model.A, -model.B * model.B.transpose() / R, -Q, -model.A.transpose();
+  for (int step = 0; step < kSteps; ++step) S = (S + S.inverse()).eval() / 2;
+  const Eigen::Matrix4d S11 = S.topLeftCorner<4, 4>(), S12 = S.topRightCorner<4, 4>();
+  const Eigen::Matrix4d P = -S12.inverse() * (S11 + Eigen::Matrix4d::Identity());
   return {model.B.transpose() * P / R, P};
 }
 

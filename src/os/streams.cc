@@ -1,5 +1,6 @@
 #include "os/streams.h"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdio>
@@ -13,6 +14,18 @@
 #include "os/system.h"
 
 namespace upswing {
+namespace {
+
+/// Whether a file that can be read starts with one of these texts.
+bool StartsWithOneOf(const std::string& path, const std::vector<std::string>& beginnings) {
+  std::ifstream file(path, std::ios::binary);
+  std::string start(256, '\0');  // longer than each beginning
+  file.read(start.data(), static_cast<std::streamsize>(start.size()));
+  return std::ranges::any_of(beginnings,
+                             [&](const std::string& text) { return start.starts_with(text); });
+}
+
+}  // namespace
 
 std::string InputName(const std::string& path) {
   return IsStandardStream(path) ? "standard input" : path;
@@ -59,23 +72,14 @@ void CheckNewOutput(const std::string& flag, const std::string& path, bool overw
   CheckWritable(flag, path);
 }
 
-void CheckReplaceable(const std::string& flag, const std::string& path, std::string_view what,
-                      std::initializer_list<std::string_view> beginnings) {
+void CheckReplaceable(const std::string& flag, const std::string& path, std::string_view kind,
+                      const std::vector<std::string>& beginnings) {
   std::error_code error;
-  // A pipe would wait for a writer.
-  if (!IsStandardStream(path) && std::filesystem::is_regular_file(path, error)) {
-    std::array<char, 256> bytes;
-    std::ifstream file(path, std::ios::binary);
-    file.read(bytes.data(), bytes.size());
-    const std::string_view old(bytes.data(), static_cast<size_t>(file.gcount()));
-    bool is_replaceable = old.empty();
-    for (const std::string_view beginning : beginnings) {
-      if (old.starts_with(beginning)) is_replaceable = true;
-    }
-    if (!is_replaceable) {
-      throw BadInput(Concat(flag, " ", path, ": expected a new file or an older ", what,
-                            ", got another file"));
-    }
+  // Only regular files are read, because reading a pipe waits for its writer.
+  const bool exists = !IsStandardStream(path) && std::filesystem::is_regular_file(path, error);
+  if (exists && std::filesystem::file_size(path, error) > 0 && !StartsWithOneOf(path, beginnings)) {
+    throw BadInput(Concat(flag, " ", path, ": expected a new file or an older ", kind,
+                          ", got another file; choose another name or remove it"));
   }
   CheckWritable(flag, path);
 }

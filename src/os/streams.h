@@ -1,8 +1,8 @@
 #pragma once
 
-#include <initializer_list>
 #include <string>
 #include <string_view>
+#include <vector>
 
 /// Files named on a command line; `-` means standard input or output.
 namespace upswing {
@@ -24,10 +24,10 @@ void CheckWritable(const std::string& flag, const std::string& path);
 /// Throws as CheckWritable does, and if a file is there that the user does not `overwrite`.
 void CheckNewOutput(const std::string& flag, const std::string& path, bool overwrite);
 
-/// Throws as CheckWritable does, and if a file with other content is there: it is not empty and has
-/// none of the `beginnings` of older outputs, which `what` names.
-void CheckReplaceable(const std::string& flag, const std::string& path, std::string_view what,
-                      std::initializer_list<std::string_view> beginnings);
+/// Throws as CheckWritable does, and if the file is neither empty nor an older output. An older
+/// output starts with one of `beginnings`; `kind` names it in the message.
+void CheckReplaceable(const std::string& flag, const std::string& path, std::string_view kind,
+                      const std::vector<std::string>& beginnings);
 
 /// Writes a file as WriteNamedFile does, or writes to standard output.
 void WriteOutput(const std::string& path, std::string_view text);

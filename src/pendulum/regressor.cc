@@ -42,21 +42,23 @@ Factors Regressor(const JointAngles<double>& angles, const Pair& velocity,
 
 MomentumRegressor MomentumRegressorOf(const JointAngles<double>& angles, const Pair& velocity) {
   using namespace column;
+  // momentum = M w. force = -Ṁ w - r for τ = 0, with Ṁ = -b s2 w2 [[2, 1], [1, 0]]: at joint 1 the
+  // terms of b cancel.
   const auto& [w1, w2] = velocity;
-  MomentumRegressor of{};
-  auto& [p1, p2] = of.momentum;
-  p1[kJ1] = w1;
-  p1[kJ2] = p2[kJ2] = w1 + w2;
-  p1[kB] = angles.c2 * (w1 + w1 + w2);
-  p2[kB] = angles.c2 * w1;
-  p2[kA] = w2;
-  auto& [force1, force2] = of.force;
+  MomentumRegressor regressor{};
+  auto& [momentum1, momentum2] = regressor.momentum;
+  momentum1[kJ1] = w1;
+  momentum1[kJ2] = momentum2[kJ2] = w1 + w2;
+  momentum1[kB] = angles.c2 * (w1 + w1 + w2);
+  momentum2[kB] = angles.c2 * w1;
+  momentum2[kA] = w2;
+  auto& [force1, force2] = regressor.force;
   force1[kG1] = angles.s1;
   force1[kG2] = force2[kG2] = angles.s12();
   force1[kD1] = w1;
   force2[kD2] = w2;
   force2[kB] = angles.s2 * w1 * (w1 + w2);
-  return of;
+  return regressor;
 }
 
 }  // namespace upswing

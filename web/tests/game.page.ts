@@ -103,7 +103,8 @@ test('a link without a try that comes up gives one line', async ({ stage: page }
     await stopAt(page, `#tour=${MOTOR}&ghost=${ghost}`);
     await expect(page.locator('#message')).toContainText('does not bring both links up');
     await expect(answer(page)).toHaveText('');
-    await expect(page.locator('#first-name')).toHaveText('Dueling Double DQN'); // loads meanwhile
+    await expect(page.locator('#first-name')).toHaveText('Dueling Double DQN'); // it has loaded
+    await expect(page.locator('#message')).toBeVisible();
     await page.locator('#message-close').click();
   }
 });

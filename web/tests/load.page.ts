@@ -142,6 +142,7 @@ test.describe('missing or broken parts are reported', () => {
     await page.locator('#agent').selectOption('fast');
     await expect(page.locator('#agent-on')).toBeEnabled();
     await expect(page.locator('#agent-text')).toContainText('8-48-32');
+    await expect(message).toBeHidden();
   });
 
   test('without MuJoCo the page uses its own physics, and says so', async ({ page }) => {

@@ -365,6 +365,8 @@ class Machine(ProgramTest):
         said = self.unexplained("machine", "validate", "plant.toml", "log.csv", "--against",
                             "realaigym", "--csv", "motion.csv")
         self.assertIn("written motion.csv\n", said)
+        self.assertIn("written motion.csv\n", self.unexplained("machine", "validate", "plant.toml", "log.csv",
+                                                               "--csv", "motion.csv"))
         self.write("other.csv", log())
         self.refuse(["machine", "validate", "plant.toml", "log.csv", "--csv", "other.csv"],
                     "other.csv: expected a new file or an older table of validate")

@@ -66,7 +66,7 @@ void SlipHalfWay(MachineLog& log, int joint, double turn) {
   for (int k = log.rows() / 2; k < log.rows(); ++k) log.angle[k][joint] += turn;
 }
 
-/// Adds an angle that grows to `turn` over the whole log.
+/// Adds an angle that grows to `turn` (rad) over the whole log.
 void Drift(MachineLog& log, int joint, double turn) {
   for (int k = 0; k < log.rows(); ++k) log.angle[k][joint] += turn * k / log.rows();
 }
@@ -102,6 +102,7 @@ TEST(Hypotheses, SmallSlipsAndDriftsAreNoFindings) {
     damage(log, 1, turn);
     return FaultsIn(log);
   };
+  // Slips are small below 0.03 rad, drifts below 0.1 rad.
   EXPECT_EQ(faults_with(SlipHalfWay, 0.02), "");
   EXPECT_NE(faults_with(SlipHalfWay, 0.05).find("slips by 0.05 rad"), std::string::npos);
   EXPECT_EQ(faults_with(Drift, 0.08), "");

@@ -310,6 +310,7 @@ std::vector<Structure> Structures(bool has_motors, bool cogging, bool one_body) 
 
 Structure Hanging(Structure structure, HangingBy cause) {
   for (auto* names : {&structure.values, &structure.of_session}) {
+    // clang 14 does not compile std::ranges::search.
     const auto zeros = std::search(names->begin(), names->end(), kZeros.begin(), kZeros.end());
     if (cause == HangingBy::kZeros || zeros == names->end()) continue;
     const auto end = zeros + std::ssize(kZeros);

@@ -25,7 +25,7 @@ export class AgentPanel {
   private readonly listener: AgentListener;
   private readonly curve = new LearningCurve();
   private requests = 0; // to drop late answers
-  private refused = ''; // the last refusal that was shown
+  private refused = ''; // the message about the last agent that could not be used
   /// Whether an agent is loading.
   busy = false;
 
@@ -80,6 +80,7 @@ export class AgentPanel {
       this.agent = agent;
       this.busy = false;
       withdraw(this.refused);
+      this.refused = '';
     } catch (error) {
       if (!(error instanceof BadInput)) throw error;
       if (request !== this.requests) return false;

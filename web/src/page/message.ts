@@ -33,7 +33,7 @@ function hideMessage(): void {
   element('message').hidden = true;
 }
 
-/// Takes a warning back that no longer holds. Another message stays.
+/// Hides the message if it still shows `text`.
 export function withdraw(text: string): void {
   if (element('message-text').textContent === printable(text, LONGEST)) hideMessage();
 }
