@@ -69,6 +69,7 @@ test('an actor has its own chart at any size, and Q-values return with a Q-netwo
     if (i === 0) await expectFits(page); // the others' numbers are as long or shorter
     await page.locator('#agent').selectOption('d3qn');
     await expect(page.locator('#q-name')).toHaveText('Q-values');
+    expect(await page.locator('#message').isHidden()).toBe(true); // that was another agent
     await expect(page.locator('#q-value')).toHaveText(/^best \d+ points, worst [\d.]+ less$/);
   }
 });

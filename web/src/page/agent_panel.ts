@@ -3,7 +3,7 @@ import { printable, quoted, sentence } from '../text';
 import { LearningCurve } from '../view/charts';
 import type { Agent, Agents } from './agents';
 import { element } from './dom';
-import { warn, withdraw } from './message';
+import { note, warn, withdraw } from './message';
 import { onThemeChange } from './theme';
 
 const NAME = 40; // characters of a refused file's name
@@ -25,7 +25,7 @@ export class AgentPanel {
   private readonly listener: AgentListener;
   private readonly curve = new LearningCurve();
   private requests = 0; // to drop late answers
-  private refused = ''; // the message about the last agent that could not be used
+  private said = ''; // the last message about an agent
   /// Whether an agent is loading.
   busy = false;
 
@@ -79,20 +79,26 @@ export class AgentPanel {
       if (request !== this.requests) return false; // a later request replaced it
       this.agent = agent;
       this.busy = false;
-      withdraw(this.refused);
-      this.refused = '';
+      withdraw(this.said);
+      this.said = '';
     } catch (error) {
       if (!(error instanceof BadInput)) throw error;
       if (request !== this.requests) return false;
       this.busy = false;
-      this.refused = sentence(`${refusal}: ${error.message}`);
-      warn(this.refused);
+      this.said = sentence(`${refusal}: ${error.message}`);
+      warn(this.said);
       this.show();
       return false;
     }
     this.listener.took(this.agent);
     this.show();
     return true;
+  }
+
+  /// Shows a note about the agent on the stage, which ends with the next agent.
+  announce(text: string): void {
+    this.said = text;
+    note(text);
   }
 
   /// Shows the list of agents, and the description of the one on the stage.

@@ -8,7 +8,6 @@ import { Dashboard } from './dashboard';
 import { button, element } from './dom';
 import { GoalButtons } from './goals';
 import { MapPanel } from './map';
-import { note } from './message';
 import { Ring } from './ring';
 import { Settings } from './settings';
 import { BEGINNING, disturbanceOf, OWN } from './share';
@@ -198,7 +197,8 @@ export class Laboratory {
     const carried = isCarried
       ? ` It learned on another pendulum, ${length} m long. It moves the page’s at that size.`
       : '';
-    note(`${quoted(this.agents.ownName!)} is the agent now. It stays in this browser.${carried}`);
+    const name = quoted(this.agents.ownName!);
+    this.agentPanel.announce(`${name} is the agent now. It stays in this browser.${carried}`);
   }
 
   private async forgetOwn(): Promise<void> {
