@@ -160,7 +160,7 @@ class LinkTest(RunTest):
         self.refuse(["study", "s.toml", "--out", "many"], "many/a: expected a folder, got a link")
 
     def test_a_link_that_the_user_names_is_followed(self):
-        self.write("precious/out.csv", "old")
+        self.write("precious/out.csv", "t,q1,q2,w1,w2\n")
         (self.folder / "out.csv").symlink_to("precious/out.csv")
         self.succeed("simulate", "--seconds", "1", "--csv", "out.csv")
         self.assertTrue((self.folder / "out.csv").is_symlink())

@@ -165,7 +165,8 @@ class InputTest(ProgramTest):
         kept = self.folder / self.write("open/kept.csv", "mine")
         kept.chmod(0o444)
         done = self.run_here("simulate", "--seconds", "1", "--csv", "open/kept.csv", **user)
-        self.assert_one_line(done, 2, "open/kept.csv: Permission denied")
+        self.assert_one_line(done, 2, "open/kept.csv: expected a file that can be written: ",
+                             "Permission denied")
         self.assertEqual(kept.read_text("utf-8"), "mine")
 
     def test_a_page_of_something_else(self):

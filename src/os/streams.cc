@@ -74,6 +74,7 @@ void CheckNewOutput(const std::string& flag, const std::string& path, bool overw
 
 void CheckReplaceable(const std::string& flag, const std::string& path, std::string_view kind,
                       const std::vector<std::string>& beginnings) {
+  CheckWritable(flag, path);
   std::error_code error;
   // Only regular files are read, because reading a pipe waits for its writer.
   const bool exists = !IsStandardStream(path) && std::filesystem::is_regular_file(path, error);
@@ -81,7 +82,6 @@ void CheckReplaceable(const std::string& flag, const std::string& path, std::str
     throw BadInput(Concat(flag, " ", path, ": expected a new file or an older ", kind,
                           ", got another file; choose another name or remove it"));
   }
-  CheckWritable(flag, path);
 }
 
 void WriteOutput(const std::string& path, std::string_view text) {

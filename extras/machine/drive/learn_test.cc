@@ -254,8 +254,7 @@ TEST(Learn, ChangesSomethingAfterAFailedTryAndKeepsItsTime) {
   EXPECT_LE(link.acting, config.motion);
   std::ranges::sort(tries);
   EXPECT_EQ(std::ranges::adjacent_find(tries), tries.end());
-  EXPECT_TRUE(result.reason.starts_with("the time of motion is used up: another try takes 5.0 s"))
-      << result.reason;
+  EXPECT_TRUE(result.reason.starts_with("the time of motion is used up: ")) << result.reason;
 }
 
 TEST(Learn, NamesThePlayOfACoupling) {
