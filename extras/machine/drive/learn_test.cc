@@ -254,7 +254,11 @@ TEST(Learn, ChangesSomethingAfterAFailedTryAndKeepsItsTime) {
   EXPECT_LE(link.acting, config.motion);
   std::ranges::sort(tries);
   EXPECT_EQ(std::ranges::adjacent_find(tries), tries.end());
-  EXPECT_TRUE(result.reason.starts_with("the time of motion is used up: ")) << result.reason;
+  // Rounding decides whether the last twin names what no twin has.
+  const std::string used_up = "the time of motion is used up: ";
+  EXPECT_TRUE(result.reason.starts_with(used_up + "another try takes 5.0 s") ||
+              result.reason.starts_with(used_up + "5 of 5 simulated machines of the twin balance"))
+      << result.reason;
 }
 
 TEST(Learn, NamesThePlayOfACoupling) {
