@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <fstream>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -58,12 +57,7 @@ std::string WriteExport(const ExportArguments& a, const std::string& flag, const
   constexpr size_t kSame = 11;  // bytes: of an ONNX model up to the producer's name
   std::error_code error;
   const bool exists = !IsStandardStream(path) && fs::is_regular_file(path, error);
-  bool is_export = false;
-  if (exists) {  // a pipe would wait for a writer
-    std::string begin(kSame, '\0');
-    std::ifstream(path, std::ios::binary).read(begin.data(), kSame);
-    is_export = text.starts_with(begin);
-  }
+  const bool is_export = exists && StartsWithOneOf(path, {text.substr(0, kSame)});
   CheckNewOutput(flag, path, a.overwrite || is_export);
   WriteOutput(path, text);
   return exists ? ", in place of the file that was there" : "";

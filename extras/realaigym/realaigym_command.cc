@@ -257,8 +257,9 @@ void ExpectUsualSize(const ScoreArguments& a, const Twin& twin) {
 
 int RunScore(const ScoreArguments& a) {
   if (a.policy.empty()) throw BadInput("realaigym score: expected a policy, got none");
-  if (!a.csv.empty())
+  if (!a.csv.empty()) {
     CheckReplaceable("--csv", a.csv, "table of score", {std::string(kBoardHeader)});
+  }
   if (IsStandardStream(a.csv) && a.as_json) {
     throw BadInput(
         "--json: expected a file for --csv, got - (standard output), where the JSON goes");

@@ -14,18 +14,14 @@
 #include "os/system.h"
 
 namespace upswing {
-namespace {
 
-/// Whether a file that can be read starts with one of these texts.
 bool StartsWithOneOf(const std::string& path, const std::vector<std::string>& beginnings) {
   std::ifstream file(path, std::ios::binary);
-  std::string start(256, '\0');  // longer than each beginning
+  std::string start(256, '\0');
   file.read(start.data(), static_cast<std::streamsize>(start.size()));
   return std::ranges::any_of(beginnings,
                              [&](const std::string& text) { return start.starts_with(text); });
 }
-
-}  // namespace
 
 std::string InputName(const std::string& path) {
   return IsStandardStream(path) ? "standard input" : path;
@@ -76,7 +72,6 @@ void CheckReplaceable(const std::string& flag, const std::string& path, std::str
                       const std::vector<std::string>& beginnings) {
   CheckWritable(flag, path);
   std::error_code error;
-  // Only regular files are read, because reading a pipe waits for its writer.
   const bool exists = !IsStandardStream(path) && std::filesystem::is_regular_file(path, error);
   if (exists && std::filesystem::file_size(path, error) > 0 && !StartsWithOneOf(path, beginnings)) {
     throw BadInput(Concat(flag, " ", path, ": expected a new file or an older ", kind,

@@ -24,6 +24,10 @@ void CheckWritable(const std::string& flag, const std::string& path);
 /// Throws as CheckWritable does, and if a file is there that the user does not `overwrite`.
 void CheckNewOutput(const std::string& flag, const std::string& path, bool overwrite);
 
+/// Whether a file that can be read starts with one of `beginnings`, which are shorter than 256
+/// bytes. Only for regular files: reading a pipe waits for its writer.
+bool StartsWithOneOf(const std::string& path, const std::vector<std::string>& beginnings);
+
 /// Throws as CheckWritable does, and if the file is neither empty nor an older output. An older
 /// output starts with one of `beginnings`; `kind` names it in the message.
 void CheckReplaceable(const std::string& flag, const std::string& path, std::string_view kind,
