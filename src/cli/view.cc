@@ -54,14 +54,27 @@ std::string KindOf(const std::string& path) {
       Concat("--record: expected FILE.mp4, FILE.gif, FILE.png or FOLDER/, got \"", path, "\""));
 }
 
+/// The first bytes of files of a kind that KindOf names.
+std::vector<std::string> BeginningsOf(const std::string& kind) {
+  if (kind == "png") return {"\x89PNG"};
+  if (kind == "gif") return {"GIF8"};
+  // An MP4 file starts with the length of its first box, whose name is ftyp (ISO/IEC 14496-12).
+  std::vector<std::string> lengths;
+  for (const char length : {'\x14', '\x18', '\x1c', '\x20', '\x24'}) {
+    lengths.push_back(std::string(3, '\0') + length + "ftyp");
+  }
+  return lengths;
+}
+
 /// The recording under construction. Throws BadInput if it cannot have this name.
 std::unique_ptr<Making> MakeRecording(const std::string& path) {
-  if (KindOf(path) == "folder") {
+  const std::string kind = KindOf(path);
+  if (kind == "folder") {
     const fs::path folder = fs::path(path).parent_path();  // without the trailing slash
     CheckFree(folder, "choose another --record");
     return std::make_unique<Making>(folder, Making::Kind::kFolder);
   }
-  CheckWritable("--record", path);
+  CheckReplaceable("--record", path, Concat(kind, " file"), BeginningsOf(kind));
   const fs::path file = fs::exists(path) ? fs::canonical(path) : fs::path(path);  // of a link
   if (fs::exists(file) && !fs::is_regular_file(file)) {
     throw BadInput(Concat("--record ", path, ": expected a regular file"));

@@ -137,7 +137,9 @@ class Recordings(ViewTest):
             "import av; file = av.open('-i %d.mp4'); film = file.streams.video[0]\n"
             "print(film.codec.name, film.width, film.height, len(list(file.decode(film))),"
             " film.average_rate)"), ["h264", "64", "48", "13", "30"])
-        self.record(FAST, "--record", "a.gif", "--seconds", 0.2, "--size", "64x48")
+        for _ in range(2):  # the second film replaces the first
+            for name in ("a.gif", "a.mp4"):
+                self.record(FAST, "--record", name, "--seconds", 0.2, "--size", "64x48")
         self.assertEqual(self.seen("from PIL import Image; film = Image.open('a.gif')\n"
                                    "print(*film.size, film.n_frames, film.info['duration'])"),
                          ["64", "48", "6", "40"])
@@ -212,6 +214,10 @@ class BadInput(ViewTest):
         (self.folder / "full").mkdir()
         self.write("full/a", "")
         self.refuse(["view", FAST, "--record", "full/"], "full", "new or empty folder")
+        for name in ("notes.png", "notes.gif", "notes.mp4"):
+            self.write(name, "notes")
+            self.refuse(["view", FAST, "--record", name], name, f"an older {name[-3:]} file")
+            self.assertEqual((self.folder / name).read_text(), "notes")
 
     def test_python_is_missing_or_lacks_packages(self):
         self.refuse(["view"], "cannot run /none", "UPSWING_PYTHON", code=1,
