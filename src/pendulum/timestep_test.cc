@@ -159,7 +159,7 @@ TEST(Timestep, StepsAreShortEnoughOverNineDecadesOfFriction) {
   Rng rng(1, "test");
   int refused = 0;
   double largest = 0;  // error of an angle, rad
-  for (int n = 0; n < 200; ++n) {
+  for (int n = 0; n < 1000; ++n) {
     Plant plant;
     plant.mass1 = Spread(0.01, 10, rng);
     plant.mass2 = Spread(0.01, 10, rng);
@@ -178,11 +178,12 @@ TEST(Timestep, StepsAreShortEnoughOverNineDecadesOfFriction) {
     const Manipulator body = ManipulatorOf(plant);
     const PendulumState start{rng.Uniform(-kPi, kPi), rng.Uniform(-kPi, kPi), 0, 0};
     const PendulumState got = After(body, start, 10, steps);
-    const PendulumState truth = After(body, start, 10, 8 * steps);
+    // The reference has steps of at most 0.1 ms, and a fourth-order error of 1/256 of the other.
+    const PendulumState truth = After(body, start, 10, std::max(200, 4 * steps));
     largest = std::max({largest, std::abs(got.q1 - truth.q1), std::abs(got.q2 - truth.q2)});
   }
-  EXPECT_LT(refused, 40);
-  EXPECT_LT(largest, 2e-4);
+  EXPECT_LT(refused, 200);
+  EXPECT_LT(largest, 2e-4) << refused;
 }
 
 TEST(Timestep, RefusalAndNonsenseCoincide) {
