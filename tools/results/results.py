@@ -485,7 +485,7 @@ def price_of_return(lab):
         return int(evaluations[-1]["step"]), report["return"]["mean"] / statistics.mean(best)
 
     rows = []
-    for agent in ("fast",) if lab.few else ("fast", "ppo"):
+    for agent in ("fast",) if lab.few else ("fast", "sac", "ppo", "d3qn"):
         first, last, price = [], [], []
         for seed in range(21, 22 if lab.few else 26):
             few = ["--steps", 20000] if lab.few else []
