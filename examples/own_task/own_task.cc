@@ -2,12 +2,14 @@
 //
 //     own_task [sac|ppo] [SETTING=VALUE …]      such as own_task sac hidden=32,32 seed=2
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
 #include <string>
 #include <string_view>
 
 #include "base/error.h"
 #include "base/options.h"
+#include "base/simd.h"
 #include "base/thread_pool.h"
 #include "pendulum_v1.h"
 #include "rl/ppo/ppo.h"
@@ -41,6 +43,8 @@ int main(int argc, char** argv) try {
   const std::string_view algorithm = argc > 1 ? argv[1] : "sac";
   if (algorithm != "sac" && algorithm != "ppo") throw BadInput("expected sac or ppo first");
   const bool is_ppo = algorithm == "ppo";
+  // The fastest vector instructions of this processor, unless others are named: avx2, portable.
+  if (const char* vectors = std::getenv("UPSWING_VECTORS")) UseSimdPath(vectors);
 
   TrainConfig train;
   train.envs = is_ppo ? 16 : 1;

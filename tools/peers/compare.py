@@ -3,6 +3,7 @@
 
   tools/peers/compare.py              five rounds, about five minutes
   tools/peers/compare.py --rounds 2
+  UPSWING_VECTORS=avx2 tools/peers/compare.py     both sides without AVX-512
 
 Both learn Pendulum-v1 on one thread. The seed is the number of the round. A ratio is the median of the
 rounds' ratios, so that load on both sides of a round cancels out. The first call installs RLtools into

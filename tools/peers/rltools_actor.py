@@ -22,6 +22,9 @@ import actors
 HERE = Path(__file__).resolve().parent
 PROGRAMS = actors.ROOT / "build/rltools"
 FLAGS = ["-std=c++17", "-O3", "-march=native", "-ffast-math"]  # same as in RLtools' Python package
+VECTORS = os.environ.get("UPSWING_VECTORS", "")  # instructions of both libraries; empty: the best
+AVX2_FLAGS = ["-mno-avx512f"]
+AVX2_CORE = {"OPENBLAS_CORETYPE": "Haswell"}
 
 
 def numbers(what):
@@ -40,7 +43,8 @@ def command(what):
                "RL_TOOLS_DISABLE_UNALIGNED_MEMORY_ALLOCATIONS": 1,
                "cblas_sgemm": "scipy_cblas_sgemm", "cblas_dgemm": "scipy_cblas_dgemm"}
     defined |= {f"PEER_{name}": value for name, value in numbers(what).items()}
-    return ["g++", *FLAGS, *(f"-D{name}={value}" for name, value in defined.items()),
+    only = AVX2_FLAGS if VECTORS == "avx2" else []
+    return ["g++", *FLAGS, *only, *(f"-D{name}={value}" for name, value in defined.items()),
             f"-isystem{headers}", HERE / f"rltools_{what}.cc", f"-L{blas}", "-lscipy_openblas",
             f"-Wl,-rpath,{blas}"]
 
@@ -67,8 +71,9 @@ def main():
     a = parser.parse_args()
     try:
         program = compiled(a.measure)
+        only = AVX2_CORE if VECTORS == "avx2" else {}
         output = actors.run([program, a.seed, actors.unclocked_steps(a.measure), actors.STEPS[a.measure]],
-                          env=os.environ | {"OPENBLAS_NUM_THREADS": "1"})
+                            env=os.environ | {"OPENBLAS_NUM_THREADS": "1"} | only)
     except actors.Failed as failed:
         sys.exit(f"rltools_actor: {failed}")
     versions = f"RLtools {version('rltools')}, OpenBLAS {version('scipy-openblas32')}"
