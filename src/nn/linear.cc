@@ -22,23 +22,26 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace upswing::HWY_NAMESPACE {
-/// y = xᵀ. Floats go through registers in blocks of 4 × 4.
+/// y = xᵀ. Floats go through registers, four columns at a time.
 void Transpose(Matrix<const Real> x, Matrix<Real> y) {
+  if ((x.cols() == 1 && x.stride() == 1) || (x.rows() == 1 && y.stride() == 1)) {
+    std::copy_n(x.data(), x.size(), y.data());  // a vector
+    return;
+  }
   int rows = 0;  // transposed in blocks so far
   int cols = 0;
 #if HWY_TARGET != HWY_SCALAR
   if constexpr (sizeof(Real) == 4) {
-    const hn::Full128<Real> d;
-    rows = x.rows() / 4 * 4;
+    const Tag d;
+    constexpr int kRows = kLanes;
+    rows = x.rows() / kRows * kRows;
     cols = x.cols() / 4 * 4;
     for (int c = 0; c < cols; c += 4) {
-      for (int r = 0; r < rows; r += 4) {
-        hn::Vec<decltype(d)> block[4];
+      for (int r = 0; r < rows; r += kRows) {
+        Vec columns[4];
+        LoadColumns(d, &x(r, c), x.stride(), columns);
         HWY_UNROLL(4)
-        for (int i = 0; i < 4; ++i) block[i] = hn::LoadU(d, &x(r + i, c));
-        TransposeBlocks(d, block);
-        HWY_UNROLL(4)
-        for (int i = 0; i < 4; ++i) hn::StoreU(block[i], d, &y(c + i, r));
+        for (int i = 0; i < 4; ++i) hn::StoreU(columns[i], d, &y(c + i, r));
       }
     }
   }
@@ -298,16 +301,24 @@ void LinearBackwardInput(Matrix<const Real> dy, Matrix<const Real> w_transposed,
 }
 
 void LinearBackwardWeight(Matrix<const Real> x, Matrix<const Real> dy, Matrix<Real> dw) {
-  if (dw.cols() == 1 && dw.stride() == 1) {
-    // Compute one column as its transpose, a row that fills registers. The sums are the same.
-    return Multiply({.M = 1,
-                     .N = dw.rows(),
-                     .K = x.rows(),
-                     .a = dy.data(),
-                     .a_m = 0,
-                     .a_k = dy.stride(),
-                     .b = x,
-                     .c = {dw.data(), 1, dw.rows()}});
+  constexpr int kFewColumns = 4, kPart = 64;
+  if (dw.cols() <= kFewColumns) {
+    // Compute a few columns as their transpose, rows that fill registers. The sums are the same.
+    Real rows[kFewColumns * kPart];
+    for (int first = 0; first < dw.rows(); first += kPart) {
+      const int count = std::min(kPart, dw.rows() - first);
+      const Matrix<Real> transposed(rows, dw.cols(), count);
+      Multiply({.M = dw.cols(),
+                .N = count,
+                .K = x.rows(),
+                .a = dy.data(),
+                .a_m = 1,
+                .a_k = dy.stride(),
+                .b = x.Cols(first, count),
+                .c = transposed});
+      Transpose(transposed, dw.Rows(first, count));
+    }
+    return;
   }
   Multiply({.M = dw.rows(),
             .N = dw.cols(),

@@ -24,11 +24,17 @@ namespace upswing::HWY_NAMESPACE {
 /// Tile shapes: kRegisters registers hold C, and others hold a row of B and a number of A. Tiles
 /// for single rows and for the rest of M have fewer rows and are wider. A multiply-add takes
 /// several cycles, so as many of them must be in flight.
-#if HWY_TARGET == HWY_AVX3 || HWY_ARCH_ARM_A64  // of 32 registers
-constexpr int kTileRows = 8;
-constexpr int kRegisters = 16;
-#else  // of 16
+#if HWY_TARGET == HWY_AVX3  // of 32 registers
 constexpr int kTileRows = 6;
+constexpr int kTallRows = 8;
+constexpr int kRegisters = 24;
+#elif HWY_ARCH_ARM_A64  // of 32
+constexpr int kTileRows = 8;
+constexpr int kTallRows = 8;
+constexpr int kRegisters = 16;
+#else                   // of 16
+constexpr int kTileRows = 6;
+constexpr int kTallRows = 6;
 constexpr int kRegisters = 12;
 #endif
 constexpr int kWidestTile = 8;  // registers per row
@@ -123,26 +129,87 @@ void MultiplyColumns(const Product& p, int m, int end, int n, int vectors) {
   for (int i = m; i < end; i += kRows) MultiplyTile<kRows, kVectors, true>(p, i, n, count);
 }
 
-/// Computes the rows of C from row m that fill tiles of kRows rows. Returns the first row after
+/// Computes the rows m to `end` of C that fill tiles of kRows rows. Returns the first row after
 /// them.
 template <int kRows>
-int MultiplyRows(const Product& p, int m) {
+int MultiplyRows(const Product& p, int m, int end) {
   // Use as few tiles as the registers allow, of about equal width: narrow tiles have too few sums
   // in flight.
   constexpr int kVectors = std::min(kRegisters / kRows, kWidestTile);
   const int lanes = static_cast<int>(hn::Lanes(Tag()));
   const int vectors = (p.N + lanes - 1) / lanes;
   const int tiles = (vectors + kVectors - 1) / kVectors;
-  const int end = m + (p.M - m) / kRows * kRows;
+  end = m + (end - m) / kRows * kRows;
   if (end > m) MultiplyColumns<kRows, kVectors>(p, m, end, 0, (vectors + tiles - 1) / tiles);
   return end;
 }
 
+// With few columns, such as the outputs of a critic, most of a row's register would be empty.
+// There, a register holds the same column of many rows. The sums are the same.
+
+#if HWY_TARGET != HWY_SCALAR
+/// Computes kGroups · kLanes rows of C from row m. C has kCols columns.
+template <int kCols, int kGroups>
+HWY_INLINE void MultiplyFewColumns(const Product& p, int m) {
+  constexpr int kRows = kLanes;
+  const Tag d;
+  Vec c[kGroups][kCols];
+  ForTile<kGroups, kCols>([&](int g, int n) HWY_ATTR {
+    c[g][n] = p.bias == nullptr ? hn::Zero(d) : hn::Set(d, p.bias[n]);
+  });
+  for (int k = 0; k < p.K; k += 4) {
+    HWY_UNROLL(2)
+    for (int g = 0; g < kGroups; ++g) {
+      Vec a[4];  // columns k to k + 3
+      LoadColumns(d, p.a + (m + g * kRows) * p.a_m + k, p.a_m, a);
+      ForTile<4, kCols>([&](int i, int n) HWY_ATTR {
+        c[g][n] = hn::MulAdd(a[i], hn::Set(d, p.b(k + i, n)), c[g][n]);
+      });
+    }
+  }
+  for (int g = 0; g < kGroups; ++g, m += kRows) {
+    if (kCols == 1 && p.c.stride() == 1) {
+      hn::StoreU(c[g][0], d, &p.c(m, 0));
+      continue;
+    }
+    HWY_ALIGN Real columns[kCols][kLanes];
+    for (int n = 0; n < kCols; ++n) hn::Store(c[g][n], d, columns[n]);
+    for (int r = 0; r < kRows; ++r) {
+      for (int n = 0; n < kCols; ++n) p.c(m + r, n) = columns[n][r];
+    }
+  }
+}
+
+/// Computes C, and returns true, if C has at most kCols columns and the product fits
+/// MultiplyFewColumns.
+template <int kCols>
+bool MultipliedFewColumns(const Product& p) {
+  if constexpr (sizeof(Real) == 4 && kCols > 0) {
+    if (p.N != kCols) return MultipliedFewColumns<kCols - 1>(p);
+    constexpr int kRows = kLanes;
+    if (p.M < kRows || p.K % 4 != 0 || p.a_k != 1 || p.relu || !p.gate.empty()) return false;
+    int m = 0;
+    for (; m + 2 * kRows <= p.M; m += 2 * kRows) MultiplyFewColumns<kCols, 2>(p, m);
+    // The last call may compute some rows again.
+    for (; m < p.M; m += kRows) MultiplyFewColumns<kCols, 1>(p, std::min(m, p.M - kRows));
+    return true;
+  }
+  return false;
+}
+#endif
+
 void Multiply(const Product& p) {
-  int m = MultiplyRows<kTileRows>(p, 0);
-  m = MultiplyRows<4>(p, m);
-  m = MultiplyRows<2>(p, m);
-  MultiplyRows<1>(p, m);
+#if HWY_TARGET != HWY_SCALAR
+  if (MultipliedFewColumns<4>(p)) return;
+#endif
+  // Tall tiles are for a C of one register per row. One of them also saves the rest of two rows.
+  const bool narrow = p.N <= static_cast<int>(kLanes);
+  const bool rest = p.M % kTileRows == kTallRows - kTileRows;
+  int m = MultiplyRows<kTallRows>(p, 0, narrow ? p.M : rest ? std::min(kTallRows, p.M) : 0);
+  m = MultiplyRows<kTileRows>(p, m, p.M);
+  m = MultiplyRows<4>(p, m, p.M);
+  m = MultiplyRows<2>(p, m, p.M);
+  MultiplyRows<1>(p, m, p.M);
 }
 
 }  // namespace upswing::HWY_NAMESPACE

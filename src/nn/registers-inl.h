@@ -63,6 +63,27 @@ HWY_INLINE void TransposeBlocks(D d, hn::Vec<D> (&rows)[4]) {
   rows[2] = hn::BitCast(d, hn::InterleaveLower(pairs, high01, high23));
   rows[3] = hn::BitCast(d, hn::InterleaveUpper(pairs, high01, high23));
 }
+
+/// Loads four floats of every fourth row: block b of the register is from row 4 b.
+template <class D>
+HWY_INLINE hn::Vec<D> LoadBlocks(D d, const hn::TFromD<D>* from, ptrdiff_t stride) {
+  if constexpr (hn::MaxLanes(d) <= 4) {
+    return hn::LoadU(d, from);
+  } else {
+    const hn::Half<D> half;
+    const hn::TFromD<D>* upper = from + static_cast<ptrdiff_t>(hn::MaxLanes(half)) * stride;
+    return hn::Combine(d, LoadBlocks(half, upper, stride), LoadBlocks(half, from, stride));
+  }
+}
+
+/// Loads four columns of as many rows as a register has numbers; each register holds one column.
+template <class D>
+HWY_INLINE void LoadColumns(D d, const hn::TFromD<D>* from, ptrdiff_t stride,
+                            hn::Vec<D> (&columns)[4]) {
+  HWY_UNROLL(4)
+  for (int i = 0; i < 4; ++i) columns[i] = LoadBlocks(d, from + i * stride, stride);
+  TransposeBlocks(d, columns);
+}
 #endif
 
 // Passes over vectors. Each pass applies `f(i, count, partial)` to whole registers. Then it applies
