@@ -121,12 +121,10 @@ Real Layer::BackwardWeights(RowRange rows, Matrix<const Real> x, const LayerActi
   const Matrix<const Real> dlinear = RowsOf(a.grad_linear, all, out_);
   const Matrix<Real> dW =
       Matrix<Real>(gradient.data() + weight_, in_, out_).Rows(rows.first, rows.count);
-  LinearBackwardWeight(x.Cols(rows.first, rows.count), dlinear, dW);
+  const std::span<Real> db = rows.first == 0 ? Vector(gradient, bias_) : std::span<Real>();
+  LinearBackwardWeight(x.Cols(rows.first, rows.count), dlinear, dW, db);
   Real squares = SquaredNorm(dW.values());
-  if (rows.first > 0) return squares;
-
-  const std::span<Real> db = Vector(gradient, bias_);
-  SumRows(dlinear, db);
+  if (db.empty()) return squares;
   squares += SquaredNorm(db);
   if (!layer_norm_) return squares;
   const Matrix<const Real> dnormal = RowsOf(a.grad_normal, all, out_);

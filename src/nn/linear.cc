@@ -300,7 +300,8 @@ void LinearBackwardInput(Matrix<const Real> dy, Matrix<const Real> w_transposed,
             .gate = gate});
 }
 
-void LinearBackwardWeight(Matrix<const Real> x, Matrix<const Real> dy, Matrix<Real> dw) {
+void LinearBackwardWeight(Matrix<const Real> x, Matrix<const Real> dy, Matrix<Real> dw,
+                          std::span<Real> db) {
   constexpr int kFewColumns = 4, kPart = 64;
   if (dw.cols() <= kFewColumns) {
     // Compute a few columns as their transpose, rows that fill registers. The sums are the same.
@@ -318,6 +319,7 @@ void LinearBackwardWeight(Matrix<const Real> x, Matrix<const Real> dy, Matrix<Re
                 .c = transposed});
       Transpose(transposed, dw.Rows(first, count));
     }
+    if (!db.empty()) SumRows(dy, db);
     return;
   }
   Multiply({.M = dw.rows(),
@@ -327,7 +329,8 @@ void LinearBackwardWeight(Matrix<const Real> x, Matrix<const Real> dy, Matrix<Re
             .a_m = 1,
             .a_k = x.stride(),
             .b = dy,
-            .c = dw});
+            .c = dw,
+            .b_sum = db});
 }
 
 void Transpose(Matrix<const Real> x, Matrix<Real> y) { HWY_DYNAMIC_DISPATCH(Transpose)(x, y); }

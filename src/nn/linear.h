@@ -25,8 +25,10 @@ void LinearForward(Matrix<const Real> x, Matrix<const Real> w, std::span<const R
 void LinearBackwardInput(Matrix<const Real> dy, Matrix<const Real> w_transposed,
                          Matrix<const Real> gate, Matrix<Real> dx);
 
-/// dW (in × out) = xᵀ (in × B) · dy (B × out).
-void LinearBackwardWeight(Matrix<const Real> x, Matrix<const Real> dy, Matrix<Real> dw);
+/// dW (in × out) = xᵀ (in × B) · dy (B × out). db (out) = the sum of the rows of dy, unless it is
+/// empty.
+void LinearBackwardWeight(Matrix<const Real> x, Matrix<const Real> dy, Matrix<Real> dw,
+                          std::span<Real> db = {});
 
 /// sum (n) of the rows of x (B × n).
 void SumRows(Matrix<const Real> x, std::span<Real> sum);

@@ -36,8 +36,9 @@ void BM_LinearForward(benchmark::State& state) {
   const LayerSize n(state);
   const AlignedVector<Real> x = Numbers(n.B, n.in), w = Numbers(n.in, n.out), b = Numbers(1, n.out);
   AlignedVector<Real> y = Numbers(n.B, n.out);
+  const bool relu = n.out > 1;  // a critic's output has none
   for (auto _ : state) {
-    LinearForward({x.data(), n.B, n.in}, {w.data(), n.in, n.out}, b, true, {y.data(), n.B, n.out});
+    LinearForward({x.data(), n.B, n.in}, {w.data(), n.in, n.out}, b, relu, {y.data(), n.B, n.out});
     benchmark::ClobberMemory();
   }
   CountOperations(state, n);
@@ -58,17 +59,20 @@ void BM_LinearBackwardInput(benchmark::State& state) {
 void BM_LinearBackwardWeight(benchmark::State& state) {
   const LayerSize n(state);
   const AlignedVector<Real> x = Numbers(n.B, n.in), dy = Numbers(n.B, n.out);
-  AlignedVector<Real> dw = Numbers(n.in, n.out);
+  AlignedVector<Real> dw = Numbers(n.in, n.out), db = Numbers(1, n.out);
   for (auto _ : state) {
-    LinearBackwardWeight({x.data(), n.B, n.in}, {dy.data(), n.B, n.out}, {dw.data(), n.in, n.out});
+    LinearBackwardWeight({x.data(), n.B, n.in}, {dy.data(), n.B, n.out}, {dw.data(), n.in, n.out},
+                         db);
     benchmark::ClobberMemory();
   }
   CountOperations(state, n);
 }
 
-/// The first layer of the agent `fast`, one of its hidden layers, and one of `d3qn`.
+/// The first layer of the agent `fast`, one of its hidden layers, the output of a critic of `ppo`,
+/// and a layer of `d3qn`.
 void LayerSizes(benchmark::internal::Benchmark* b) {
-  b->ArgNames({"B", "in", "out"})->Args({64, 8, 64})->Args({64, 64, 64})->Args({128, 256, 256});
+  b->ArgNames({"B", "in", "out"});
+  b->Args({64, 8, 64})->Args({64, 64, 64})->Args({32, 64, 1})->Args({128, 256, 256});
 }
 BENCHMARK(BM_LinearForward)->Apply(LayerSizes);
 BENCHMARK(BM_LinearBackwardInput)->Apply(LayerSizes);

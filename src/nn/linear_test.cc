@@ -104,7 +104,10 @@ void CheckLinear(int B, int in, int out) {
   LinearForward(x, w, b.row(), false, y.view);
   LinearForward(x, w, b.row(), true, y_relu.view);
   LinearBackwardInput(dy, w_transposed, gate, dx.view);
-  LinearBackwardWeight(x, dy, dw.view);
+  Table db(1, out, ""), row_sum(1, out, "");
+  LinearBackwardWeight(x, dy, dw.view, db.row());
+  SumRows(dy, row_sum.row());
+  ASSERT_TRUE(std::ranges::equal(db.row(), row_sum.row()));
   for (int i = 0; i < B; ++i) {
     for (int o = 0; o < out; ++o) {
       double sum = b.view(0, o);

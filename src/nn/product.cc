@@ -49,8 +49,9 @@ HWY_INLINE void ForTile(const F& f) {
   }
 }
 
-/// Computes the tile of C at (m, n). If kPartial, the last register of a row has `count` numbers.
-template <int kRows, int kVectors, bool kPartial>
+/// Computes the tile of C at (m, n), and the sums of the rows of B if kSum. If kPartial, the last
+/// register of a row has `count` numbers.
+template <int kRows, int kVectors, bool kPartial, bool kSum>
 HWY_INLINE void MultiplyTile(const Product& p, int m, int n, size_t count) {
   const Tag d;
   const int lanes = static_cast<int>(hn::Lanes(d));
@@ -66,6 +67,8 @@ HWY_INLINE void MultiplyTile(const Product& p, int m, int n, size_t count) {
     HWY_UNROLL(16)
     for (int i = 0; i < kRows; ++i) c[i][v] = start;
   }
+  [[maybe_unused]] Vec sum[kVectors];
+  if constexpr (kSum) std::fill_n(sum, kVectors, hn::Zero(d));
 
   const Real* a = p.a + m * p.a_m;
   const Real* b = p.b.data() + n;
@@ -78,6 +81,10 @@ HWY_INLINE void MultiplyTile(const Product& p, int m, int n, size_t count) {
       const Vec a_ik = hn::Set(d, a[i * p.a_m]);
       HWY_UNROLL(16)
       for (int v = 0; v < kVectors; ++v) c[i][v] = hn::MulAdd(a_ik, b_row[v], c[i][v]);
+    }
+    if constexpr (kSum) {
+      HWY_UNROLL(16)
+      for (int v = 0; v < kVectors; ++v) sum[v] = hn::Add(sum[v], b_row[v]);
     }
     a += p.a_k;
     b += p.b.stride();
@@ -96,51 +103,57 @@ HWY_INLINE void MultiplyTile(const Product& p, int m, int n, size_t count) {
       c[i][v] = hn::IfThenElseZero(hn::Gt(open, hn::Zero(d)), c[i][v]);
     });
   }
+  const auto store = [&](Vec value, Real* row, int v) HWY_ATTR {
+    if (kPartial && v == kVectors - 1) {
+      Store<kPartial>(value, row + v * lanes, count);
+    } else {
+      hn::StoreU(value, d, row + v * lanes);
+    }
+  };
   Real* to = &p.c(m, n);
   const ptrdiff_t stride = p.c.stride();
-  ForTile<kRows, kVectors>([&](int i, int v) HWY_ATTR {
-    if (kPartial && v == kVectors - 1) {
-      Store<kPartial>(c[i][v], to + i * stride + v * lanes, count);
-    } else {
-      hn::StoreU(c[i][v], d, to + i * stride + v * lanes);
-    }
-  });
+  ForTile<kRows, kVectors>([&](int i, int v) HWY_ATTR { store(c[i][v], to + i * stride, v); });
+  if constexpr (kSum) {
+    for (int v = 0; v < kVectors; ++v) store(sum[v], p.b_sum.data() + n, v);
+  }
 }
 
 /// Computes rows m to `end` of C from column n: tiles of kRows × `vectors` registers
 /// (`vectors` ≤ kVectors), then a narrower tile for the remaining columns.
-template <int kRows, int kVectors>
+template <int kRows, int kVectors, bool kSum>
 void MultiplyColumns(const Product& p, int m, int end, int n, int vectors) {
   if constexpr (kVectors > 1) {
-    if (vectors < kVectors) return MultiplyColumns<kRows, kVectors - 1>(p, m, end, n, vectors);
+    if (vectors < kVectors)
+      return MultiplyColumns<kRows, kVectors - 1, kSum>(p, m, end, n, vectors);
   }
   const int lanes = static_cast<int>(hn::Lanes(Tag()));
   for (; n + kVectors * lanes <= p.N; n += kVectors * lanes) {
-    for (int i = m; i < end; i += kRows) MultiplyTile<kRows, kVectors, false>(p, i, n, 0);
+    for (int i = m; i < end; i += kRows) MultiplyTile<kRows, kVectors, false, kSum>(p, i, n, 0);
   }
   const int rest = (p.N - n + lanes - 1) / lanes;
   if constexpr (kVectors > 1) {
     if (rest > 0 && rest < kVectors) {
-      return MultiplyColumns<kRows, kVectors - 1>(p, m, end, n, rest);
+      return MultiplyColumns<kRows, kVectors - 1, kSum>(p, m, end, n, rest);
     }
   }
   if (rest == 0) return;
   const size_t count = static_cast<size_t>(p.N - n - 1) % hn::Lanes(Tag()) + 1;
-  for (int i = m; i < end; i += kRows) MultiplyTile<kRows, kVectors, true>(p, i, n, count);
+  for (int i = m; i < end; i += kRows) MultiplyTile<kRows, kVectors, true, kSum>(p, i, n, count);
 }
 
-/// Computes the rows m to `end` of C that fill tiles of kRows rows. Returns the first row after
-/// them.
-template <int kRows>
+/// Computes the rows m to `end` of C that fill tiles of kRows rows, and the sums of the rows of B
+/// if kSum. Returns the first row after them.
+template <int kRows, bool kSum = false>
 int MultiplyRows(const Product& p, int m, int end) {
+  end = m + (end - m) / kRows * kRows;
+  if (end == m) return m;
   // Use as few tiles as the registers allow, of about equal width: narrow tiles have too few sums
   // in flight.
-  constexpr int kVectors = std::min(kRegisters / kRows, kWidestTile);
+  constexpr int kVectors = std::min(kRegisters / (kSum ? kRows + 1 : kRows), kWidestTile);
   const int lanes = static_cast<int>(hn::Lanes(Tag()));
   const int vectors = (p.N + lanes - 1) / lanes;
   const int tiles = (vectors + kVectors - 1) / kVectors;
-  end = m + (end - m) / kRows * kRows;
-  if (end > m) MultiplyColumns<kRows, kVectors>(p, m, end, 0, (vectors + tiles - 1) / tiles);
+  MultiplyColumns<kRows, kVectors, kSum>(p, m, end, 0, (vectors + tiles - 1) / tiles);
   return end;
 }
 
@@ -198,14 +211,23 @@ bool MultipliedFewColumns(const Product& p) {
 }
 #endif
 
+/// Computes the first rows of C and the sums of the rows of B. Returns the number of these rows.
+int MultiplyFirstRows(const Product& p) {
+  int m = MultiplyRows<4, true>(p, 0, std::min(p.M, 4));
+  if (m == 0) m = MultiplyRows<3, true>(p, 0, p.M);
+  if (m == 0) m = MultiplyRows<1, true>(p, 0, 1);
+  return m;
+}
+
 void Multiply(const Product& p) {
 #if HWY_TARGET != HWY_SCALAR
   if (MultipliedFewColumns<4>(p)) return;
 #endif
+  int m = p.b_sum.empty() ? 0 : MultiplyFirstRows(p);
   // Tall tiles are for a C of one register per row. One of them also saves the rest of two rows.
   const bool narrow = p.N <= static_cast<int>(kLanes);
-  const bool rest = p.M % kTileRows == kTallRows - kTileRows;
-  int m = MultiplyRows<kTallRows>(p, 0, narrow ? p.M : rest ? std::min(kTallRows, p.M) : 0);
+  const bool rest = (p.M - m) % kTileRows == kTallRows - kTileRows;
+  m = MultiplyRows<kTallRows>(p, m, narrow ? p.M : rest ? std::min(m + kTallRows, p.M) : m);
   m = MultiplyRows<kTileRows>(p, m, p.M);
   m = MultiplyRows<4>(p, m, p.M);
   m = MultiplyRows<2>(p, m, p.M);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 
 #include "base/matrix.h"
 #include "nn/real.h"
@@ -16,6 +17,7 @@ struct Product {
   Matrix<const Real> b;          // (K × N)
   Matrix<Real> c;                // (M × N)
   const Real* bias = nullptr;    // (N); null: no bias
+  std::span<Real> b_sum = {};    // (N) receives the sums of the rows of B; empty: not wanted
   bool relu = false;             // C = max(C, 0)
   Matrix<const Real> gate = {};  // (M × N) C = 0 where gate is not positive; empty: no gate
 };
