@@ -140,7 +140,7 @@ TEST_P(KernelTest, LinearLayersMatchTheirDefinitions) {
   for (const auto& [B, in, out] : sizes) CheckLinear(B, in, out);
 }
 
-/// Compares the rows of a batch with rows that are computed alone, to the bit.
+/// Requires each row of a batch to have the bits of a batch of only that row.
 void CheckRows(int B, int in, int out, bool relu) {
   const Input x(B, in, "x"), w(in, out, "w"), b(1, out, "b");
   Table together(B, out, ""), alone(1, out, "");
