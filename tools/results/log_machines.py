@@ -32,6 +32,7 @@ def draw_plant(rng):
     p = {"J1": i1 + m1 * c1**2 + m2 * l1**2, "J2": i2 + m2 * c2**2, "b": m2 * l1 * c2,
          "G1": G * (m1 * c1 + m2 * l1), "G2": G * m2 * c2}
     p["a"] = rng.uniform(0, 0.3) * p["J2"]
+    p["J1"] += p["a"]  # both joints have the same rotor, as in a plant file
     inertia = p["J1"] + p["J2"] + 2 * p["b"]
     time = math.sqrt(inertia / (p["G1"] + p["G2"]))
     p |= {"d1": rng.uniform(0.002, 0.05) * inertia / time, "d2": rng.uniform(0.002, 0.05) * p["J2"] / time,

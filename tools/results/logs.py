@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Judges `machine check` by logs whose truth is known: false alarms, and damage that it names.
 
-    logs.py [--machines N] [--seed S] [--good N] [--kind TITLE] [--identify] [--verbose] [--keep FOLDER]
+    logs.py [--machines N] [--seed S] [--good N] [--kind TITLE]... [--identify] [--verbose] [--keep FOLDER]
 
 Draws machines of 5 cm to 2 m with drawn shapes and friction, which move by both motors, by one or by none. Draws
 for each a logger: 50 Hz to 2 kHz, encoders of 512 to 2^20 counts, 3 to 9 printed digits, conventions that a file of
@@ -160,8 +160,8 @@ def distrust_of(program, arguments, machine, logger):
     """Why a twin that is identified from a log is not to be trusted; None if it is."""
     log = Path(arguments[0])
     plant, twin = log.with_suffix(".plant.toml"), log.with_suffix(".twin.toml")
-    limit = max(machine["limit"].max(), 1e-3 * machine["gravity"][0])
-    plant.write_text("[plant]\n" + "".join(f"{k} = {v!r}\n" for k, v in machine["links"].items())
+    limit = max(machine["limit"].max(), 1e-3 * machine["gravity"][0], 1e-3)  # N·m, the least of a plant
+    plant.write_text("[plant]\n" + "".join(f"{k} = {float(v)!r}\n" for k, v in machine["links"].items())
                      + f"torque_limit = {float(limit)!r}\n")
     if logger["torques"] == "measured":  # identify drives its model by commands
         columns = log.with_suffix(".identify.toml")
@@ -243,7 +243,7 @@ class Judge:
             if self.identifies and verdict in ("nothing", "silent"):
                 distrust = distrust_of(self.program, arguments, machine, logger)
                 if distrust:
-                    verdict = "distrusted"
+                    verdict = "refused" if distrust.startswith("refused") else "distrusted"
                     findings = [*findings, f"identify: {distrust}"]
                 elif kind:
                     verdict = "silent"
@@ -257,7 +257,8 @@ def main():
     parser.add_argument("--machines", type=int, default=100, help="for each kind of damage")
     parser.add_argument("--good", type=int, default=1000, help="undamaged logs")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--kind", help="only kinds with this text in their title")
+    parser.add_argument("--kind", action="append", default=[], 
+                        help="only kinds with this text in their title; may be given more than once")
     parser.add_argument("--program", default="./upswing --no-setup")
     parser.add_argument("--keep", type=Path, help="folder for the logs")
     parser.add_argument("--identify", action="store_true", help="fit a twin to each log in which check finds nothing")
@@ -267,7 +268,7 @@ def main():
                   arguments.identify)
     streams = [(None, arguments.good, 0)] if not arguments.kind else []
     streams += [(kind, arguments.machines, i + 1) for i, kind in enumerate(KINDS)
-                if not arguments.kind or arguments.kind in kind.title]
+                if not arguments.kind or any(text in kind.title for text in arguments.kind)]
     for kind, count, stream in streams:
         if count == 0:
             continue

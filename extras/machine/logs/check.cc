@@ -69,84 +69,6 @@ void CheckClockUnit(double usual, const Reporter& report) {
   report(Severity::kFault, text);
 }
 
-/// Whether a clock counts rows instead of measuring them: nearly all cycles are equal.
-bool IsNominal(const std::vector<Cycle>& cycles, double usual) {
-  constexpr double kEqual = 1e-3, kMost = 0.99;  // of a cycle, share of the cycles
-  const auto equal = std::ranges::count_if(
-      cycles, [&](const Cycle& cycle) { return std::abs(cycle.seconds - usual) < kEqual * usual; });
-  return static_cast<double>(equal) > kMost * static_cast<double>(cycles.size());
-}
-
-/// Steps of an angle between rows, compared with the steps around them.
-struct Step {
-  double usual;    // mean of the step before and the one after, rad
-  double changes;  // by which these two differ, rad
-  double more;     // by which the step is longer than the usual one, rad
-
-  /// Whether the step is that of `cycles` between those of one.
-  bool IsThatOf(double cycles) const {
-    constexpr double kNear = 0.35;
-    return std::abs(more / usual - (cycles - 1)) < kNear && std::abs(changes / usual) < kNear;
-  }
-};
-
-/// The steps of a joint's angle to the rows 2 to rows - 2 of all pieces, within three cycles of the
-/// usual length (s).
-std::vector<Step> StepsOf(Pieces pieces, int joint, double cycle) {
-  constexpr double kLongest = 3.5;  // cycles; after longer ones the clock tells of the loss
-  std::vector<Step> steps;
-  for (const MachineLog& log : pieces) {
-    const auto step = [&](int k) { return log.angle[k][joint] - log.angle[k - 1][joint]; };
-    for (int k = 2; k + 1 < log.rows(); ++k) {
-      if (log.time[k + 1] - log.time[k - 2] > kLongest * cycle) continue;
-      const double usual = (step(k - 1) + step(k + 1)) / 2;
-      steps.push_back({usual, step(k + 1) - step(k - 1), step(k) - usual});
-    }
-  }
-  return steps;
-}
-
-/// Reports rows that are lost without a trace in the clock: both joints then move twice as far.
-/// `cycle`: usual one, s.
-void CheckLostRows(Pieces pieces, double cycle, const Reporter& report) {
-  constexpr double kClear = 4;        // standard deviations of a step without a loss
-  constexpr double kOverEncoder = 3;  // steps of the encoder
-  constexpr double kNormal = 0.6745;  // median of the size of a normal number
-  constexpr double kSigmas = 3;
-  constexpr double kMuch = 2e-3, kFewest = 5;  // share of the clear steps, rows
-  const std::array steps{StepsOf(pieces, 0, cycle), StepsOf(pieces, 1, cycle)};
-  Joints least{};  // clear steps, rad
-  for (const int joint : {0, 1}) {
-    std::vector<double> sizes;
-    for (const Step& step : steps[joint]) sizes.push_back(std::abs(step.more));
-    if (sizes.empty()) return;
-    least[joint] = std::max(kClear * QuartilesOf(std::move(sizes)).median / kNormal,
-                            kOverEncoder * StepOfNoise(AngleNoise(pieces, joint)));
-  }
-  double clear = 0, lost = 0, missing = 0;
-  for (size_t k = 0; k < steps[0].size(); ++k) {
-    bool is_clear = false, is_double = true, is_none = true;
-    for (const int joint : {0, 1}) {
-      const Step& step = steps[joint][k];
-      if (!(std::abs(step.usual) > least[joint])) continue;
-      is_clear = true;
-      is_double = is_double && step.IsThatOf(2);
-      is_none = is_none && step.IsThatOf(0);
-    }
-    clear += is_clear;
-    lost += is_clear && is_double;
-    missing += is_clear && is_none;
-  }
-  // Accelerations make as many steps of none as of two.
-  const double least_lost = std::max(kFewest, kSigmas * std::sqrt(lost + missing));
-  if (lost - missing < std::max(least_lost, kMuch * clear)) return;
-  report(Severity::kFault,
-         fmt::format("about {} of the rows are lost, but the clock counts on: write the time "
-                     "of each row",
-                     FormatPercent(lost / (lost + clear))),
-         {}, {{"lost_share", lost / (lost + clear)}});
-}
-
 /// Cycles that are longer count as gaps, s.
 double GapOf(double usual) { return std::max(0.05, 20 * usual); }
 
@@ -267,7 +189,7 @@ void CheckClock(Pieces pieces, Findings& findings) {
   CheckClockUnit(usual, report);
   CheckStandingClock(cycles, report);
   CheckLostCycles(cycles, usual, report);
-  if (IsNominal(cycles, usual)) CheckLostRows(pieces, usual, report);
+  CheckLostRows(pieces, findings);
   CheckGaps(cycles, usual, OwnTime(pieces), report);
 }
 

@@ -92,6 +92,8 @@ struct Reporter {
 
 /// Rate, jitter, lost cycles and gaps.
 void CheckClock(Pieces pieces, Findings& findings);
+/// Rows that are lost without a trace in the clock.
+void CheckLostRows(Pieces pieces, Findings& findings);
 /// Resolution, saturation and stuck encoders.
 void CheckAngles(Pieces pieces, Findings& findings);
 /// Angles that jump: wrapped ones, wrong samples, and encoders that slip.

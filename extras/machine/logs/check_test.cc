@@ -550,6 +550,20 @@ TEST(MachineCheck, LostRowsThatTheClockShowsAreNoFault) {
   EXPECT_EQ(FaultsOf(log), "");
 }
 
+/// Damages a log: a tenth of the rows is lost, and the clock counts on.
+void LoseRows(MachineLog& log) {
+  const MachineLog all = log;
+  Rng rng(7, "lost rows");
+  log.angle.clear();
+  log.commanded.clear();
+  for (int k = 0; k < all.rows(); ++k) {
+    if (rng.Uniform() < 0.1) continue;
+    log.angle.push_back(all.angle[k]);
+    log.commanded.push_back(all.commanded[k]);
+  }
+  log.time.resize(log.angle.size());
+}
+
 TEST(MachineCheck, AFreeSwingMayHaveACoarseEncoderAndNoTorques) {
   Plant plant;
   plant.mass1 = plant.mass2 = 1.2;
@@ -709,18 +723,7 @@ TEST(MachineCheck, FaultsOfTheWiringAreNamedForEachSize) {
        [](double u, double) { return std::abs(u) < 0.9 ? 0 : u; }},
       {"a sign that turns near", [](MachineLog&) {},
        [](double u, double share) { return share > 0.5 ? -u : u; }},
-      {"rows are lost, but the clock counts on", [](MachineLog& log) {
-         const MachineLog all = log;
-         Rng rng(7, "lost rows");
-         log.angle.clear();
-         log.commanded.clear();
-         for (int k = 0; k < all.rows(); ++k) {
-           if (rng.Uniform() < 0.1) continue;
-           log.angle.push_back(all.angle[k]);
-           log.commanded.push_back(all.commanded[k]);
-         }
-         log.time.resize(log.angle.size());
-       }}};
+      {"rows are lost, but the clock counts on", LoseRows}};
   for (const double length : {0.1, 4.0}) {
     for (const Fault& fault : faults) {
       MachineLog log = Sampled(OfSize(length, fault.torque), 1, 8192);
@@ -731,6 +734,42 @@ TEST(MachineCheck, FaultsOfTheWiringAreNamedForEachSize) {
           << found;
     }
   }
+}
+
+TEST(MachineCheck, LostRowsAreNamedAtSlowRatesAndWithCoarseEncoders) {
+  const MachineLog exact = OfSize(1, AsCommanded, 30);
+  for (const MachineLog& right : {Sampled(exact, 20, 1 << 20), Sampled(exact, 2, 1024)}) {
+    EXPECT_EQ(FaultsOf(right), "");
+    MachineLog log = right;
+    LoseRows(log);
+    const std::string faults = FaultsOf(log);
+    EXPECT_NE(faults.find("rows are lost, but the clock counts on"), std::string::npos)
+        << right.rows() << " rows:\n"
+        << faults;
+  }
+  // Angles in steps that a cycle does not pass.
+  EXPECT_EQ(FaultsOf(Sampled(exact, 1, 512)), "");
+}
+
+TEST(MachineCheck, RowsThatAreThereTwiceAreNamedWhereTheClockCountsOn) {
+  const MachineLog right = Sampled(OfSize(1, AsCommanded), 4, 8192);
+  MachineLog log;
+  Rng rng(8, "double rows");
+  for (int k = 0; k < right.rows(); ++k) {
+    const int times = rng.Uniform() < 0.1 ? 2 : 1;
+    for (int i = 0; i < times; ++i) {
+      log.angle.push_back(right.angle[k]);
+      log.commanded.push_back(right.commanded[k]);
+      log.time.push_back((right.time[1] - right.time[0]) * static_cast<double>(log.time.size()));
+    }
+  }
+  const std::string faults = FaultsOf(log);
+  EXPECT_NE(faults.find("rows are there twice, but the clock counts on"), std::string::npos)
+      << faults;
+  // A sensor may be read in each third row only.
+  MachineLog held = right;
+  for (int k = 0; k < held.rows(); ++k) held.angle[k] = right.angle[k - k % 3];
+  EXPECT_EQ(FaultsOf(held).find("there twice"), std::string::npos) << FaultsOf(held);
 }
 
 TEST(MachineCheck, AFactorOfAColumnWithAbsoluteAnglesIsNamed) {

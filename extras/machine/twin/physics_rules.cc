@@ -78,16 +78,18 @@ void ValuesAreWithinRanges(Judged& of) {
   }
 }
 
-/// Without reports, the torques of the log may be measurements. The delay then lacks their age, and
-/// the lag makes up for a part of it.
+/// A lag delays the torque, too: slow torques tell the sum of both only. Without reports, the
+/// torques of the log may be measurements. The delay then lacks their age: some milliseconds, or a
+/// cycle.
 void TorquesActAfterCommands(Judged& of) {
   constexpr double kRounding = 1.1;  // of a cycle
   constexpr double kOldest = 0.005;  // measurement, s
-  const double delay = of.twin.actuator.delay, cycle = kRounding * of.twin.loop.period;
-  const double age = of.reports ? 0 : std::max(kOldest, of.twin.actuator.lag);
-  if (delay >= -cycle - age) return;
+  const Actuator& actuator = of.twin.actuator;
+  const double cycle = of.twin.loop.period;
+  const double age = of.reports ? 0 : std::max(kOldest, cycle);
+  if (actuator.delay + actuator.lag >= -kRounding * cycle - age) return;
   of.Add("delay is {:.3g} ms: torques act before the cycle of {:.3g} ms in which they are sent",
-         1e3 * delay, 1e3 * of.twin.loop.period);
+         1e3 * actuator.delay, 1e3 * cycle);
 }
 
 /// Dry friction above gravity and the motor's torque: nothing could move the joint.

@@ -75,7 +75,21 @@ TEST(OutsidePhysics, TorquesActAfterCommands) {
   };
   EXPECT_EQ(LineAfter(delay(-1)), "");
   EXPECT_EQ(LineAfter(delay(-1.2)), "delay");
-  // Measured torques may be some milliseconds old.
+  // A lag makes up for a delay: slow torques do not tell which.
+  EXPECT_EQ(LineAfter([](Twin& t) {
+              t.actuator.delay = -1.5 * t.loop.period;
+              t.actuator.lag = 0.5 * t.loop.period;
+            }),
+            "");
+  // Measured torques may be some milliseconds or a cycle old.
+  const auto of_slow_loop = [](double cycles) {
+    return [=](Twin& t) {
+      t.loop.period = 0.02;
+      t.actuator.delay = cycles * t.loop.period;
+    };
+  };
+  EXPECT_EQ(LineAfter(of_slow_loop(-2), /*reports=*/false), "");
+  EXPECT_EQ(LineAfter(of_slow_loop(-3), /*reports=*/false), "delay");
   EXPECT_EQ(LineAfter(delay(-1.2), /*reports=*/false), "");
   EXPECT_EQ(LineAfter(delay(-6.5), /*reports=*/false), "delay");
 }
