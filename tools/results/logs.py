@@ -257,7 +257,7 @@ def main():
     parser.add_argument("--machines", type=int, default=100, help="for each kind of damage")
     parser.add_argument("--good", type=int, default=1000, help="undamaged logs")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--kind", action="append", default=[], 
+    parser.add_argument("--kind", action="append", default=[],
                         help="only kinds with this text in their title; may be given more than once")
     parser.add_argument("--program", default="./upswing --no-setup")
     parser.add_argument("--keep", type=Path, help="folder for the logs")

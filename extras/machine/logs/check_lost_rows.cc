@@ -86,7 +86,7 @@ struct ClearCycles {
 
 /// Compares each cycle with the motion of no, one and two cycles, by both angles.
 ClearCycles CountClearCycles(Pieces pieces, double cycle) {
-  constexpr double kClear = 12, kBetter = 8;  // times the noise, factor of the squares
+  constexpr double kClear = 6, kBetter = 8;  // times the noise, factor of the squares
   constexpr double kFreedom = 2 * kSide - 4;  // of six angles and a cubic
   constexpr double kQuartile = 0.575;  // lower, of the chi-squared distribution with 2 degrees
   const std::array<SixBySix, 3> no_cubic{NoCubic(0), NoCubic(1), NoCubic(2)};

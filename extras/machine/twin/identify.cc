@@ -294,8 +294,9 @@ std::vector<Structure> Structures(bool has_motors, bool cogging, bool one_body) 
   add("and viscous friction", {"damping1", "damping2"});
   now.of_session = {"coulomb1", "coulomb2"};
   add("and dry friction of each session", now.of_session);
+  // The rotors of idle motors turn with the links.
+  add("and inertia of the motors", {"armature"});
   if (has_motors) {
-    add("and inertia of the motors", {"armature"});
     add("and delay and lag of the motors", {"delay", "lag", "current_delay", "current_inertia"});
   }
   now.of_session.insert(now.of_session.end(), kZeros.begin(), kZeros.end());

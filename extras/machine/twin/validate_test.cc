@@ -126,11 +126,8 @@ TEST(Identify, LeavesOutLogsOfSessionsWithASingleLog) {
   EXPECT_THROW(Identify(logs, RealPlant(), config, nullptr), Error);
 }
 
-TEST(Identify, FindsAFreeSwingWithoutMotors) {
-  Twin machine = RealPlant();
-  machine.plant.coulomb1 = machine.plant.coulomb2 = 0.002;
-  machine.plant.damping1 = machine.plant.damping2 = 0.003;
-  machine.plant.armature = 0;
+/// Free swings of a machine, whose logs have no torques.
+std::vector<MachineLog> FreeSwings(const Twin& machine) {
   std::vector<MachineLog> logs;
   for (int i = 0; i < 2; ++i) {
     logs.push_back(RunLoop(machine, {.seconds = 3, .start = {1.0 + 0.1 * i, 0.5 * i - 0.5, 0, 0}},
@@ -139,6 +136,15 @@ TEST(Identify, FindsAFreeSwingWithoutMotors) {
     logs.back().commanded.clear();
     logs.back().measured.clear();
   }
+  return logs;
+}
+
+TEST(Identify, FindsAFreeSwingWithoutMotors) {
+  Twin machine = RealPlant();
+  machine.plant.coulomb1 = machine.plant.coulomb2 = 0.002;
+  machine.plant.damping1 = machine.plant.damping2 = 0.003;
+  machine.plant.armature = 0;
+  const std::vector<MachineLog> logs = FreeSwings(machine);
   Twin first = machine;
   first.plant.inertia1 *= 1.2;
   first.plant.center1 *= 0.9;
@@ -150,6 +156,25 @@ TEST(Identify, FindsAFreeSwingWithoutMotors) {
   EXPECT_GE(found.chosen, 1);
   EXPECT_NEAR(found.fit.twin.plant.inertia1, machine.plant.inertia1, 2e-4);
   EXPECT_LT(Median(WindowErrors(logs[0], found.fit.twin, 1, false)), 2e-3);
+}
+
+/// The rotors of motors that are off turn with the links. Without them, the fit takes another
+/// length.
+TEST(Identify, FindsTheRotorsOfIdleMotorsInAFreeSwing) {
+  Twin machine = RealPlant();
+  machine.plant.coulomb1 = machine.plant.coulomb2 = 0.002;
+  machine.plant.damping1 = machine.plant.damping2 = 0.003;
+  machine.plant.armature = 0.003;
+  Twin first = machine;
+  first.plant.armature = 0;
+  first.plant.inertia1 *= 1.2;
+  first.plant.center1 *= 0.9;
+  IdentifyConfig config;
+  config.folds = 0;
+  config.fit = {.windows = {1, 1}, .iterations = 30};
+  const Identification found = Identify(FreeSwings(machine), first, config, nullptr);
+  EXPECT_NEAR(found.fit.twin.plant.armature, machine.plant.armature, 1e-4);
+  EXPECT_NEAR(found.fit.twin.plant.length1, machine.plant.length1, 0.002);
 }
 
 TEST(MeasureLoop, FindsPeriodAndQuanta) {
