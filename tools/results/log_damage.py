@@ -104,6 +104,18 @@ def nominal_clock(log, m, rng):
     log["time"] = m["cycle"] * np.arange(kept.sum())
 
 
+def changing_clock(log, m, rng):
+    middle = log["time"][int(rng.uniform(0.3, 0.7) * len(log["time"]))]
+    log["time"] = log["time"] + rng.uniform(0.05, 0.2) * np.maximum(0, log["time"] - middle)
+
+
+def rows_twice(log, m, rng):
+    times = 1 + (rng.uniform(size=len(log["time"])) < 0.1)
+    for key in ("q", "w", "u", "tau"):
+        log[key] = np.repeat(log[key], times, axis=0)
+    log["time"] = m["cycle"] * np.arange(times.sum())
+
+
 def within_one(log, m, rng):
     """Commands as shares of the limit. Only commands that reach 1 tell: a motor may give .97 N·m at most."""
     log["u"] = log["u"] / np.where(m["limit"] > 0, m["limit"], 1)
@@ -248,4 +260,6 @@ KINDS = [
     Kind("sign of an angle", ("opposite sign",), readings=turned),
     Kind("sign of a torque", ("torque {j}: .*opposite sign",), DRIVEN, readings=turned_torque),
     Kind("zero of an angle", ("another zero",), readings=zero),
+    Kind("a tenth of the rows there twice", ("rows are there twice",), readings=rows_twice, logger={"lost": 0}),
+    Kind("clock 5 to 20% faster from a moment on", ("a clock that runs",), readings=changing_clock),
 ]

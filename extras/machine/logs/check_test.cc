@@ -723,6 +723,11 @@ TEST(MachineCheck, FaultsOfTheWiringAreNamedForEachSize) {
        [](double u, double) { return std::abs(u) < 0.9 ? 0 : u; }},
       {"a sign that turns near", [](MachineLog&) {},
        [](double u, double share) { return share > 0.5 ? -u : u; }},
+      {"clock: suspect a clock that runs",
+       [](MachineLog& log) {
+         const double middle = log.time[log.rows() / 2];
+         for (double& t : log.time) t += 0.1 * std::max(0.0, t - middle);
+       }},
       {"rows are lost, but the clock counts on", LoseRows}};
   for (const double length : {0.1, 4.0}) {
     for (const Fault& fault : faults) {

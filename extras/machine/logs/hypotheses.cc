@@ -86,6 +86,7 @@ void Hypotheses::TryAll() {
   TryTimes();
   TryTorques();
   TryEncoders();
+  TryClock();
   ImproveDelays();
   Choose();
 }
@@ -164,7 +165,11 @@ void Hypotheses::ImproveDelay(Hypothesis& h) const {
 bool Hypotheses::IsSmall(const Hypothesis& h) const {
   constexpr double kSlip = 0.03, kDrift = 0.1;    // rad
   constexpr double kScale = 0.005, kLate = 0.01;  // share, natural times
+  constexpr double kRate = 0.02;                  // share
+  // Least share that slips of drawn machines leave is 0.2 r², that of drifts a third.
+  constexpr double kShownSlip = 0.03, kShownDrift = 0.01;
   if (h.changes() != 1) return false;
+  if (h.change.kind == Change::kClock) return std::abs(h.change.rate - 1) < kRate;
   if (h.angles.late != 0) return std::abs(h.angles.late) < kLate * form_.time();
   for (const double scale : h.angles.scale) {
     if (HasScale(scale)) return std::abs(std::abs(scale) - 1) < kScale;
@@ -172,10 +177,14 @@ bool Hypotheses::IsSmall(const Hypothesis& h) const {
   const bool drifts = h.change.kind == Change::kDrift;
   if (!drifts && h.change.kind != Change::kSlip) return false;
   if (h.fit.constants.size() <= weak::kColumns) return false;
-  const double least = drifts ? kDrift : kSlip;
   const Joints more = h.more_turn();
-  return std::abs(h.angles.turn[0] + more[0]) < least &&
-         std::abs(h.angles.turn[1] + more[1]) < least;
+  const double turn =
+      std::max(std::abs(h.angles.turn[0] + more[0]), std::abs(h.angles.turn[1] + more[1]));
+  if (turn < (drifts ? kDrift : kSlip)) return true;
+  // A turn of an angle by r leaves a share of the order of r² unexplained. Where the log leaves far
+  // less, the turn makes up for small errors of the constants.
+  const double shown = (drifts ? kShownDrift : kShownSlip) * turn * turn;
+  return log_.fit.left() < shown;
 }
 
 void Hypotheses::Offer(const Hypothesis& h) {

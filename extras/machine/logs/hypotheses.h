@@ -21,11 +21,13 @@ inline constexpr double kFullTurn = 2 * std::numbers::pi, kOneDegree = kFullTurn
 /// A nearer zero of an angle is an offset that identification finds, rad.
 inline constexpr double kZero = 0.3;
 
-/// Changes of an encoder or a torque during a log: more columns of the equations.
+/// Changes of an encoder, a torque or the clock during a log. Those of encoders and torques are
+/// more columns of the equations, that of the clock is a factor of columns.
 struct Change {
-  enum Kind { kNone, kSlip, kDrift, kOffset } kind = kNone;
-  double place = 0;  // of a slip in the log, from 0 to 1
+  enum Kind { kNone, kSlip, kDrift, kOffset, kClock } kind = kNone;
+  double place = 0;  // of a slip, or of a change of the clock, in the log, from 0 to 1
   int joint = 0;     // of an offset of the torque, 0 or 1
+  double rate = 1;   // of the clock after the place, over that before
 };
 
 /// A way to read a log, and how well it explains the motion.
@@ -93,6 +95,7 @@ class Hypotheses {
   void TryLimits(Joints TorqueReading::*limit, bool only_small);
   void TryEncoders();
   void TryDrift();
+  void TryClock();
   void TryPlaces(double step, const std::function<Hypothesis(double)>& with);
   /// The hypothesis with a number near `value`, improved by steps that halve down to `least`.
   /// `with`: the fitted hypothesis with a number.
@@ -112,6 +115,7 @@ class Hypotheses {
   // hypotheses_changes.cc: slips, drifts and offsets.
   Hypothesis WithChange(const Change& change) const;
   Hypothesis Turned(Hypothesis h) const;
+  static WeakEquations WithRate(const Change& change, WeakEquations equations);
   static WeakEquations Smooth(const Change& change, const WeakEquations& equations);
   /// The fit of a hypothesis to its equations.
   WeakFit FitOf(const Hypothesis& h, const WeakEquations& equations) const;

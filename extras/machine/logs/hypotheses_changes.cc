@@ -1,5 +1,6 @@
-// Changes during a log: slips and drifts of encoders, and offsets of torques. Each is columns of
-// the equations of motion, so its size is fitted with the constants.
+// Changes during a log: slips and drifts of encoders, offsets of torques, and a clock that goes on
+// at another rate. Those of encoders and torques are columns of the equations of motion, so their
+// size is fitted with the constants.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -31,17 +32,34 @@ Hypothesis Hypotheses::WithChange(const Change& change) const {
   return next;
 }
 
-/// The windows in which the motion is smooth: not those where the encoder slips.
+/// The equations with the right clock. A clock that runs fast by a factor makes all velocities less
+/// by it, and the rate of a momentum by its square.
+WeakEquations Hypotheses::WithRate(const Change& change, WeakEquations equations) {
+  using namespace weak;
+  for (int row = 0; row < equations.windows(); ++row) {
+    if (equations.when[row] < change.place) continue;
+    for (auto& A : equations.A) {
+      for (const int c : {kJ1, kJ2, kB, kA, kZeroB}) A(row, c) *= change.rate * change.rate;
+      for (const int c : {kD1, kD2}) A(row, c) *= change.rate;
+    }
+  }
+  return equations;
+}
+
+/// The windows in which the motion is smooth: not those where the encoder slips, or the clock
+/// changes.
 WeakEquations Hypotheses::Smooth(const Change& change, const WeakEquations& equations) {
   return equations.Selected([&](int row) {
     const double place = equations.when[row];
-    return change.kind != Change::kSlip || std::abs(place - change.place) > equations.length;
+    const bool is_sudden = change.kind == Change::kSlip || change.kind == Change::kClock;
+    return !is_sudden || std::abs(place - change.place) > equations.length;
   });
 }
 
 WeakFit Hypotheses::FitOf(const Hypothesis& h, const WeakEquations& equations) const {
   if (h.change.kind == Change::kNone) return FitSmallZeros(equations);
   const WeakEquations smooth = Smooth(h.change, equations);
+  if (h.change.kind == Change::kClock) return FitSmallZeros(WithRate(h.change, smooth));
   return FitSmallZeros(smooth, ColumnsOf(h.change, smooth));
 }
 

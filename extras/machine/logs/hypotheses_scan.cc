@@ -166,6 +166,33 @@ void Hypotheses::TryEncoders() {
   TryDrift();
 }
 
+/// Tries clocks that go on at another rate from a place in the log on.
+void Hypotheses::TryClock() {
+  constexpr double kStep = 0.1, kExactPlace = 0.01, kExactRate = 0.002;
+  const auto with = [&](double place, double rate) {
+    return WithChange(
+        {Change::kClock, std::clamp(place, 0.05, 0.95), 0, std::clamp(rate, 0.4, 2.5)});
+  };
+  Hypothesis best = log_;
+  for (double place = kStep; place < 0.95; place += kStep) {
+    for (const double rate : {0.5, 0.7, 0.85, 0.95, 1.05, 1.15, 1.4, 2.0}) {
+      const Hypothesis next = with(place, rate);
+      if (next.misfit() < best.misfit()) best = next;
+    }
+  }
+  if (best.change.kind != Change::kClock) return;
+  constexpr int kRounds = 2;
+  for (int round = 0; round < kRounds; ++round) {
+    const Change found = best.change;
+    best = Refined(best, found.rate, 0.1 * found.rate, kExactRate,
+                   [&](double rate) { return with(found.place, rate); });
+    const double rate = best.change.rate;
+    best = Refined(best, found.place, kStep / 2, kExactPlace,
+                   [&](double place) { return with(place, rate); });
+  }
+  Offer(best);
+}
+
 /// Tries drifts of each joint. The columns of a drift are right for small turns: those of a large
 /// drift begin near it.
 void Hypotheses::TryDrift() {

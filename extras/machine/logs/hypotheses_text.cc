@@ -29,6 +29,13 @@ Suspicion SuspicionOfChange(const Hypothesis& h, double seconds) {
             fmt::format("an offset of {} N·m",
                         FormatPlain(effect > 0 ? -x(weak::kColumns) / effect : 0, 2))};
   }
+  if (h.change.kind == Change::kClock) {
+    const double rate = h.change.rate;
+    return {Aspect::kClock, 0,
+            fmt::format("a clock that runs {} {} after {} s than before",
+                        FormatPercent(std::abs(rate - 1)), rate > 1 ? "faster" : "slower",
+                        FormatPlain(h.change.place * seconds, 3))};
+  }
   const Joints more = h.more_turn();
   const Joints slip{-h.angles.turn[0] - more[0], -h.angles.turn[1] - more[1]};
   const bool is_first = std::abs(slip[0]) > std::abs(slip[1]);
