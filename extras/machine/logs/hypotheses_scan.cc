@@ -169,13 +169,14 @@ void Hypotheses::TryEncoders() {
 /// Tries clocks that go on at another rate from a place in the log on.
 void Hypotheses::TryClock() {
   constexpr double kStep = 0.1, kExactPlace = 0.01, kExactRate = 0.002;
+  constexpr double kSlowest = 0.7, kFastest = 1.4;  // beyond, a decaying swing has other causes
   const auto with = [&](double place, double rate) {
     return WithChange(
-        {Change::kClock, std::clamp(place, 0.05, 0.95), 0, std::clamp(rate, 0.4, 2.5)});
+        {Change::kClock, std::clamp(place, 0.05, 0.95), 0, std::clamp(rate, kSlowest, kFastest)});
   };
   Hypothesis best = log_;
   for (double place = kStep; place < 0.95; place += kStep) {
-    for (const double rate : {0.5, 0.7, 0.85, 0.95, 1.05, 1.15, 1.4, 2.0}) {
+    for (const double rate : {0.75, 0.85, 0.95, 1.05, 1.15, 1.3}) {
       const Hypothesis next = with(place, rate);
       if (next.misfit() < best.misfit()) best = next;
     }
@@ -190,7 +191,8 @@ void Hypotheses::TryClock() {
     best = Refined(best, found.place, kStep / 2, kExactPlace,
                    [&](double place) { return with(place, rate); });
   }
-  Offer(best);
+  const double rate = best.change.rate;
+  if (rate > kSlowest && rate < kFastest) Offer(best);
 }
 
 /// Tries drifts of each joint. The columns of a drift are right for small turns: those of a large
