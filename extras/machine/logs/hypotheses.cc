@@ -160,6 +160,16 @@ void Hypotheses::ImproveDelay(Hypothesis& h) const {
   h = Refined(found, found.delay, (usual[1] - usual[0]) / 2, 0.002 * form_.time(), with);
 }
 
+/// The joints whose motors a hypothesis suspects of another torque than the log's.
+Driven ChangedMotors(const Hypothesis& h) {
+  Driven changed{};
+  for (const int j : {0, 1}) {
+    changed[j] = h.torques.largest[j] > 0 || h.torques.dead_band[j] > 0 ||
+                 (h.change.kind == Change::kOffset && h.change.joint == j);
+  }
+  return changed;
+}
+
 /// Whether a hypothesis changes too little to matter. Errors of the model produce such changes,
 /// too.
 bool Hypotheses::IsSmall(const Hypothesis& h) const {
@@ -170,6 +180,10 @@ bool Hypotheses::IsSmall(const Hypothesis& h) const {
   constexpr double kShownSlip = 0.03, kShownDrift = 0.01;
   if (h.changes() != 1) return false;
   if (h.change.kind == Change::kClock) return std::abs(h.change.rate - 1) < kRate;
+  // Smaller shares are those of rounded torques and of the motion between rows.
+  constexpr double kShownTorque = 2e-5;
+  const Driven changed = ChangedMotors(h);
+  if (changed[0] || changed[1]) return log_.fit.left() < kShownTorque;
   if (h.angles.late != 0) return std::abs(h.angles.late) < kLate * form_.time();
   for (const double scale : h.angles.scale) {
     if (HasScale(scale)) return std::abs(std::abs(scale) - 1) < kScale;
@@ -207,16 +221,6 @@ void Hypotheses::ImproveDelays() {
     Hypothesis& h = offered_[i];
     if (!h.is_late) ImproveDelay(h);
   }
-}
-
-/// The joints whose motors a hypothesis suspects of another torque than the log's.
-Driven ChangedMotors(const Hypothesis& h) {
-  Driven changed{};
-  for (const int j : {0, 1}) {
-    changed[j] = h.torques.largest[j] > 0 || h.torques.dead_band[j] > 0 ||
-                 (h.change.kind == Change::kOffset && h.change.joint == j);
-  }
-  return changed;
 }
 
 /// Whether a single suspicion of motors makes their equations much better, and no other equation
