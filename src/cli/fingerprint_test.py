@@ -42,8 +42,8 @@ PINNED = {
     "d3qn-small": ("2f6600da35efe387", "d1fda76c026377aa"),
     "dqn": ("6bcd20162a53fa5c", "afdf0617efc61356"),
     "fast": ("5c552012c6c7e04d", "bb94d076dfb0edaa"),
-    "ppo": ("ce863a10c4591c03", "e5b498575c33f759"),
-    "ppo --actions levels": ("77bb72242c932e1e", "6b077dd7033e297d"),
+    "ppo": ("f4a66f7f19712921", "45e46c02cd4e79a9"),
+    "ppo --actions levels": ("0f04dadc6180894f", "a091e2c662ae3fda"),
     "sac-fast": ("a4146b06501a81f3", "38ff96e1e4d4147c"),
 }
 
