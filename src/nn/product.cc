@@ -196,11 +196,12 @@ HWY_INLINE void MultiplyFewColumns(const Product& p, int m) {
 /// Computes C, and returns true, if C has at most kCols columns and the product fits
 /// MultiplyFewColumns.
 template <int kCols>
-bool MultipliedFewColumns(const Product& p) {
+bool TryFewColumns(const Product& p) {
   if constexpr (sizeof(Real) == 4 && kCols > 0) {
-    if (p.N != kCols) return MultipliedFewColumns<kCols - 1>(p);
+    if (p.N != kCols) return TryFewColumns<kCols - 1>(p);
     constexpr int kRows = kLanes;
-    if (p.M < kRows || p.K % 4 != 0 || p.a_k != 1 || p.relu || !p.gate.empty()) return false;
+    if (p.M < kRows || p.K % 4 != 0 || p.a_k != 1) return false;
+    if (p.relu || !p.gate.empty() || !p.b_sum.empty()) return false;
     int m = 0;
     for (; m + 2 * kRows <= p.M; m += 2 * kRows) MultiplyFewColumns<kCols, 2>(p, m);
     // The last call may compute some rows again.
@@ -221,13 +222,17 @@ int MultiplyFirstRows(const Product& p) {
 
 void Multiply(const Product& p) {
 #if HWY_TARGET != HWY_SCALAR
-  if (MultipliedFewColumns<4>(p)) return;
+  if (TryFewColumns<4>(p)) return;
 #endif
   int m = p.b_sum.empty() ? 0 : MultiplyFirstRows(p);
-  // Tall tiles are for a C of one register per row. One of them also saves the rest of two rows.
+  // Tall tiles are for a C of one register per row. One tall tile also covers a remainder of two
+  // rows.
   const bool narrow = p.N <= static_cast<int>(kLanes);
-  const bool rest = (p.M - m) % kTileRows == kTallRows - kTileRows;
-  m = MultiplyRows<kTallRows>(p, m, narrow ? p.M : rest ? std::min(m + kTallRows, p.M) : m);
+  const bool leaves_two_rows = (p.M - m) % kTileRows == kTallRows - kTileRows;
+  m = MultiplyRows<kTallRows>(p, m,
+                              narrow            ? p.M
+                              : leaves_two_rows ? std::min(m + kTallRows, p.M)
+                                                : m);
   m = MultiplyRows<kTileRows>(p, m, p.M);
   m = MultiplyRows<4>(p, m, p.M);
   m = MultiplyRows<2>(p, m, p.M);
