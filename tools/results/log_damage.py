@@ -260,6 +260,6 @@ KINDS = [
     Kind("sign of an angle", ("opposite sign",), readings=turned),
     Kind("sign of a torque", ("torque {j}: .*opposite sign",), DRIVEN, readings=turned_torque),
     Kind("zero of an angle", ("another zero",), readings=zero),
-    Kind("a tenth of the rows there twice", ("rows are there twice",), readings=rows_twice, logger={"lost": 0}),
+    Kind("a tenth of the rows duplicated", ("rows are duplicates",), readings=rows_twice, logger={"lost": 0}),
     Kind("clock 5 to 20% faster from a moment on", ("a clock that runs",), readings=changing_clock),
 ]

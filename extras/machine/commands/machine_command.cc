@@ -331,6 +331,16 @@ void WarnIfWorseThanStart(std::span<const ErrorRow> rows) {
                   FormatNumber(last->seconds), last->errors[0].value, last->errors[1].value));
 }
 
+/// Warns of what a motion without torques cannot show.
+void WarnOfFreeSwings(std::span<const MachineLog> logs, const Plant& plant) {
+  if (HasCommands(logs)) return;
+  const double center2 = plant.center2 > 0 ? plant.center2 : plant.length2 / 2;
+  SayError(
+      Concat("warning: logs without torques show ratios of masses, not masses: center2 stays at ",
+             fmt::format("{:.4g}", center2),
+             " m; if that is wrong, center1, inertias and friction are, too"));
+}
+
 /// Whether the command is adapt, whose first guess is a prior twin; else identify, with --plant.
 bool Adapts(const MachineArguments& a) { return a.plant.empty() && !a.twin.empty(); }
 
@@ -400,6 +410,7 @@ void FitTwin(const MachineArguments& a, bool& is_doubtful) {
   AddOthers(others, a, logs, predictors);
   const auto rows = CompareErrors(logs, predictors, kHorizons, &pool);
   WarnIfWorseThanStart(rows);
+  WarnOfFreeSwings(logs, found.fit.twin.plant);
   if (!distrust.empty()) SayDistrust(a.out, distrust);
   is_doubtful = !distrust.empty();
   if (!a.as_json) PrintIdentification(found, logs.size());

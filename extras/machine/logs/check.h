@@ -92,7 +92,7 @@ struct Reporter {
 
 /// Rate, jitter, lost cycles and gaps.
 void CheckClock(Pieces pieces, Findings& findings);
-/// Rows that are lost without a trace in the clock.
+/// Rows that are lost or duplicated without a trace in the clock.
 void CheckLostRows(Pieces pieces, Findings& findings);
 /// Resolution, saturation and stuck encoders.
 void CheckAngles(Pieces pieces, Findings& findings);

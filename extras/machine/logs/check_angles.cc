@@ -104,6 +104,34 @@ void CheckRepeats(Pieces pieces, int joint, double own_time, const Reporter& rep
   }
 }
 
+/// Warns of a sensor that is slower than the log: each of its readings stands in several rows.
+void CheckSlowSensor(Pieces pieces, int joint, const Reporter& report) {
+  constexpr double kFast = 4;     // steps of the encoder between two readings
+  constexpr double kMost = 0.8;   // share of the readings
+  constexpr size_t kFewest = 20;  // readings
+  const double least = kFast * StepOf(pieces, joint);
+  std::vector<double> rows;  // of each reading that a clear motion ends
+  for (const MachineLog& log : pieces) {
+    int first = 0;  // row of the reading; 0: the piece may begin in the middle of one
+    for (int k = 1; k < log.rows(); ++k) {
+      const double way = std::abs(log.angle[k][joint] - log.angle[k - 1][joint]);
+      if (way == 0) continue;
+      if (first > 0 && way > least) rows.push_back(k - first);
+      first = k;
+    }
+  }
+  if (rows.size() < kFewest) return;
+  const double usual = QuartilesOf(rows).median;
+  const auto equal = static_cast<double>(std::ranges::count(rows, usual));
+  if (usual < 2 || equal < kMost * static_cast<double>(rows.size())) return;
+  report(
+      Severity::kWarning,
+      fmt::format("each reading stands in {:.0f} rows, so the sensor is slower than the log: keep "
+                  "the first row of each",
+                  usual),
+      {}, {{"rows_per_reading", usual}});
+}
+
 }  // namespace
 
 double SpeedTo(const MachineLog& log, int joint, int k, double cycle) {
@@ -157,6 +185,7 @@ void CheckAngles(Pieces pieces, Findings& findings) {
                          2 * std::numbers::pi / *quantum),
              {}, {{"quantum", *quantum}});
     }
+    CheckSlowSensor(pieces, joint, report);
     CheckRepeats(pieces, joint, own_time, report);
   }
 }

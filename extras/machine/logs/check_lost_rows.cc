@@ -35,7 +35,7 @@ using SixBySix = Eigen::Matrix<double, 2 * kSide, 2 * kSide>;
 /// Whether a joint moves in six rows, but keeps its angle in a cycle that is not the middle one:
 /// the rows come faster than the readings of its sensor, or than the steps of its encoder. Such
 /// cycles differ without a loss.
-bool IsHeld(const MachineLog& log, int joint, int first) {
+bool RepeatsReadings(const MachineLog& log, int joint, int first) {
   constexpr double kSame = 1e-12;  // rad
   bool holds = false, moves = false;
   for (int i = 0; i + 1 < 2 * kSide; ++i) {
@@ -51,7 +51,7 @@ bool IsHeld(const MachineLog& log, int joint, int first) {
 bool IsComparable(const MachineLog& log, int first, double cycle) {
   const double seconds = log.time[first + 2 * kSide - 1] - log.time[first];
   if (seconds > (2 * kSide - 0.5) * cycle) return false;
-  return !IsHeld(log, 0, first) && !IsHeld(log, 1, first);
+  return !RepeatsReadings(log, 0, first) && !RepeatsReadings(log, 1, first);
 }
 
 /// The projection onto what no cubic in time explains of six angles, if the cycle in their middle
@@ -69,24 +69,24 @@ SixBySix NoCubic(double cycles) {
   return Q * Q.transpose();
 }
 
-/// Counts of cycles in which the motion is clear of the noise. Torques that jump make as many with
-/// the motion of two as without.
+/// Counts of cycles in which the motion is clear of the noise. A jump of the torque looks like a
+/// lost row as often as like a duplicate.
 struct ClearCycles {
-  double single = 0;  // with the motion of one
-  double twice = 0;   // with that of two: a row is lost
-  double none = 0;    // without motion: a row is there twice
+  double normal = 0;      // with the motion of one cycle
+  double lost = 0;        // with the motion of two: a row is lost
+  double duplicated = 0;  // without motion: a row is there twice
 
   /// The share of `rows` in all, if they are more than the others can be.
   double ShareOf(double rows, double others) const {
     constexpr double kFewest = 5, kSigmas = 3, kMuch = 5e-3;  // rows, deviations, share
-    const double least = std::max({kFewest, kSigmas * std::sqrt(rows + others), kMuch * single});
-    return rows - others >= least ? rows / (rows + single) : 0;
+    const double least = std::max({kFewest, kSigmas * std::sqrt(rows + others), kMuch * normal});
+    return rows - others >= least ? rows / (rows + normal) : 0;
   }
 };
 
 /// Compares each cycle with the motion of no, one and two cycles, by both angles.
 ClearCycles CountClearCycles(Pieces pieces, double cycle) {
-  constexpr double kClear = 6, kBetter = 8;  // times the noise, factor of the squares
+  constexpr double kClear = 6, kBetter = 8;   // times the noise, factor of the squares
   constexpr double kFreedom = 2 * kSide - 4;  // of six angles and a cubic
   constexpr double kQuartile = 0.575;  // lower, of the chi-squared distribution with 2 degrees
   const std::array<SixBySix, 3> no_cubic{NoCubic(0), NoCubic(1), NoCubic(2)};
@@ -119,10 +119,10 @@ ClearCycles CountClearCycles(Pieces pieces, double cycle) {
   ClearCycles counts;
   const double clear = 2 * kFreedom * kClear;
   for (const auto& [none, single, twice] : squares) {
-    counts.single += twice > clear && twice > kBetter * single;
+    counts.normal += twice > clear && twice > kBetter * single;
     if (single < clear) continue;
-    counts.twice += single > kBetter * twice && twice < none;
-    counts.none += single > kBetter * none && none < twice;
+    counts.lost += single > kBetter * twice && twice < none;
+    counts.duplicated += single > kBetter * none && none < twice;
   }
   return counts;
 }
@@ -138,12 +138,12 @@ void CheckLostRows(Pieces pieces, Findings& findings) {
            {{name, share}});
   };
   const ClearCycles counts = CountClearCycles(pieces, cycle);
-  const double twice = counts.ShareOf(counts.none, counts.twice);
-  if (twice > 0) {
-    add(twice, "there twice, but the clock counts on: write each row once", "double_share");
+  const double duplicated = counts.ShareOf(counts.duplicated, counts.lost);
+  if (duplicated > 0) {
+    add(duplicated, "duplicates, but the clock counts on: write each row once", "double_share");
     return;
   }
-  const double lost = counts.ShareOf(counts.twice, counts.none);
+  const double lost = counts.ShareOf(counts.lost, counts.duplicated);
   if (lost == 0) return;
   add(lost, "lost, but the clock counts on: write the time of each row", "lost_share");
 }

@@ -769,12 +769,24 @@ TEST(MachineCheck, RowsThatAreThereTwiceAreNamedWhereTheClockCountsOn) {
     }
   }
   const std::string faults = FaultsOf(log);
-  EXPECT_NE(faults.find("rows are there twice, but the clock counts on"), std::string::npos)
+  EXPECT_NE(faults.find("rows are duplicates, but the clock counts on"), std::string::npos)
       << faults;
-  // A sensor may be read in each third row only.
+}
+
+TEST(MachineCheck, ASensorThatIsSlowerThanTheLogIsAWarning) {
+  const MachineLog right = Sampled(OfSize(1, AsCommanded), 4, 8192);
   MachineLog held = right;
   for (int k = 0; k < held.rows(); ++k) held.angle[k] = right.angle[k - k % 3];
-  EXPECT_EQ(FaultsOf(held).find("there twice"), std::string::npos) << FaultsOf(held);
+  const auto warnings = [](const MachineLog& log) {
+    return std::ranges::count_if(CheckAll(log), [](const Finding& f) {
+      return f.severity == Severity::kWarning &&
+             f.text.starts_with("each reading stands in 3 rows");
+    });
+  };
+  EXPECT_EQ(warnings(held), 2);
+  EXPECT_EQ(warnings(right), 0);
+  EXPECT_EQ(FaultsOf(held).find("duplicates"), std::string::npos) << FaultsOf(held);
+  EXPECT_EQ(FaultsOf(held).find("duplicates"), std::string::npos) << FaultsOf(held);
 }
 
 TEST(MachineCheck, AFactorOfAColumnWithAbsoluteAnglesIsNamed) {

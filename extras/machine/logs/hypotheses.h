@@ -21,8 +21,8 @@ inline constexpr double kFullTurn = 2 * std::numbers::pi, kOneDegree = kFullTurn
 /// A nearer zero of an angle is an offset that identification finds, rad.
 inline constexpr double kZero = 0.3;
 
-/// Changes of an encoder, a torque or the clock during a log. Those of encoders and torques are
-/// more columns of the equations, that of the clock is a factor of columns.
+/// Changes of an encoder, a torque or the clock during a log. A change of an encoder or a torque
+/// adds a column to the equations. A change of the clock multiplies columns.
 struct Change {
   enum Kind { kNone, kSlip, kDrift, kOffset, kClock } kind = kNone;
   double place = 0;  // of a slip, or of a change of the clock, in the log, from 0 to 1

@@ -1,6 +1,6 @@
-// Changes during a log: slips and drifts of encoders, offsets of torques, and a clock that goes on
-// at another rate. Those of encoders and torques are columns of the equations of motion, so their
-// size is fitted with the constants.
+// Changes during a log: slips and drifts of encoders, offsets of torques, and a clock that changes
+// its rate. A slip, a drift or an offset is a column of the equations of motion, so its size is
+// fitted with the constants.
 #include <algorithm>
 #include <array>
 #include <cmath>

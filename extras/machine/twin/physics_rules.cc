@@ -88,8 +88,10 @@ void TorquesActAfterCommands(Judged& of) {
   const double cycle = of.twin.loop.period;
   const double age = of.reports ? 0 : std::max(kOldest, cycle);
   if (actuator.delay + actuator.lag >= -kRounding * cycle - age) return;
-  of.Add("delay is {:.3g} ms: torques act before the cycle of {:.3g} ms in which they are sent",
-         1e3 * actuator.delay, 1e3 * cycle);
+  of.Add(
+      "delay is {:.3g} ms, {:.3g} ms with the lag: torques act before the cycle of {:.3g} ms in "
+      "which they are sent",
+      1e3 * actuator.delay, 1e3 * (actuator.delay + actuator.lag), 1e3 * cycle);
 }
 
 /// Dry friction above gravity and the motor's torque: nothing could move the joint.
