@@ -229,10 +229,13 @@ void Multiply(const Product& p) {
   // rows.
   const bool narrow = p.N <= static_cast<int>(kLanes);
   const bool leaves_two_rows = (p.M - m) % kTileRows == kTallRows - kTileRows;
-  m = MultiplyRows<kTallRows>(p, m,
-                              narrow            ? p.M
-                              : leaves_two_rows ? std::min(m + kTallRows, p.M)
-                                                : m);
+  int tall_end = m;
+  if (narrow) {
+    tall_end = p.M;
+  } else if (leaves_two_rows) {
+    tall_end = std::min(m + kTallRows, p.M);
+  }
+  m = MultiplyRows<kTallRows>(p, m, tall_end);
   m = MultiplyRows<kTileRows>(p, m, p.M);
   m = MultiplyRows<4>(p, m, p.M);
   m = MultiplyRows<2>(p, m, p.M);
