@@ -282,6 +282,7 @@ void PrintTwin(const Identification& found) {
                  Decimals(option.number()), option.unit);
     }
   }
+  fmt::print("  Masses and torques are taken as given: a motion shows only their ratios.\n");
   if (twin.sessions.empty()) return;
   fmt::print("\nsession                        ");
   for (const Session::Value& v : twin.sessions.front().values) fmt::print(" {:>8}", v.setting);
