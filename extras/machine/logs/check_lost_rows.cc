@@ -9,6 +9,7 @@
 
 #include "base/format.h"
 #include "base/sample.h"
+#include "base/text.h"
 #include "extras/machine/logs/check.h"
 
 namespace upswing::machine {
