@@ -92,8 +92,8 @@ struct Reporter {
 
 /// Rate, jitter, lost cycles and gaps.
 void CheckClock(Pieces pieces, Findings& findings);
-/// Rows that are lost or duplicated without a trace in the clock.
-void CheckLostRows(Pieces pieces, Findings& findings);
+/// Rows that are lost or duplicated without a trace in a clock that counts cycles of `cycle` s.
+void CheckLostRows(Pieces pieces, double cycle, const Reporter& report);
 /// Resolution, saturation and stuck encoders.
 void CheckAngles(Pieces pieces, Findings& findings);
 /// Angles that jump: wrapped ones, wrong samples, and encoders that slip.

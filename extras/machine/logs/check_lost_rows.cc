@@ -15,19 +15,6 @@
 namespace upswing::machine {
 namespace {
 
-/// Whether a clock counts rows instead of measuring them: nearly all cycles are equal.
-bool IsNominal(Pieces pieces, double usual) {
-  constexpr double kEqual = 1e-3, kMost = 0.99;  // of a cycle, share of the cycles
-  double cycles = 0, equal = 0;
-  for (const MachineLog& log : pieces) {
-    for (int k = 1; k < log.rows(); ++k) {
-      ++cycles;
-      equal += std::abs(log.time[k] - log.time[k - 1] - usual) < kEqual * usual;
-    }
-  }
-  return equal > kMost * cycles;
-}
-
 /// Rows before, and after, a cycle that is compared with a smooth motion.
 constexpr int kSide = 3;
 using SixAngles = Eigen::Matrix<double, 2 * kSide, 1>;
@@ -53,6 +40,31 @@ bool IsComparable(const MachineLog& log, int first, double cycle) {
   const double seconds = log.time[first + 2 * kSide - 1] - log.time[first];
   if (seconds > (2 * kSide - 0.5) * cycle) return false;
   return !RepeatsReadings(log, 0, first) && !RepeatsReadings(log, 1, first);
+}
+
+/// Six adjacent rows of a piece.
+struct SixRows {
+  const MachineLog* piece;
+  int first;
+
+  /// The angles of a joint over the first one, rad.
+  SixAngles Angles(int joint) const {
+    SixAngles angles;
+    for (int i = 0; i < 2 * kSide; ++i) angles(i) = piece->angle[first + i][joint];
+    angles.array() -= angles(0);
+    return angles;
+  }
+};
+
+/// All comparable stretches of six rows.
+std::vector<SixRows> ComparableRows(Pieces pieces, double cycle) {
+  std::vector<SixRows> stretches;
+  for (const MachineLog& log : pieces) {
+    for (int first = 0; first + 2 * kSide <= log.rows(); ++first) {
+      if (IsComparable(log, first, cycle)) stretches.push_back({&log, first});
+    }
+  }
+  return stretches;
 }
 
 /// The projection onto what no cubic in time explains of six angles, if the cycle in their middle
@@ -91,28 +103,24 @@ ClearCycles CountClearCycles(Pieces pieces, double cycle) {
   constexpr double kFreedom = 2 * kSide - 4;  // of six angles and a cubic
   constexpr double kQuartile = 0.575;  // lower, of the chi-squared distribution with 2 degrees
   const std::array<SixBySix, 3> no_cubic{NoCubic(0), NoCubic(1), NoCubic(2)};
-  std::vector<std::array<double, 3>> squares;  // of both joints, in variances of their noise
+  const std::vector<SixRows> stretches = ComparableRows(pieces, cycle);
+  if (stretches.empty()) return {};
+  // Of both joints, in variances of their noise.
+  std::vector<std::array<double, 3>> squares(stretches.size());
   for (const int joint : {0, 1}) {
     std::vector<std::array<double, 3>> own;  // rad²
-    for (const MachineLog& log : pieces) {
-      for (int first = 0; first + 2 * kSide <= log.rows(); ++first) {
-        if (!IsComparable(log, first, cycle)) continue;
-        SixAngles angles;
-        for (int i = 0; i < 2 * kSide; ++i) angles(i) = log.angle[first + i][joint];
-        angles.array() -= angles(0);
-        std::array<double, 3>& left = own.emplace_back();
-        for (int n : {0, 1, 2}) left[n] = angles.dot(no_cubic[n] * angles);
-      }
-    }
-    if (own.empty()) return {};
     std::vector<double> usual;
-    for (const auto& left : own) usual.push_back(left[1]);
+    for (const SixRows& stretch : stretches) {
+      const SixAngles angles = stretch.Angles(joint);
+      std::array<double, 3>& left = own.emplace_back();
+      for (int n : {0, 1, 2}) left[n] = angles.dot(no_cubic[n] * angles);
+      usual.push_back(left[1]);
+    }
     // Many stretches may have a loss, so the quartile tells of the noise. It is 0 if most angles
     // are the same.
     const double step = StepOf(pieces, joint);
     const double variance = std::max(QuartilesOf(usual).low / kQuartile, step * step / 12);
     if (!(variance > 0)) continue;  // the joint never moves
-    squares.resize(own.size());
     for (size_t k = 0; k < own.size(); ++k) {
       for (int n : {0, 1, 2}) squares[k][n] += own[k][n] / variance;
     }
@@ -130,10 +138,7 @@ ClearCycles CountClearCycles(Pieces pieces, double cycle) {
 
 }  // namespace
 
-void CheckLostRows(Pieces pieces, Findings& findings) {
-  const double cycle = UsualCycle(pieces);
-  if (!(cycle > 0) || !IsNominal(pieces, cycle)) return;
-  const Reporter report{findings, Aspect::kClock};
+void CheckLostRows(Pieces pieces, double cycle, const Reporter& report) {
   const auto add = [&](double share, const char* what, const char* name) {
     report(Severity::kFault, Concat("about ", FormatPercent(share), " of the rows are ", what), {},
            {{name, share}});

@@ -786,7 +786,6 @@ TEST(MachineCheck, ASensorThatIsSlowerThanTheLogIsAWarning) {
   EXPECT_EQ(warnings(held), 2);
   EXPECT_EQ(warnings(right), 0);
   EXPECT_EQ(FaultsOf(held).find("duplicates"), std::string::npos) << FaultsOf(held);
-  EXPECT_EQ(FaultsOf(held).find("duplicates"), std::string::npos) << FaultsOf(held);
 }
 
 TEST(MachineCheck, AFactorOfAColumnWithAbsoluteAnglesIsNamed) {

@@ -176,7 +176,7 @@ bool Hypotheses::IsSmall(const Hypothesis& h) const {
   constexpr double kSlip = 0.03, kDrift = 0.1;    // rad
   constexpr double kScale = 0.005, kLate = 0.01;  // share, natural times
   constexpr double kRate = 0.02;                  // share
-  // Least share that slips of drawn machines leave is 0.2 r², that of drifts a third.
+  // A seventh of the least share that slips of drawn machines leave, 0.2 r², and drifts, 0.07 r².
   constexpr double kShownSlip = 0.03, kShownDrift = 0.01;
   if (h.changes() != 1) return false;
   if (h.change.kind == Change::kClock) return std::abs(h.change.rate - 1) < kRate;

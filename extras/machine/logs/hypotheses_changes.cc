@@ -32,8 +32,8 @@ Hypothesis Hypotheses::WithChange(const Change& change) const {
   return next;
 }
 
-/// The equations with the right clock. A clock that runs fast by a factor makes all velocities less
-/// by it, and the rate of a momentum by its square.
+/// The equations with the right clock. A clock that runs fast by a factor divides all velocities by
+/// it, and the rates of momenta by its square.
 WeakEquations Hypotheses::WithRate(const Change& change, WeakEquations equations) {
   using namespace weak;
   for (int row = 0; row < equations.windows(); ++row) {
