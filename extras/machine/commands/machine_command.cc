@@ -335,7 +335,7 @@ void WarnIfWorseThanStart(std::span<const ErrorRow> rows) {
 /// Warns of what a motion without torques cannot show.
 void WarnOfFreeSwings(std::span<const MachineLog> logs, const Plant& plant) {
   if (HasCommands(logs)) return;
-  const double center2 = plant.center2 > 0 ? plant.center2 : plant.length2 / 2;
+  const double center2 = LinksOf(plant)[1].c;
   SayError(
       Concat("warning: logs without torques show ratios of masses, not masses: center2 stays at ",
              fmt::format("{:.4g}", center2),
