@@ -73,7 +73,7 @@ async function withProcessor(page, work) {
 
 /// A training in the page: steps, seconds from the click to the end, and frames per second.
 async function learn(page, seed) {
-  await page.click('#learn-options > summary');
+  await page.evaluate(() => (document.getElementById('learn-options').open = true));
   await page.fill('#learn-seed', String(seed));
   await page.uncheck('#learn-slow');
   return page.evaluate(
