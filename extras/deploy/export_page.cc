@@ -168,7 +168,8 @@ PageAgent ReadAgent(const std::string& path, const std::string& given_id, int64_
                           "joint 2"));
   }
   if (loaded.plant.rotor_inertia != 0 || loaded.plant.has_dry_friction() ||
-      loaded.plant.has_own_links() || loaded.plant.armature != kArmature) {
+      loaded.plant.has_own_links() || loaded.plant.armature != kArmature ||
+      loaded.plant.own_armature1() != kArmature) {
     throw BadInput(
         Concat(where, ": expected a policy for a plant as in the page, without rotors ",
                "and dry friction, with links that are solid capsules and an armature of ",

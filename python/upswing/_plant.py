@@ -572,25 +572,18 @@ def parameters_of(p: Pendulum, motor: Motor, coulomb: Any, length2: float | None
     if not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_DAMPER:
         damping = model.dof_damping
     a1, a2 = model.dof_armature
-    extra = a1 - a2
-    if p.I1 + extra <= 0:
-        raise Refusal(f"a plant file cannot hold an armature of {a1:g} kg·m² at {p.shown[0]} and {a2:g} kg·m² at "
-                      f"{p.shown[1]}")
     bodies = [", ".join(printable(model.body(b).name) or f"body {b}" for b in p._bodies(link)[:8])
               for link in p.links]
-    inertia1 = "about the centre of mass and the axis"
-    if extra:
-        inertia1 += f", plus {extra:g} by which the armature of {p.shown[0]} is larger than that of {p.shown[1]}"
     friction = "frictionloss · 2/π, see above" if any(coulomb) else "no frictionloss"
     reach = (p.l2, p.l2_from) if length2 is None else (length2, "--length2")
-    return [
+    parameters = [
         Parameter("mass1", p.m1, "kg", bodies[0]),
         Parameter("mass2", p.m2, "kg", bodies[1]),
         Parameter("length1", p.l1, "m", f"{p.shown[0]} to {p.shown[1]}"),
         Parameter("length2", reach[0], "m", f"{p.shown[1]} to {reach[1]}" if length2 is None else reach[1]),
         Parameter("center1", max(p.c1, ZERO), "m", f"{p.shown[0]} to the centre of mass"),
         Parameter("center2", max(p.c2, ZERO), "m", f"{p.shown[1]} to the centre of mass"),
-        Parameter("inertia1", p.I1 + extra, "kg·m²", inertia1),
+        Parameter("inertia1", p.I1, "kg·m²", "about the centre of mass and the axis"),
         Parameter("inertia2", p.I2, "kg·m²", "about the centre of mass and the axis"),
         Parameter("armature", a2, "kg·m²", f"armature of {p.shown[1]}"),
         Parameter("damping1", damping[0], "N·m·s/rad", f"damping of {p.shown[0]}"),
@@ -603,6 +596,9 @@ def parameters_of(p: Pendulum, motor: Motor, coulomb: Any, length2: float | None
         Parameter("rotor_inertia", 0, "kg·m²", "in the armature"),
         Parameter("gear_ratio", 1, "", "no effect without a rotor inertia"),
     ]
+    if a1 != a2:
+        parameters.append(Parameter("armature1", a1, "kg·m²", f"armature of {p.shown[0]}"))
+    return parameters
 
 
 def move(p: Pendulum, motor: Motor, physics: Physics, starts: Any, torques: Any, coulomb: Any) -> Any:

@@ -50,8 +50,8 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
             or "closed-form"), episode_seconds, random_start_share, random_start_drive,
             start_noise, memory, any_pose; the plant
             (mass1, …, torque_limit, actuated_joint, rotor_inertia, gear_ratio, coulomb1, coulomb2,
-            center1, center2, inertia1, inertia2, armature); plant, a plant file (TOML with a
-            table [plant]) or a shipped plant such as "realaigym", which these change;
+            center1, center2, inertia1, inertia2, armature, armature1); plant, a plant file (TOML
+            with a table [plant]) or a shipped plant such as "realaigym", which these change;
             sensor_noise, delay, encoder_counts, velocity_window, velocity_filter, sensor_latency,
             late_share, late; randomize, …; the reward weights
 

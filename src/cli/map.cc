@@ -116,7 +116,7 @@ void AddMap(CommandLine& line) {
       "  plant    mass1, mass2, length1, length2, damping1, damping2 (mass, length,\n"
       "           damping for both links), gravity, torque_limit, actuated_joint (1 or 2),\n"
       "           rotor_inertia, gear_ratio, coulomb1, coulomb2, center1, center2,\n"
-      "           inertia1, inertia2, armature\n"
+      "           inertia1, inertia2, armature, armature1\n"
       "  sensors  sensor_noise [rad, rad/s], sensor_latency [s], encoder_counts,\n"
       "           velocity_window [s], velocity_filter [s]\n"
       "  motor    delay [s], in control periods of 0.02 s, one cell each\n"

@@ -24,12 +24,13 @@ Plant ModeratePlant(Rng& rng) {
   return p;
 }
 
-/// A ModeratePlant with own centres of mass, inertias and armature.
+/// A ModeratePlant with own centres of mass, inertias and armatures.
 Plant ModerateMachine(Rng& rng) {
   Plant p = ModeratePlant(rng);
   for (double* x : {&p.center1, &p.center2}) *x = rng.Uniform(0.1, 3);
   for (double* x : {&p.inertia1, &p.inertia2}) *x = rng.Uniform(0.001, 2);
   p.armature = rng.Uniform(0, 0.1);
+  p.armature1 = rng.Uniform(0, 0.1);
   return p;
 }
 
@@ -77,7 +78,8 @@ struct ClosedForm {
     const double g1 = (p.mass1 * c1 + p.mass2 * p.length1) * p.gravity * std::sin(q1) + g2;
     const double f1 = tau + h * (2 * w1 * w2 + w2 * w2) - g1 - p.damping1 * w1;
     const double f2 = -h * w1 * w1 - g2 - p.damping2 * w2;
-    const double M11 = m11 + p.armature, M22 = m22 + p.armature;
+    const double armature1 = p.armature1 < 0 ? p.armature : p.armature1;
+    const double M11 = m11 + armature1, M22 = m22 + p.armature;
     const double det = M11 * M22 - m12 * m12;
     return {w1, w2, (M22 * f1 - m12 * f2) / det, (M11 * f2 - m12 * f1) / det};
   }

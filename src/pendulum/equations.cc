@@ -34,7 +34,7 @@ Manipulator ManipulatorOf(const Plant& plant) {
   const auto& [m2, l2, c2, I2] = links[1];
   const double g = plant.gravity;
   Manipulator m;
-  m.J1 = I1 + m1 * c1 * c1 + m2 * l1 * l1 + plant.armature;
+  m.J1 = I1 + m1 * c1 * c1 + m2 * l1 * l1 + plant.own_armature1();
   m.J2 = I2 + m2 * c2 * c2;
   m.b = m2 * l1 * c2;
   m.a = plant.armature;

@@ -34,7 +34,8 @@ double Lagrangian(const Plant& p, const std::array<double, 4>& x) {
   const double lower = link(p.mass2, I2, w12, l1 * w1 * std::cos(q1) + c2 * w12 * std::cos(q12),
                             l1 * w1 * std::sin(q1) + c2 * w12 * std::sin(q12),
                             -l1 * std::cos(q1) - c2 * std::cos(q12));
-  const double armatures = p.armature / 2 * (w1 * w1 + w2 * w2);
+  const double armature1 = p.armature1 < 0 ? p.armature : p.armature1;
+  const double armatures = (armature1 * w1 * w1 + p.armature * w2 * w2) / 2;
   const double rotors =
       p.rotor_inertia / 2 * (square(p.gear_ratio * w1) + square(w1 - p.gear_ratio * w2));
   return upper + lower + armatures + rotors;
@@ -77,6 +78,7 @@ TEST(Manipulator, SatisfiesLagrangesEquations) {
     p.gear_ratio = rng.Uniform(0, 10);
     p.coulomb1 = rng.Uniform(0, 0.5);
     p.coulomb2 = rng.Uniform(0, 0.5);
+    if (trial % 4 == 3) p.armature1 = rng.Uniform(0, 0.1);
     if (trial % 2 == 1) {
       for (double* x : {&p.center1, &p.center2}) *x = rng.Uniform(0.1, 2);
       for (double* x : {&p.inertia1, &p.inertia2}) *x = rng.Uniform(0.01, 1);
@@ -117,7 +119,7 @@ TEST(Manipulator, TheTaskHasTheTrueEnergyOfOwnLinks) {
   Rng rng(5, "plants");
   for (int trial = 0; trial < 100; ++trial) {
     Plant p = RandomMachine(rng);
-    p.armature = p.rotor_inertia = 0;
+    p.armature = p.armature1 = p.rotor_inertia = 0;
     if (!p.has_own_links()) p.inertia1 = 0.05;
     const Manipulator m = ManipulatorOf(p);
     const PendulumState s{rng.Uniform(-3, 3), rng.Uniform(-3, 3), rng.Uniform(-5, 5),

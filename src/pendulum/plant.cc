@@ -14,7 +14,7 @@ constexpr Range kCenter{0, 100}, kInertia{0, 1e9}, kJoint{1, 2}, kRotor{0, 1e3};
 
 }  // namespace
 
-const std::array<PlantParameter, 18> kPlantParameters{{
+const std::array<PlantParameter, 19> kPlantParameters{{
     {"mass1", &Plant::mass1, kMass, "kg", "mass of link 1"},
     {"mass2", &Plant::mass2, kMass, "kg", "mass of link 2"},
     {"length1", &Plant::length1, kLength, "m", "length of link 1"},
@@ -41,6 +41,8 @@ const std::array<PlantParameter, 18> kPlantParameters{{
     {"inertia2", &Plant::inertia2, kInertia, "kg·m²",
      "moment of inertia of link 2 about its centre of mass; 0: that of a solid capsule"},
     {"armature", &Plant::armature, {0, 1e6}, "kg·m²", "armature of each joint, without rotors"},
+    {"armature1", &Plant::armature1, {-1, 1e6}, "kg·m²",
+     "armature of joint 1 if it differs, without rotors; -1: armature"},
 }};
 
 void Plant::Describe(Options& o) {
@@ -91,7 +93,7 @@ std::array<Link, 2> LinksOf(const Plant& p) {
 }
 
 double Armature1(const Plant& plant) {
-  return plant.armature + plant.gear_ratio * plant.gear_ratio * plant.rotor_inertia;
+  return plant.own_armature1() + plant.gear_ratio * plant.gear_ratio * plant.rotor_inertia;
 }
 
 PendulumState StateBetween(const PendulumState& a, const PendulumState& b, double h, double share) {

@@ -40,11 +40,14 @@ struct Plant {
   double center1 = 0, center2 = 0;        // joint to centre of mass, m; 0: the capsule's middle
   double inertia1 = 0, inertia2 = 0;      // about the centre of mass, kg·m²; 0: the capsule's
   double armature = kArmature;            // of both joints, kg·m²
+  double armature1 = -1;                  // of joint 1, kg·m²; below 0: armature
 
   /// Declares each setting in `options`: name, range, unit, help.
   void Describe(Options& options);
 
   bool has_dry_friction() const { return coulomb1 != 0 || coulomb2 != 0; }
+  /// Armature of joint 1 without rotors, kg·m².
+  double own_armature1() const { return armature1 < 0 ? armature : armature1; }
   /// Whether a link has its own centre of mass or inertia, instead of a capsule's.
   bool has_own_links() const {
     return center1 != 0 || center2 != 0 || inertia1 != 0 || inertia2 != 0;
@@ -59,7 +62,7 @@ struct PlantParameter {
   const char *unit, *help;
 };
 /// All parameters. Files of every version have the first kMainParameters.
-extern const std::array<PlantParameter, 18> kPlantParameters;
+extern const std::array<PlantParameter, 19> kPlantParameters;
 inline constexpr size_t kMainParameters = 8;
 
 /// Name and value of each parameter of the plant, as files have them. Only the first

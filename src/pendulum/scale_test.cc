@@ -18,8 +18,8 @@ Plant ImageOf(const Plant& plant, double length, double mass, double time) {
   for (double Plant::*l : {&Plant::length1, &Plant::length2, &Plant::center1, &Plant::center2}) {
     image.*l *= length;
   }
-  for (double Plant::*I :
-       {&Plant::inertia1, &Plant::inertia2, &Plant::armature, &Plant::rotor_inertia}) {
+  for (double Plant::*I : {&Plant::inertia1, &Plant::inertia2, &Plant::armature, &Plant::armature1,
+                           &Plant::rotor_inertia}) {
     image.*I *= inertia;
   }
   for (double Plant::*d : {&Plant::damping1, &Plant::damping2}) image.*d *= torque * time;

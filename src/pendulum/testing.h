@@ -50,7 +50,7 @@ inline Plant RandomPlant(Rng& rng) {
 }
 
 /// A RandomPlant with rotors and dry friction, both small enough for the physics' steps. It has its
-/// own armature, and often own centres of mass and inertias.
+/// own armatures, and often own centres of mass and inertias.
 inline Plant RandomMachine(Rng& rng) {
   Plant plant = RandomPlant(rng);
   const double inertia = plant.mass2 * plant.length2 * plant.length2;  // about link 2's
@@ -59,6 +59,7 @@ inline Plant RandomMachine(Rng& rng) {
   plant.coulomb1 = rng.Uniform(0, 0.2) * inertia;
   plant.coulomb2 = rng.Uniform(0, 0.2) * inertia;
   plant.armature = rng.Uniform(0.001, 0.05);
+  if (rng.Uniform() < 0.5) plant.armature1 = rng.Uniform(0, 0.05);
   const auto often = [&](double value) { return rng.Uniform() < 0.7 ? value : 0; };
   plant.center1 = often(rng.Uniform(0.2, 1.2) * plant.length1);
   plant.center2 = often(rng.Uniform(0.2, 1.2) * plant.length2);
