@@ -71,6 +71,12 @@ class Results(unittest.TestCase):
         best, guess = map(float, re.search(r"episode 0: (\S+) from sac, best guess (\S+);", text).groups())
         self.assertGreater(best, guess)
 
+    @unittest.skipUnless(importlib.util.find_spec("casadi"), "needs CasADi")
+    def test_a_solver_finds_the_motions_of_mpc(self):
+        text = self.succeed("tools/peers/mpc.py", "--episodes", 1)
+        self.assertIn("upright at the end: True", text)
+        self.assertLess(float(re.search(r"largest (\S+)%", text)[1]), 2)
+
     def test_upright_modes(self):
         self.assertIn("|delta|", self.succeed("tools/results/upright_modes.py", "fast", "--episodes", 4,
                                               "--physics", "closed-form"))
