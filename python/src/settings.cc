@@ -42,7 +42,7 @@ nb::dict Describe(const Option& option) {
     if (!number || !std::isfinite(value)) return nb::none();
     return integer ? nb::cast(static_cast<int64_t>(value)) : nb::cast(value);
   };
-  d["low"] = end(option.range.low);
+  d["low"] = end(option.lowest());
   d["high"] = end(option.range.high);
   d["step"] = option.step > 0 ? nb::cast(option.step) : nb::none();
   d["choices"] = option.name == "agent" ? NamesOfAgents() : option.choices;

@@ -68,9 +68,10 @@ std::string RangeInWords(Range range, double step) {
 
 /// A help line `HELP [UNIT] (VALUES; DEFAULT)` without its empty parts.
 std::string HelpLine(const Option& option, const std::string& fallback) {
-  std::vector<std::string> notes{
-      option.choices.empty() ? RangeInWords(option.range, option.step) : Join(option.choices, ", "),
-      fallback.empty() ? "" : "default " + fallback};
+  std::string values =
+      option.choices.empty() ? RangeInWords(option.range, option.step) : Join(option.choices, ", ");
+  if (option.sentinel) values += Concat(" or ", FormatNumber(*option.sentinel));
+  std::vector<std::string> notes{std::move(values), fallback.empty() ? "" : "default " + fallback};
   std::erase(notes, "");
   return Concat(option.help, option.unit.empty() ? "" : Concat(" [", option.unit, "]"),
                 notes.empty() ? "" : Concat(" (", Join(notes, "; "), ")"));
@@ -168,7 +169,10 @@ std::string Option::expected() const {
       Overloaded{
           [](const bool*) -> std::string { return "true or false"; },
           [&](const int64_t*) { return Concat("an integer", RangeText(range, unit)); },
-          [&](const double*) { return NumberText(range, step, unit); },
+          [&](const double*) {
+            const std::string text = NumberText(range, step, unit);
+            return sentinel ? Concat(text, " or ", FormatNumber(*sentinel)) : text;
+          },
           [&](const std::string*) -> std::string {
             return choices.empty() ? "a text" : Concat("one of ", Join(choices, ", "));
           },
@@ -195,10 +199,9 @@ void Option::Set(std::string_view text, const std::string& where) const {
                      },
                      [&](double* value) {
                        const auto parsed = ParseNumber(text);
-                       if (!parsed || !std::isfinite(*parsed) || !range.Contains(*parsed) ||
-                           !IsMultiple(*parsed, step)) {
-                         return false;
-                       }
+                       if (!parsed || !std::isfinite(*parsed)) return false;
+                       const bool in_range = range.Contains(*parsed) && IsMultiple(*parsed, step);
+                       if (!in_range && parsed != sentinel) return false;
                        *value = *parsed;
                        return true;
                      },

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <concepts>
 #include <cstdint>
 #include <functional>
@@ -49,6 +50,7 @@ struct Option {
   Decides decides = Decides::kTraining;
   std::vector<std::string> choices = {};  // allowed values of a text; empty: any
   double step = 0;                        // a number must be a multiple of it; 0: any number
+  std::optional<double> sentinel = {};    // a number outside the range that is allowed, too
   bool wraps = false;                     // a text whose line breaks are blanks
   std::string usual = {};  // default in words, shown in place of the value; may be empty
   // Keeps the copy alive that `target` points into; null: the caller keeps the struct.
@@ -56,6 +58,8 @@ struct Option {
 
   /// Whether another value makes a different run, which cannot resume this one.
   bool identity() const { return decides == Decides::kTraining || decides == Decides::kSeed; }
+  /// The smallest allowed number.
+  double lowest() const { return sentinel ? std::min(range.low, *sentinel) : range.low; }
   /// The flag, such as `--eval-every`.
   std::string flag() const { return FlagOf(name); }
   /// The value of a setting that is a double.

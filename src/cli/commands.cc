@@ -20,6 +20,7 @@ Options PlantFlags(Plant& plant) {
     Option& flag = flags.Add(std::get<double*>(option.target), option.name, option.range,
                              option.unit, option.help);
     flag.step = option.step;
+    flag.sentinel = option.sentinel;
     flag.usual = "as in the plant";
   }
   for (const auto& alias : settings.aliases()) flags.Alias(alias.name, alias.members, alias.help);

@@ -41,7 +41,10 @@ const std::array<PlantParameter, 19> kPlantParameters{{
     {"inertia2", &Plant::inertia2, kInertia, "kg·m²",
      "moment of inertia of link 2 about its centre of mass; 0: that of a solid capsule"},
     {"armature", &Plant::armature, {0, 1e6}, "kg·m²", "armature of each joint, without rotors"},
-    {"armature1", &Plant::armature1, {-1, 1e6}, "kg·m²",
+    {"armature1",
+     &Plant::armature1,
+     {0, 1e6},
+     "kg·m²",
      "armature of joint 1 if it differs, without rotors; -1: armature"},
 }};
 
@@ -50,6 +53,7 @@ void Plant::Describe(Options& o) {
   for (const auto& [name, value, range, unit, help] : kPlantParameters) {
     Option& option = o.Add(&(this->*value), name, range, unit, help);
     if (value == &Plant::actuated_joint) option.step = 1;
+    if (value == &Plant::armature1) option.sentinel = -1;
   }
   o.Alias("mass", {"mass1", "mass2"});
   o.Alias("length", {"length1", "length2"});

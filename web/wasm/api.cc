@@ -461,7 +461,7 @@ UPSWING_EXPORT(agent_settings) int AgentSettings(const char* agent, size_t size)
     for (const Option& option : options.all()) {
       settings.push_back({{"name", option.name},
                           {"value", option.plain_text()},
-                          {"low", option.range.low},
+                          {"low", option.lowest()},
                           {"high", option.range.high},
                           {"whole", std::holds_alternative<int64_t*>(option.target)},
                           {"unit", option.unit},
