@@ -147,7 +147,8 @@ void PrintConditions(const EvalReport& report) {
 }
 
 /// Prints what a reader of the figures has to know of the policy, whose `name` begins each line.
-void PrintNotes(const EvalReport& report, const std::string& name) {
+/// `first` is the first of the compared reports, whose conditions stand above.
+void PrintNotes(const EvalReport& report, const EvalReport& first, const std::string& name) {
   const int64_t episodes = report.figures.episodes;
   if (report.known_plant) {
     fmt::print(
@@ -157,6 +158,9 @@ void PrintNotes(const EvalReport& report, const std::string& name) {
   if (report.figures.diverged > 0) {
     fmt::print("  note           {}the simulation diverged in {} of {}, which count as failures\n",
                name, report.figures.diverged, Counted(episodes, "episode"));
+  }
+  if (report.env.control_period != first.env.control_period) {
+    fmt::print("  decisions      {}every {:.4g} s\n", name, report.env.control_period);
   }
   if (report.only_balances) {
     fmt::print(
@@ -176,7 +180,7 @@ void PrintEvalTable(const EvalReport& report) {
   const Evaluation& e = report.figures;
   fmt::print("{}\n", Printable(report.policy));
   PrintConditions(report);
-  PrintNotes(report, "");
+  PrintNotes(report, report, "");
   fmt::print("  success        {} of {} = {:.1f}%   (95% interval {:.1f}% to {:.1f}%)\n",
              e.successes, e.episodes, 100 * e.success_rate(), 100 * e.success_interval.low,
              100 * e.success_interval.high);
@@ -215,7 +219,8 @@ void PrintEvalComparison(std::span<const EvalReport> reports,
 
   fmt::print("The same {} for all\n", Counted(first.figures.episodes, "episode"));
   PrintConditions(first);
-  for (const EvalReport& report : reports) PrintNotes(report, Printable(report.title) + ": ");
+  for (const EvalReport& report : reports)
+    PrintNotes(report, first, Printable(report.title) + ": ");
   fmt::print("\n");
   const size_t figures = 1 + reports.size();  // rows before those of the differences
   for (const ComparisonRow& row : std::span(rows).first(figures)) PrintRow(row, widths);

@@ -45,7 +45,7 @@ class EvalTest(ProgramTest):
     def test_json_has_all_fields(self):
         result = self.evaluate()
         self.assertEqual(list(result), [
-            "policy", "seed", "physics", "task", "plant", "unknown_plant", "disturbance",
+            "policy", "seed", "physics", "task", "plant", "control_period", "unknown_plant", "disturbance",
             "randomize", "episodes", "successes", "diverged", "success_rate",
             "success_interval_95", "settled", "steady_tilt_degrees", "reward_terms", "return",
             "swing_up_seconds", "settling_seconds", "energy_used", "peak_torque", "rms_torque",

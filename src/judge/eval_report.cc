@@ -157,6 +157,7 @@ ordered_json ReportJson(const EvalReport& report) {
   j["physics"] = report.env.engine->name;
   j["task"] = kDoublePendulum;
   for (const auto& [name, value] : PlantValues(report.env.plant(0))) j["plant"][name] = value;
+  j["control_period"] = report.env.control_period;
   j["unknown_plant"] = report.env.assumed_plant.has_value();
   if (report.known_plant) j["known_plant"] = NumDesigned(report);
   const TrialConditions conditions{report.env.disturbance(0), report.env.randomization};

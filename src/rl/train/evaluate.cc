@@ -61,8 +61,11 @@ class EpisodeTally {
     discount_ *= gamma_;
     const size_t terms = episode_.terms.size();
     if (torques_.steps() <= return_steps_) {
-      episode_.reward_sum += result.reward[i];
-      for (size_t j = 0; j < terms; ++j) episode_.terms[j] += result.reward_terms[i * terms + j];
+      const double weight = rule_.return_weight;
+      episode_.reward_sum += weight * result.reward[i];
+      for (size_t j = 0; j < terms; ++j) {
+        episode_.terms[j] += weight * result.reward_terms[i * terms + j];
+      }
     }
     // The last step may time out, because the rule's time is over then.
     terminated_ = result.terminated[i] != 0;

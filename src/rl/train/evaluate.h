@@ -29,7 +29,7 @@ struct EvaluationEpisode {
   // Start of the stretch at the goal, and of the settled stretch, with which the episode ends.
   // Nothing if the episode does not end at the goal, or not settled.
   std::optional<double> swing_up_seconds, settling_seconds;
-  double reward_sum = 0;  // undiscounted return over the first return_seconds
+  double reward_sum = 0;  // return: Σ return_weight · r over the first return_seconds
   double work = 0;        // Σ |mechanical work of the motor|, J
   // Torques over the episode, in the unit of the task's actions, such as N·m.
   double peak_torque = 0;       // largest |torque|
@@ -43,7 +43,7 @@ struct EvaluationEpisode {
   /// Σ γᵏ r over the whole episode. `value` estimates it if the policy was trained with the same
   /// reward.
   double discounted_return = 0;
-  std::vector<double> terms;  // (K) sum of each reward term over the first return_seconds
+  std::vector<double> terms;  // (K) the return's part of each reward term
   std::vector<double> tilt;   // (bodies) mean lean over the last kSteadyTiltSeconds, rad
 };
 
