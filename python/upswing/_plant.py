@@ -646,7 +646,9 @@ def remarks_of(p: Pendulum, motor: Motor, left_out: list[str], length2_given: bo
     remarks = []
     for k, sign in enumerate((1, p.sign2)):
         zero = f"{p.zero[k]:.9g} {'+' if sign > 0 else '-'} " if abs(p.zero[k]) > 1e-12 or sign < 0 else ""
-        remarks.append(f"q{k + 1} = {zero}{p.shown[k]} [rad], the angle from the file's zero pose")
+        ref = p.model.qpos0[k]
+        qpos = f", where its qpos is {ref:.9g}" if ref else ""
+        remarks.append(f"q{k + 1} = {zero}{p.shown[k]} [rad], the angle from the file's zero pose{qpos}")
     if motor.turns:
         remarks.append(f"A positive control is a {'positive' if motor.turns > 0 else 'negative'} torque here.")
     if p.l2_from == NO_END and not length2_given:
@@ -676,13 +678,14 @@ def remove_features(p: Pendulum, leave_out: set[str], convert_friction: bool) ->
     return removed
 
 
-def steps_for(plant: str) -> int:
-    """The Runge-Kutta steps in a control period that the program takes for a plant (TOML)."""
+def periods_for(plant: str) -> tuple[float, int]:
+    """The control period [s] that the program takes for a plant (TOML), and the Runge-Kutta steps in it."""
     print(json.dumps({"toml": plant}), flush=True)
     answer = sys.stdin.readline()
     if not answer:  # the program refuses the plant
         sys.exit(1)
-    return int(answer)
+    period, steps = answer.split()
+    return float(period), int(steps)
 
 
 def read_plant(job: dict[str, Any]) -> dict[str, Any]:
@@ -698,8 +701,8 @@ def read_plant(job: dict[str, Any]) -> dict[str, Any]:
     motor = Motor(p, document, job)
     remarks = remarks_of(p, motor, left_out + motor.left_out, job["length2"] is not None)
     parameters = parameters_of(p, motor, coulomb, job["length2"])
-    steps = steps_for(toml_of(p, parameters, []))
-    physics = Physics(timestep=job["control_period"] / steps, steps=steps, friction_slope=job["friction_slope"])
+    period, steps = periods_for(toml_of(p, parameters, []))
+    physics = Physics(timestep=period / steps, steps=steps, friction_slope=job["friction_slope"])
     starts, torques = random_motions(p, motor)
     angles = move(p, motor, physics, starts, torques, coulomb)
     if converted:

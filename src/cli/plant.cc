@@ -65,8 +65,13 @@ nlohmann::json JobOf(const PlantArguments& a) {
           {"torque_limit", given(a.torque_limit)},
           {"length2", given(a.length2)},
           {"convert_friction", a.convert_friction},
-          {"control_period", kControlPeriod},
           {"friction_slope", kFrictionSlope}};
+}
+
+/// The control period of the compared motions (s): that of the built-in plant in the plant's
+/// natural time. In a longer time, rounding grows beyond every tolerance.
+double PeriodFor(const Plant& plant) {
+  return std::clamp(kControlPeriod * ScaleOf(plant).time, kShortestPeriod, kLongestPeriod);
 }
 
 /// Largest difference (rad) between the motions of a plant in this program and those of the model.
@@ -80,7 +85,8 @@ double LargestDifference(const Plant& plant, const nlohmann::json& read) {
     config.env.plants = {plant};
     config.start = PendulumState{start[0], start[1], start[2], start[3]};
     config.schedule = read["torques"][n].get<std::vector<double>>();
-    config.seconds = static_cast<double>(config.schedule.size()) * kControlPeriod;
+    config.env.control_period = PeriodFor(plant);
+    config.seconds = static_cast<double>(config.schedule.size()) * config.env.control_period;
     const Rollout rollout = RunRollout(config);
     for (size_t k = 0; k < angles.size(); ++k) {
       const PendulumState& s = rollout.rows.at(k).state;
@@ -123,7 +129,8 @@ int RunPlant(const PlantArguments& a) {
   const std::string where = Concat("plant of ", Printable(a.model));
   const Plant plant = ParsePlantFile((*model)["toml"].get<std::string>(), where).plant;
   // Both have to take the steps that the plant needs.
-  reader.Answer(Concat(PhysicsStepsFor(plant, kControlPeriod, where)));
+  const double period = PeriodFor(plant);
+  reader.Answer(Concat(FormatNumber(period), " ", PhysicsStepsFor(plant, period, where)));
   const std::optional<nlohmann::json> read = NextOf(reader, code);
   if (!read) return code;
   if (code = reader.Finish(); code != 0) return code;
@@ -131,8 +138,10 @@ int RunPlant(const PlantArguments& a) {
 
   const size_t motions = (*read)["starts"].size();
   const double difference = LargestDifference(plant, *read);
-  const std::string check = fmt::format(
-      "{} random motions of 1 s differ from MuJoCo's by at most {:.2g} rad", motions, difference);
+  const double seconds = static_cast<double>((*read)["torques"].at(0).size()) * period;
+  const std::string check =
+      fmt::format("{} random motions of {:.2g} s differ from MuJoCo's by at most {:.2g} rad",
+                  motions, seconds, difference);
   if (!(difference <= kTolerance)) {
     throw Failure(Concat(Printable(a.model), ": ", check, ", expected at most ", kTolerance,
                          ": the model has something that a plant file cannot hold"));
@@ -172,9 +181,9 @@ void AddPlantCommand(CommandLine& line) {
                           "joint whose motor the plant has; the other joint's motor is left out");
   motor.step = 1;
   motor.usual = "the only motor";
-  own.Add(&a.torque_limit, "torque_limit", {0.001, 1000}, "N·m", "largest torque of the motor")
+  own.Add(&a.torque_limit, "torque_limit", {1e-3, 1e6}, "N·m", "largest torque of the motor")
       .usual = "as in the file";
-  own.Add(&a.length2, "length2", {0.01, 10}, "m",
+  own.Add(&a.length2, "length2", {0.01, 100}, "m",
           "length of link 2, which only the task's heights need")
       .usual = "the distance to its farthest site, else to the end of its farthest shape";
   line.Arguments(own);
