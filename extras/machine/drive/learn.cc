@@ -126,7 +126,7 @@ class LearningSession {
 
   bool IsTrusted() const { return twin_.distrust.empty(); }
 
-  double TimeLeft() const { return c_.motion - result_.motion; }
+  double TimeLeft() const { return c_.MostMotion() - result_.motion; }
   /// Longest time of an excitation, s.
   double TimeOf(const ExcitationPlan& e) const {
     return e.seconds * scale().time + c_.limits.brake_seconds;

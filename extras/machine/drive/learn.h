@@ -20,7 +20,7 @@ struct LearnConfig {
   double encoder_counts = 0;  // of a turn
   double hz = 500;            // cycles per second
   double hold = 10;           // time of balance that ends the learning, s
-  double motion = 60;         // most time in which torques move the links, s
+  double motion = 0;          // most time in which torques move the links, s; 0: see MostMotion
   double computing = 120;     // most processor time of models and controllers, s
   double length = 0;          // of both links together, m; 0: about that of RealAIGym's robot
   int actuated_joint = 1;     // 1 or 2
@@ -31,6 +31,9 @@ struct LearnConfig {
   /// A twin with all that is known of the machine. With a length, its plant is UsualPlant in
   /// another size, which the length and the torque limit tell.
   Twin Known() const;
+  /// The most time in which torques move the links, s: `motion`, or 60 s, which a machine that
+  /// swings more slowly than RealAIGym's robot has in natural time.
+  double MostMotion() const;
   /// The default limits for the length and this torque limit (N·m).
   Limits DefaultLimits(double torque) const;
   /// Throws BadInput without the encoders' steps, and for limits that forbid a swing-up.

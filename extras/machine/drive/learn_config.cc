@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <numbers>
 #include <string>
 
@@ -9,11 +10,12 @@ namespace upswing::machine {
 
 void LearnConfig::Describe(Options& o) {
   o.Section("learning");
-  o.Add(&encoder_counts, "encoder_counts", {16, 1e9}, "1/turn", "steps of the encoders")
-      .usual = "none";
+  o.Add(&encoder_counts, "encoder_counts", {16, 1e9}, "1/turn", "steps of the encoders").usual =
+      "none";
   o.Add(&hold, "hold", {1, 3600}, "s", "time of balance that ends the learning");
   o.Add(&motion, "motion", {10, 3600}, "s",
-        "longest time with torques, pulses and braking included, all runs together");
+        "longest time with torques, pulses and braking included, all runs together")
+      .usual = "60, or more for a slower machine, which --length tells";
   o.Add(&computing, "computing", {1, 1e6}, "s", "longest processor time of models and controllers");
   o.Add(&hz, "hz", {100, 1000}, "1/s", "cycles per second").step = 1;
   o.Add(&length, "length", {0.02, 200}, "m",
@@ -44,6 +46,11 @@ Twin LearnConfig::Known() const {
   twin.sensors.velocity_dead_zone = 0.1 * ScaleOverUsual(plant).velocity();
   twin.loop.period = 1 / hz;
   return twin;
+}
+
+double LearnConfig::MostMotion() const {
+  constexpr double kUsual = 60;  // s
+  return motion > 0 ? motion : kUsual * std::max(1.0, ScaleOverUsual(Known().plant).time);
 }
 
 Limits LearnConfig::DefaultLimits(double torque) const {

@@ -121,7 +121,7 @@ TEST(Learn, BalancesAMachineThatItDoesNotKnow) {
   EXPECT_FALSE(link.enabled());
   EXPECT_LE(link.strongest[0], 5.0);
   EXPECT_LE(link.strongest[1], 0.5);
-  EXPECT_LT(result.motion, config.motion);
+  EXPECT_LT(result.motion, config.MostMotion());
   const std::vector<MachineLog> logs = LogsIn(folder.path());
   const Twin twin = StrangeTwin();
   const auto causes = CausesOf({.config = config, .twin = twin, .logs = logs, .is_faulty = true});
@@ -158,7 +158,19 @@ TEST(Learn, WithoutALengthTheMachineIsOfTheUsualSize) {
     EXPECT_EQ(ScaleOverUsual(config.Known().plant), Scale());
     EXPECT_EQ(config.DefaultLimits(torque).velocity, Limits().velocity);
     EXPECT_EQ(config.DefaultLimits(torque).angle, 25);
+    EXPECT_EQ(config.MostMotion(), 60);
   }
+}
+
+TEST(Learn, ASlowMachineHasMoreTime) {
+  LearnConfig config = ConfigFor(2);
+  config.limits.torque = 5 * 1000;
+  config.length = 10 * 0.5;
+  EXPECT_NEAR(config.MostMotion(), 60 * std::sqrt(10), 1e-6);
+  config.length = 0.1 * 0.5;
+  EXPECT_EQ(config.MostMotion(), 60);
+  config.motion = 45;
+  EXPECT_EQ(config.MostMotion(), 45);
 }
 
 TEST(Learn, ExcitationsStayWithinTheLimits) {
@@ -172,8 +184,8 @@ TEST(Learn, ExcitationsStayWithinTheLimits) {
   const LearnResult result = LearnOn(link, config, folder.path());
   EXPECT_TRUE(result.reason.starts_with("the time of motion is used up")) << result.reason;
   EXPECT_EQ(result.tries, 0);
-  EXPECT_LE(result.motion, config.motion);
-  EXPECT_LE(link.acting, config.motion);
+  EXPECT_LE(result.motion, config.MostMotion());
+  EXPECT_LE(link.acting, config.MostMotion());
   EXPECT_LT(link.largest, 3.5);
   // A step of the encoder in one cycle is a velocity, too.
   EXPECT_LT(link.fastest, 6 + 2 * 6.3 / 2000 / 0.002);
@@ -250,8 +262,8 @@ TEST(Learn, ChangesSomethingAfterAFailedTryAndKeepsItsTime) {
   const LearnResult result =
       Learn(config, link, folder.path(), nullptr, keep_tries, [] { return false; });
   EXPECT_GE(result.tries, 2);
-  EXPECT_LE(result.motion, config.motion);
-  EXPECT_LE(link.acting, config.motion);
+  EXPECT_LE(result.motion, config.MostMotion());
+  EXPECT_LE(link.acting, config.MostMotion());
   std::ranges::sort(tries);
   EXPECT_EQ(std::ranges::adjacent_find(tries), tries.end());
   // Rounding decides whether the last twin names what no twin has.

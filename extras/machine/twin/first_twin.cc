@@ -106,8 +106,14 @@ Plant RodsOf(const Eigen::Matrix<double, kUnknowns, 1>& x, Plant plant) {
   plant.center1 = plant.length1 / 2;
   plant.mass1 = within("mass1", (x[4] / g - plant.mass2 * plant.length1) / plant.center1);
   const double rest = J1 - plant.armature - plant.mass2 * plant.length1 * plant.length1;
-  plant.inertia1 = within("inertia1", std::max(rest - plant.mass1 * plant.center1 * plant.center1,
-                                               std::abs(J1) / 20 + least_inertia));
+  double inertia1 = rest - plant.mass1 * plant.center1 * plant.center1;
+  // Only the sum of inertia1 and the armature of joint 1 shows. A motor at joint 2 may have more
+  // armature than this sum; then all of it is the link's.
+  if (inertia1 < 0 && plant.actuated_joint == 2) {
+    plant.armature1 = 0;
+    inertia1 += plant.armature;
+  }
+  plant.inertia1 = within("inertia1", std::max(inertia1, std::abs(J1) / 20 + least_inertia));
   plant.damping1 = within("damping1", x[6]);
   plant.damping2 = within("damping2", x[7]);
   plant.coulomb1 = within("coulomb1", x[8]);

@@ -10,6 +10,7 @@
 #include "extras/machine/logs/check.h"
 #include "extras/machine/twin/length_by_motion.h"
 #include "extras/machine/twin/physics_rules.h"
+#include "pendulum/posterior.h"
 
 namespace upswing::machine {
 namespace {
@@ -321,9 +322,12 @@ Structure Hanging(Structure structure, HangingBy cause) {
   return structure;
 }
 
-Identification Identify(std::span<const MachineLog> logs, const Twin& first,
-                        const IdentifyConfig& config, ThreadPool* pool, const Progress& progress) {
-  for (const MachineLog& log : logs) ExpectCommands(log);
+namespace {
+
+/// Identify with the joints' armatures as in `first`.
+Identification IdentifyFrom(const Twin& first, std::span<const MachineLog> logs,
+                            const IdentifyConfig& config, ThreadPool* pool,
+                            const Progress& progress) {
   const std::vector<Structure> structures =
       Structures(HasCommands(logs), first.cogging.any(), config.one_body);
   const int folds = config.folds >= 2 ? config.folds : 0;
@@ -352,6 +356,23 @@ Identification Identify(std::span<const MachineLog> logs, const Twin& first,
   result.fit.twin.distrust =
       DistrustOf(result.judgement, result.fit.twin, logs, first.plant.length1);
   return result;
+}
+
+}  // namespace
+
+Identification Identify(std::span<const MachineLog> logs, const Twin& first,
+                        const IdentifyConfig& config, ThreadPool* pool, const Progress& progress) {
+  for (const MachineLog& log : logs) ExpectCommands(log);
+  Identification result = IdentifyFrom(first, logs, config, pool, progress);
+  // A motor at joint 2 may have more armature than joint 1 has with the inertia of link 1, which
+  // then ends at the limit of its range. Only the sum shows in a motion: all of it is the link's.
+  const Plant& found = result.fit.twin.plant;
+  const Range range = UncertainRange(*OptionsOf(found).Get("inertia1"));
+  if (first.plant.armature1 >= 0 || found.inertia1 > range.low) return result;
+  Twin passive = first;
+  passive.plant.armature1 = 0;
+  Identification other = IdentifyFrom(passive, logs, config, pool, progress);
+  return other.fit.error < result.fit.error ? other : result;
 }
 
 std::string DistrustOf(const Judgement& judgement, const Twin& twin,

@@ -177,6 +177,26 @@ TEST(Identify, FindsTheRotorsOfIdleMotorsInAFreeSwing) {
   EXPECT_NEAR(found.fit.twin.plant.length1, machine.plant.length1, 0.002);
 }
 
+/// A geared motor at joint 2 has more armature than link 1 has inertia. Only the sum of inertia1
+/// and the armature of joint 1 shows in a motion.
+TEST(Identify, FindsTheArmatureOfAGearedElbow) {
+  Twin machine = RealPlant();
+  machine.plant.coulomb1 = machine.plant.coulomb2 = 0.002;
+  machine.plant.damping1 = machine.plant.damping2 = 0.003;
+  machine.plant.armature = 4 * machine.plant.inertia1;
+  machine.plant.armature1 = 0.001;
+  Twin first = machine;
+  first.plant.armature = 0;
+  first.plant.armature1 = -1;
+  IdentifyConfig config;
+  config.folds = 0;
+  config.fit = {.windows = {1, 1}, .iterations = 30};
+  const Plant found = Identify(FreeSwings(machine), first, config, nullptr).fit.twin.plant;
+  EXPECT_NEAR(found.armature / machine.plant.armature, 1, 0.02);
+  EXPECT_EQ(found.armature1, 0);
+  EXPECT_NEAR(found.inertia1, machine.plant.inertia1 + machine.plant.armature1, 1e-4);
+}
+
 TEST(MeasureLoop, FindsPeriodAndQuanta) {
   Twin machine = RealPlant();
   machine.loop = {.period = 0.002, .jitter = 0.0001, .late_share = 0.05, .late = 0.003};
