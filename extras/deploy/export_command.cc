@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "agents/arguments.h"
 #include "base/error.h"
 #include "base/format.h"
 #include "base/text.h"
@@ -147,6 +148,7 @@ void AddExport(CommandLine& line) {
   line.Excludes("--onnx", {"--c"});
   line.Excludes("--id", {"--onnx", "--c"});
   Options own;
+  DescribeControlPeriod(own, &a.controller.control_period);
   own.Add(&a.checkpoints, "checkpoints", {2, 100}, "",
           "number of policies per agent in the page, from untrained to trained; trains the agent "
           "again; Q-networks only")

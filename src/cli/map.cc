@@ -3,6 +3,7 @@
 #include <cmath>
 #include <functional>
 
+#include "agents/arguments.h"
 #include "agents/config.h"
 #include "agents/loaded_policy.h"
 #include "base/error.h"
@@ -100,6 +101,7 @@ void AddMap(CommandLine& line) {
   line.Text("--y", a.y, kAxis, "vertical axis (default length2=-50%:+50%:31)", "");
   Options own;
   a.Describe(own);
+  DescribeControlPeriod(own, &a.trial.control_period);
   line.Arguments(own);
   AddPlant(line, a.trial.plant);
   AddSet(line, a.set, "value of a quantity on neither axis, such as q1=178deg");

@@ -107,12 +107,36 @@ class PlantTest(ProgramTest):
         self.assertRegex(config, r"(?m)^random_start_velocity = 3 ")
         self.assertRegex(config, r"(?m)^gamma = 0.992")
 
+    def test_a_large_plant_decides_less_often(self):
+        self.write_size(100, 1)
+        done = self.run_here("eval", "sac", "--plant", "size.toml", "--episodes", 5, "--physics",
+                             "closed-form", "--json")
+        report = json.loads(done.stdout)
+        self.assertAlmostEqual(report["control_period"], 0.2, delta=0.001)
+        self.assertEqual(report["successes"], 5)
+
+    def test_the_armature_of_joint_1(self):
+        for value in (-0.5, -2):
+            self.refuse(["eval", "sac", "--armature1", value],
+                        f'--armature1: expected a number in [0, 1000000] kg·m² or -1, got "{value}"')
+        ends = [self.table("--seconds", 1, *more)[-1][1:5] for more in
+                ((), ("--armature1", -1), ("--armature1", 0.01), ("--armature1", 0.05))]
+        self.assertEqual(ends[0], ends[1])
+        self.assertEqual(ends[0], ends[2])
+        self.assertNotEqual(ends[0], ends[3])
+
     def test_the_control_period(self):
         rows = self.table("--control-period", 0.005, "--seconds", 0.02)
         self.assertEqual([row[0] for row in rows], [0, 0.005, 0.01, 0.015, 0.02])
         self.refuse(["eval", "sac", "--control-period", 0.01],
-                    "--control-period: expected 0.02 s, the control period of sac, got 0.01")
-        self.refuse(["simulate", "--control-period", 0.2], "--control-period", "[0.001, 0.1]")
+                    "--control-period: expected 0.02 s, the control period of sac on its own plant, got 0.01")
+        self.refuse(["simulate", "--control-period", 2], "--control-period", "[0.001, 1]")
+        # Returns do not depend on how often a controller decides.
+        returns = [json.loads(self.succeed(
+            "eval", "tvlqr", "--control-period", period, "--episodes", 5, "--physics", "closed-form",
+            "--json"))["return"]["mean"] for period in (0.02, 0.01, 0.005)]
+        for other in returns[1:]:
+            self.assertAlmostEqual(other / returns[0], 1, delta=0.03)
         for period in (0.005, 0.01):
             self.assertIn("20 of 20", self.succeed(
                 "eval", "tvlqr", "--control-period", period, "--episodes", 20, "--physics",

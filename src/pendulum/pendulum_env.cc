@@ -48,7 +48,7 @@ void CheckPeriods(const PendulumEnvConfig& config) {
                           " s, got ", FormatNumber(period)));
   }
   for (const Disturbance& disturbance : config.disturbances) {
-    ExpectWholePeriods("delay", disturbance.delay, period);
+    ExpectWholePeriods("delay", disturbance.delay, period, "; sensor_latency may be any time");
   }
   ExpectWholePeriods("randomize_delay", config.randomization.delay, period);
 }
@@ -86,7 +86,10 @@ EnvSpec PendulumSpec(const PendulumEnvConfig& config) {
   if (!RewardAsymmetry(config).empty()) spec.mirror_signs.clear();
   spec.bodies = 2;
   const double time = config.scale.time;
-  spec.evaluation = {kEvaluationSeconds * time, kReturnSeconds * time, kHoldSeconds * time, 0};
+  spec.evaluation = {.seconds = kEvaluationSeconds * time,
+                     .return_seconds = kReturnSeconds * time,
+                     .hold_seconds = kHoldSeconds * time,
+                     .return_weight = config.control_period / (kControlPeriod * time)};
   return spec;
 }
 

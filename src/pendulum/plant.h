@@ -18,7 +18,7 @@ inline constexpr double kControlPeriod = 0.02;
 inline constexpr double kPhysicsTimestep = 0.005;  // s
 inline constexpr int kPhysicsSteps = 4;
 static_assert(kPhysicsSteps * kPhysicsTimestep == kControlPeriod);
-inline constexpr double kShortestPeriod = 0.001, kLongestPeriod = 0.1;  // between actions, s
+inline constexpr double kShortestPeriod = 0.001, kLongestPeriod = 1;  // between actions, s
 
 /// Constants of every plant; Mjcf uses the same values.
 inline constexpr double kArmature = 0.01;       // of both joints, kg·m²

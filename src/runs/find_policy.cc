@@ -239,8 +239,8 @@ LoadedPolicy GetPolicy(const PolicyArguments& a) {
   LoadedPolicy loaded = LoadNamed(a.name, true);
   if (a.control_period == 0 || a.control_period == loaded.control_period()) return loaded;
   throw BadInput(Concat("--control-period: expected ", FormatNumber(loaded.control_period()),
-                        " s, the control period of ", Printable(loaded.name), ", got ",
-                        FormatNumber(a.control_period)));
+                        " s, the control period of ", Printable(loaded.name),
+                        " on its own plant, got ", FormatNumber(a.control_period)));
 }
 
 LoadedPolicy DesignController(const std::string& name, const ControllerConfig& config,

@@ -66,7 +66,7 @@ describe('a policy', () => {
     ['format', 'other'],
     ['format_version', '2'],
     ['output', 'mean'],
-    ['control_period', '0.2'],
+    ['control_period', '2'],
     ['control_period', '0.0005'],
     ['model', '<mujoco/>'],
     ['network', 'x'],
