@@ -185,7 +185,7 @@ class PolicyFileTest(SmallRunTest):
         metadata, _ = read_tensors(self.policy)
         observation = json.loads(metadata["observation"])
         changes = [(key, text) for key, texts in {
-            "control_period": ("0.5", "0", "banana", "nan", "-0.02", ""),
+            "control_period": ("1.5", "0", "banana", "nan", "-0.02", ""),
             "seed": ("nan", "1e19", "-1", "7.5", "99999999999999999999"),
             "step": ("nan", "1e19", "-1", "many"),
             "success_rate": ("nan", "1e19", "-0.5", "2"),

@@ -52,11 +52,21 @@ void SayIfCarriedOver(const LoadedPolicy& loaded) {
                        loaded.control_period()));
 }
 
+/// Says that the motor of a plant is at another joint than a policy or controller knows.
+void SayIfOtherMotor(const LoadedPolicy& loaded, const Plant& plant) {
+  const double known = loaded.plant.actuated_joint, here = plant.actuated_joint;
+  if (known == here) return;
+  SayError(fmt::format("{}: its {} has the motor at joint {}, this plant has it at joint {}",
+                       Printable(loaded.name), loaded.origin(), known, here));
+}
+
 }  // namespace
 
 LoadedPolicy GetPolicyIn(const TrialArguments& trial, PolicyArguments a) {
   a.control_period = trial.control_period;
-  const LoadedPolicy loaded = UsedIn(trial, GetPolicy(a));
+  const LoadedPolicy known = GetPolicy(a);
+  const LoadedPolicy loaded = UsedIn(trial, known);
+  SayIfOtherMotor(loaded, PlantIn(trial, known));
   SayIfCarriedOver(loaded);
   return loaded;
 }
@@ -76,6 +86,7 @@ std::vector<LoadedPolicy> GetPoliciesIn(const TrialArguments& trial,
       undesigned->push_back({loaded.name, error.what()});
       continue;
     }
+    SayIfOtherMotor(loaded, plant);
     SayIfCarriedOver(loaded);
     policies.push_back(loaded);
   }

@@ -76,8 +76,11 @@ class Lqr(ProgramTest):
                                  "--seconds", 8, "--physics", physics)
             self.assertLess(max(map(abs, deviation(rows[-1]))), 1e-3)
         # A controller for the other joint does not hold this one.
-        self.assertEqual(self.simulate("--set", "actuated_joint=2", "--start", "3.131,0.02,0,0",
-                                       "--seconds", 3)[-1]["inverted"], 0)
+        done = self.run_here("simulate", "lqr", "--set", "actuated_joint=2", "--start", "3.131,0.02,0,0",
+                             "--seconds", 3)
+        self.assertEqual(done.stderr, "upswing: lqr: its design has the motor at joint 1, this plant has "
+                         "it at joint 2\n")
+        self.assertEqual(list(csv.DictReader(io.StringIO(done.stdout)))[-1]["inverted"], "0")
         self.refuse(["eval", "lqr", "--made-for", "actuated_joint=2", "--made-for",
                      "damping1=0.5659823434"], "lqr: found no gain", "damping of joint 1 cancels")
         for law in ("energy", "pfl"):
