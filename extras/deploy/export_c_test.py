@@ -193,6 +193,13 @@ class HeadersTest(HeaderTest):
             self.write("policy.h", whole.replace(right, wrong))
             self.assertEqual(self.self_test(), 3, right)
 
+    def test_the_control_period_of_a_controller(self):
+        self.succeed("export", "lqr", "--c", "policy.h", "--control-period", 0.01)
+        self.assertIn("#define POLICY_PERIOD 0.01f", self.header())
+        self.assertEqual(self.self_test(), 0)
+        self.refuse(["export", "fast", "--page", "page", "--control-period", 0.02],
+                    "--control-period: expected --c or --onnx with it, got --page")
+
     def test_controllers_that_have_no_header(self):
         for flags in (["--c", "x.h"], ["--onnx", "x.onnx"],
                       ["--c", "x.h", "--swing-up", AGENTS / "fast.safetensors"]):

@@ -116,6 +116,9 @@ int RunExport(const ExportArguments& a) {
     throw BadInput(
         "settings of a controller: expected --c with them, the only export of controllers");
   }
+  if (!a.page.empty() && a.controller.control_period > 0) {
+    throw BadInput("--control-period: expected --c or --onnx with it, got --page");
+  }
   if (!a.onnx.empty()) return ExportOnnx(a);
   if (!a.c.empty()) return ExportC(a);
   return ExportPage(a);

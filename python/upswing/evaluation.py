@@ -63,7 +63,8 @@ def evaluate(
     An episode of the double pendulum lasts 20 s and starts hanging, with normal noise of 0.1 (rad,
     rad/s).
     It succeeds if both links are within 30° of upright throughout the last 10 s. The return is the
-    undiscounted sum of the reward over the first 10 s, weighted by the control period over 0.02 s.
+    undiscounted sum of the reward over the first 10 s, weighted by the control period
+    over the usual one (0.02 s, in the plant's natural time).
 
     Args:
         policy: a `Policy`, the path of a policy file or run folder, the name of a controller, or a

@@ -8,14 +8,13 @@ namespace upswing {
 /// success, passed and solved.
 struct EvaluationRule {
   double seconds = 0;  // length of an evaluation episode, s; a termination ends it earlier
-  /// The return is the weighted, undiscounted reward of this first part of an episode, s.
+  /// The return is Σ return_weight · reward over this first part of an episode, s.
   double return_seconds = 0;
   // An episode succeeds if it is at the goal for the last `hold_seconds` of the episode. If
   // `hold_seconds` is 0, an episode succeeds if its return is at least `solved_return`.
   double hold_seconds = 0;
   double solved_return = 0;
-  /// Weight of each reward in the return. With the control period over the usual one, returns of
-  /// policies with different periods can be compared.
+  /// The control period over the usual one, so that returns at different periods are comparable.
   double return_weight = 1;
 
   bool by_return() const { return hold_seconds == 0; }

@@ -86,7 +86,8 @@ std::vector<LoadedPolicy> GetPoliciesIn(const TrialArguments& trial,
       undesigned->push_back({loaded.name, error.what()});
       continue;
     }
-    SayIfOtherMotor(loaded, plant);
+    const bool has_own_designs = trial.known_plant && loaded.design_for;
+    if (!has_own_designs) SayIfOtherMotor(loaded, plant);
     SayIfCarriedOver(loaded);
     policies.push_back(loaded);
   }

@@ -121,7 +121,7 @@ void AddMap(CommandLine& line) {
       "           inertia1, inertia2, armature, armature1\n"
       "  sensors  sensor_noise [rad, rad/s], sensor_latency [s], encoder_counts,\n"
       "           velocity_window [s], velocity_filter [s]\n"
-      "  motor    delay [s], in control periods of 0.02 s, one cell each\n"
+      "  motor    delay [s], in whole control periods, one cell each\n"
       "  start    q1, q2, w1, w2, in rad and rad/s or with a unit, such as 178deg or 90deg/s,\n"
       "           as in --start of `simulate`; 0 if not given: hanging, at rest. map.csv and\n"
       "           figures have angles in degrees\n\n"

@@ -125,6 +125,15 @@ class MapTest(ProgramTest):
         for value, expected in zip(result["x"]["values"], (0.02, 0.04, 0.06, 0.08), strict=True):
             self.assertAlmostEqual(value, expected, delta=1e-12)
 
+    def test_the_control_period_of_a_controller(self):
+        def delays(*more):
+            result = json.loads(self.succeed("map", "lqr", "--x", "delay=0.01:0.02", "--y", "q1=178deg:179deg:2",
+                                          "--episodes", 1, "--out", "period", "--json", *more))
+            return result["x"]["values"]
+
+        self.refuse(["map", "lqr", "--x", "delay=0.01:0.02", "--y", "q1=178deg:179deg:2"], "a multiple of 0.02")
+        self.assertEqual(delays("--control-period", 0.01), [0.01, 0.02])
+
     def test_sensors_may_be_axes(self):
         result = self.map("--x", "encoder_counts=0:4096:2", "--y", "sensor_latency=0:0.01:2",
                           "--set", "velocity_window=0.01", "--episodes", 1)

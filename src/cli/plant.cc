@@ -68,8 +68,8 @@ nlohmann::json JobOf(const PlantArguments& a) {
           {"friction_slope", kFrictionSlope}};
 }
 
-/// The control period of the compared motions (s): that of the built-in plant in the plant's
-/// natural time. In a longer time, rounding grows beyond every tolerance.
+/// Control period of the compared motions, s: that of the built-in plant, in the plant's natural
+/// time. Rounding grows beyond the tolerance in longer motions.
 double PeriodFor(const Plant& plant) {
   return std::clamp(kControlPeriod * ScaleOf(plant).time, kShortestPeriod, kLongestPeriod);
 }
@@ -192,8 +192,8 @@ void AddPlantCommand(CommandLine& line) {
       "free base, a third joint, two motors, servos, springs, joint limits that a swing-up\n"
       "reaches. It also refuses shapes that touch, MuJoCo's frictionloss, tendons, fluids and a\n"
       "tilted plane. It then moves MuJoCo's model and the plant from 200 random states under\n"
-      "random torques for 1 s, in the same Runge-Kutta steps of 0.005 s. If an angle differs by\n"
-      "more than 1e-6 rad, it writes nothing and ends with exit code 1.\n\n"
+      "random torques for 1 s in the time of the built-in plant, in the same Runge-Kutta steps.\n"
+      "If an angle differs by more than 1e-6 rad, it writes nothing and ends with exit code 1.\n\n"
       "Python reads the file, with MuJoCo: `python3`, or the one that UPSWING_PYTHON names.\n");
   line.Examples(
       "  ./upswing plant acrobot.xml --out acrobot.toml\n"

@@ -107,13 +107,15 @@ class PlantTest(ProgramTest):
         self.assertRegex(config, r"(?m)^random_start_velocity = 3 ")
         self.assertRegex(config, r"(?m)^gamma = 0.992")
 
-    def test_a_large_plant_decides_less_often(self):
+    def test_links_of_50_m_have_a_decision_every_200_ms(self):
         self.write_size(100, 1)
         done = self.run_here("eval", "sac", "--plant", "size.toml", "--episodes", 5, "--physics",
                              "closed-form", "--json")
         report = json.loads(done.stdout)
         self.assertAlmostEqual(report["control_period"], 0.2, delta=0.001)
         self.assertEqual(report["successes"], 5)
+        usual = json.loads(self.succeed("eval", "sac", "--episodes", 5, "--physics", "closed-form", "--json"))
+        self.assertAlmostEqual(report["return"]["mean"] / usual["return"]["mean"], 1, delta=0.01)
 
     def test_the_armature_of_joint_1(self):
         for value in (-0.5, -2):

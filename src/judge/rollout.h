@@ -43,7 +43,7 @@ struct RolloutConfig {
 struct Rollout {
   std::vector<RolloutRow> rows;            // one per control step, and one for the last state
   double control_period = kControlPeriod;  // s
-  double return_seconds = kReturnSeconds;  // length of the part whose rewards are the return, s
+  double return_seconds = kReturnSeconds;  // length of the part that the return counts, s
   // Of this episode:
   Plant plant;
   Disturbance disturbance;

@@ -58,7 +58,7 @@ TEST(Disturbance, DelaysFollowTheControlPeriod) {
   EXPECT_EQ(
       problem(0.025, 0.02),
       "delay: expected a multiple of 0.02, the control period, got \"0.025\"; the nearest are "
-      "0.02 and 0.04; sensor_latency may be any time");
+      "0.02 and 0.04; sensor_latency may be any time up to 0.1 s");
   EXPECT_EQ(problem(0, 2), "control_period: expected 0.001 to 1 s, got 2");
 }
 

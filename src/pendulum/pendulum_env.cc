@@ -48,7 +48,8 @@ void CheckPeriods(const PendulumEnvConfig& config) {
                           " s, got ", FormatNumber(period)));
   }
   for (const Disturbance& disturbance : config.disturbances) {
-    ExpectWholePeriods("delay", disturbance.delay, period, "; sensor_latency may be any time");
+    ExpectWholePeriods("delay", disturbance.delay, period,
+                       "; sensor_latency may be any time up to 0.1 s");
   }
   ExpectWholePeriods("randomize_delay", config.randomization.delay, period);
 }

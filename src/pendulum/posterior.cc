@@ -24,7 +24,7 @@ constexpr SensorValue kSensorValues[] = {{"sensor_latency", &SensorModel::latenc
 
 // Parameters of the plant that identification cannot find.
 constexpr std::string_view kCertain[] = {"torque_limit", "actuated_joint", "rotor_inertia",
-                                         "gear_ratio"};
+                                         "gear_ratio", "armature1"};
 
 }  // namespace
 

@@ -2,8 +2,8 @@
 """Compares the decisions of `mpc` with those of Fatrop, a solver of optimal control problems.
 
 `mpc` improves its previous plan in two iterations. Fatrop solves the same problem from the same states to its end:
-the same cost over 2.5 s, the same torque limit, the equations of motion in the steps of MuJoCo. Both hold the links
-in a loop from the start states of `eval`. The cost of a motion is that of 10 s. Needs `pip install casadi` and a
+the same cost over 2.5 s, the same torque limit, the equations of motion in the steps of MuJoCo. Both swing up and
+balance the links in a loop from the start states of `eval`. The cost of a motion is that of 10 s. Needs `pip install casadi` and a
 C compiler.
 
     python3 tools/peers/mpc.py                 five episodes
@@ -11,6 +11,7 @@ C compiler.
 """
 
 import argparse
+import math
 import sys
 import time
 from pathlib import Path
@@ -25,7 +26,7 @@ except ModuleNotFoundError:
 
 HORIZON, SWING_UP = 125, 150  # control periods: of a plan, and of the swing-up with its end at rest
 Q, R = (10, 10, 1, 1), 1  # weights of the deviation from upright and of the torque, as in LqrConfig
-TURN = 2 * np.pi if ca else 0
+TURN = 2 * math.pi
 
 
 def final_weights(step):
@@ -61,7 +62,7 @@ class Problem:
             u, following = ca.MX.sym("u"), ca.MX.sym("x", 4)
             unknowns += [x, u]
             constraints.append(following - self.step(x, u))
-            if t == 0:
+            if t == 0:  # Fatrop finds stages by this order: the step, then what else holds at its begin
                 constraints.append(x - start)
             d = x - goals[:, t]
             cost += d.T @ weights @ d + R * u**2
@@ -102,8 +103,10 @@ def drive(problem, states, torques):
     driven, applied, seconds = [x], [], []
     for _ in range(STEPS):
         begin = time.process_time()
-        planned, u, _, _ = problem.solve(x, *plan)
+        planned, u, _, ended = problem.solve(x, *plan)
         seconds.append(time.process_time() - begin)
+        if not ended:
+            raise SystemExit(f"step {len(applied)}: Fatrop found no solution")
         applied.append(float(np.clip(u[0], -LIMIT, LIMIT)))
         x = np.array(problem.step(x, applied[-1])).ravel()
         driven.append(x)

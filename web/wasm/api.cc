@@ -190,7 +190,7 @@ void ExpectPageCanShow(const Controller& controller) {
         "with them");
   }
   if (controller.units != Scale()) return;
-  if (plant.has_own_links() || plant.armature != kArmature) {
+  if (plant.has_own_links() || plant.armature != kArmature || plant.own_armature1() != kArmature) {
     throw BadInput(
         "expected a policy for links that are solid capsules and the usual armature, as in the "
         "page, got others");

@@ -31,8 +31,8 @@ struct LearnConfig {
   /// A twin with all that is known of the machine. With a length, its plant is UsualPlant in
   /// another size, which the length and the torque limit tell.
   Twin Known() const;
-  /// The most time in which torques move the links, s: `motion`, or 60 s, which a machine that
-  /// swings more slowly than RealAIGym's robot has in natural time.
+  /// The most time in which torques move the links, s: `motion`. If that is 0: 60 s, or more in
+  /// proportion for a machine that swings more slowly than RealAIGym's robot.
   double MostMotion() const;
   /// The default limits for the length and this torque limit (N·m).
   Limits DefaultLimits(double torque) const;

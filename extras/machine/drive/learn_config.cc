@@ -15,7 +15,7 @@ void LearnConfig::Describe(Options& o) {
   o.Add(&hold, "hold", {1, 3600}, "s", "time of balance that ends the learning");
   o.Add(&motion, "motion", {10, 3600}, "s",
         "longest time with torques, pulses and braking included, all runs together")
-      .usual = "60, or more for a slower machine, which --length tells";
+      .usual = "60; more for a slower machine (--length)";
   o.Add(&computing, "computing", {1, 1e6}, "s", "longest processor time of models and controllers");
   o.Add(&hz, "hz", {100, 1000}, "1/s", "cycles per second").step = 1;
   o.Add(&length, "length", {0.02, 200}, "m",

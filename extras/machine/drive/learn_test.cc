@@ -433,6 +433,21 @@ TEST(FirstTwin, RodsKeepTheEquationsOfMotion) {
   }
 }
 
+/// More armature at joint 2 than joint 1 has with link 1: the rods keep J1, the second time, too.
+TEST(FirstTwin, RodsKeepAGearedElbow) {
+  Twin twin = StrangeTwin();
+  twin.plant.actuated_joint = 2;
+  twin.plant.armature =
+      4 * (twin.plant.inertia1 + twin.plant.mass1 * std::pow(twin.plant.center1, 2));
+  twin.plant.armature1 = 0;
+  const double J1 = ManipulatorOf(twin.plant).J1;
+  for (int time = 0; time < 2; ++time) {
+    twin = AsRods(twin);
+    EXPECT_EQ(twin.plant.armature1, 0);
+    EXPECT_NEAR(ManipulatorOf(twin.plant).J1, J1, 1e-9 * J1);
+  }
+}
+
 TEST(FirstTwin, FindsTheEquationsOfMotion) {
   const Twin truth = StrangeTwin();
   Excitation excitation(

@@ -107,8 +107,9 @@ Plant RodsOf(const Eigen::Matrix<double, kUnknowns, 1>& x, Plant plant) {
   plant.mass1 = within("mass1", (x[4] / g - plant.mass2 * plant.length1) / plant.center1);
   const double rest = J1 - plant.armature - plant.mass2 * plant.length1 * plant.length1;
   double inertia1 = rest - plant.mass1 * plant.center1 * plant.center1;
-  // Only the sum of inertia1 and the armature of joint 1 shows. A motor at joint 2 may have more
-  // armature than this sum; then all of it is the link's.
+  // A motion shows only the sum of inertia1 and the armature of joint 1. A motor at joint 2 may
+  // have more armature than this sum. Then all of the sum is the link's.
+  plant.armature1 = -1;
   if (inertia1 < 0 && plant.actuated_joint == 2) {
     plant.armature1 = 0;
     inertia1 += plant.armature;

@@ -364,11 +364,13 @@ Identification Identify(std::span<const MachineLog> logs, const Twin& first,
                         const IdentifyConfig& config, ThreadPool* pool, const Progress& progress) {
   for (const MachineLog& log : logs) ExpectCommands(log);
   Identification result = IdentifyFrom(first, logs, config, pool, progress);
-  // A motor at joint 2 may have more armature than joint 1 has with the inertia of link 1, which
-  // then ends at the limit of its range. Only the sum shows in a motion: all of it is the link's.
+  // A motion shows only the sum of inertia1 and the armature of joint 1. If joint 2 has more
+  // armature than this sum, the fit presses inertia1 to its lower limit. Then all of the sum is the
+  // link's.
   const Plant& found = result.fit.twin.plant;
   const Range range = UncertainRange(*OptionsOf(found).Get("inertia1"));
-  if (first.plant.armature1 >= 0 || found.inertia1 > range.low) return result;
+  const bool is_known = config.fit.adapts || first.plant.armature1 >= 0;
+  if (is_known || found.inertia1 > range.low) return result;
   Twin passive = first;
   passive.plant.armature1 = 0;
   Identification other = IdentifyFrom(passive, logs, config, pool, progress);

@@ -51,7 +51,8 @@ struct Identification {
   Judgement judgement;
 };
 
-/// Identifies a twin from logs and judges it. Zeros of the encoders compete with offsets of the
+/// Identifies a twin from logs and judges it. If inertia1 ends at its lower limit, fits again with
+/// armature1 = 0, and returns the better fit. Zeros of the encoders compete with offsets of the
 /// torques, if the logs have torques and there is a cross-validation. A twin that does not explain
 /// its logs, or has values outside physics, says so (Twin::distrust). Throws BadInput if they have
 /// no usable motion, or if there are too few for a cross-validation.
