@@ -10,11 +10,15 @@ import random
 import re
 import shutil
 import subprocess
+import sys
 import unittest
 
 from c_testing import (AGENTS, COMPILERS, COUNT, EXAMPLE, HAS_CORTEX_M4, NO_CORTEX_M4, SANITIZE, HeaderTest,
                        compile_c, random_states, rows_of, run_on_cortex_m4)
 from testing import ROOT, UPSWING, ProgramTest, probe, read_csv, read_tensors, small, write_tensors
+
+sys.path.insert(0, str(ROOT / "tools/results"))
+from sizes import image  # noqa: E402
 
 ACTORS = sorted((ROOT / "web/tests/actors").glob("*.safetensors"))
 
@@ -192,6 +196,22 @@ class HeadersTest(HeaderTest):
             self.assertEqual(whole.count(right), 1, right)
             self.write("policy.h", whole.replace(right, wrong))
             self.assertEqual(self.self_test(), 3, right)
+
+    def test_a_policy_for_a_plant_of_another_size(self):
+        self.write("size.toml", image(0.1, 0.01))
+        for flag, file in (("--c", "policy.h"), ("--onnx", "policy.onnx")):
+            done = self.run_here("export", "sac", "--plant", "size.toml", flag, file)
+            self.assertIn("carried over to a plant of another size", done.stderr)
+            self.assertEqual(done.returncode, 0)
+        header = self.header()
+        for name, value in (("PERIOD", 0.00632), ("TORQUE_LIMIT", 5e-3)):
+            got = float(re.search(rf"#define POLICY_{name} (\S+)f", header)[1])
+            self.assertAlmostEqual(got / value, 1, delta=0.01)
+        self.assertEqual(self.self_test(), 0)
+        self.refuse(["export", "mpc", "--plant", "size.toml", "--c", "x.h"],
+                    "--plant: expected a learned policy, got mpc; --made-for designs")
+        self.refuse(["export", "sac", "--page", "page", "--plant", "size.toml"],
+                    "--plant: expected --c or --onnx with it, got --page")
 
     def test_the_control_period_of_a_controller(self):
         self.succeed("export", "lqr", "--c", "policy.h", "--control-period", 0.01)

@@ -6,12 +6,15 @@
 #include <vector>
 
 #include "agents/arguments.h"
+#include "agents/controllers.h"
+#include "agents/loaded_policy.h"
 #include "base/error.h"
 #include "base/format.h"
 #include "base/text.h"
 #include "cli/commands.h"
 #include "extras/deploy/c_header.h"
 #include "extras/deploy/export.h"
+#include "judge/trial.h"
 #include "os/streams.h"
 #include "runs/find_policy.h"
 
@@ -23,6 +26,7 @@ namespace fs = std::filesystem;
 struct ExportArguments {
   std::vector<std::string> policies;
   PolicyArguments controller;  // settings of a controller
+  std::string plant;           // on which a learned policy acts; empty: its own
   std::string page, id, onnx, c, prefix;
   int64_t checkpoints = 0;
   bool overwrite = false;
@@ -38,7 +42,8 @@ void RefuseHybrid(const std::string& name) {
       "policy that swings up, and lqr with --c, each by itself");
 }
 
-/// The single policy that `flag` exports.
+/// The single policy that `flag` exports, carried over to the plant of --plant if that has another
+/// size.
 LoadedPolicy SinglePolicy(const ExportArguments& a, const char* flag) {
   if (a.policies.size() != 1) {
     throw BadInput(Concat(flag, ": expected a policy or a run folder, got ",
@@ -47,7 +52,18 @@ LoadedPolicy SinglePolicy(const ExportArguments& a, const char* flag) {
   PolicyArguments policy = a.controller;
   policy.name = a.policies.front();
   RefuseHybrid(policy.name);
-  return GetPolicy(policy);
+  if (a.plant.empty()) return GetPolicy(policy);
+  if (IsController(policy.name)) {
+    throw BadInput(Concat("--plant: expected a learned policy, got ", policy.name,
+                          "; --made-for designs a controller for a plant"));
+  }
+  TrialArguments trial;
+  trial.plant = a.plant;
+  trial.control_period = a.controller.control_period;
+  LoadedPolicy loaded = GetPolicyIn(trial, policy);
+  ExpectPendulum(loaded);
+  loaded.plant = PlantIn(trial, loaded);
+  return loaded;
 }
 
 /// Writes an export. An older export, whose first bytes are those of `text`, may be replaced;
@@ -116,8 +132,12 @@ int RunExport(const ExportArguments& a) {
     throw BadInput(
         "settings of a controller: expected --c with them, the only export of controllers");
   }
-  if (!a.page.empty() && a.controller.control_period > 0) {
-    throw BadInput("--control-period: expected --c or --onnx with it, got --page");
+  for (const auto& [flag, is_given] :
+       {std::pair("--control-period", a.controller.control_period > 0),
+        {"--plant", !a.plant.empty()}}) {
+    if (!a.page.empty() && is_given) {
+      throw BadInput(Concat(flag, ": expected --c or --onnx with it, got --page"));
+    }
   }
   if (!a.onnx.empty()) return ExportOnnx(a);
   if (!a.c.empty()) return ExportC(a);
@@ -133,6 +153,7 @@ void AddExport(CommandLine& line) {
                     "controllers (",
                     Join(ControllersInC(), ", "), ")"));
   AddControllers(line, a.controller);
+  AddPlant(line, a.plant);
   line.Text(
       "--onnx", a.onnx, "FILE",
       "ONNX file to write, which maps observations to torques and values; -: standard output");
@@ -162,6 +183,7 @@ void AddExport(CommandLine& line) {
       "  ./upswing export runs/d3qn-seed1 --onnx policy.onnx\n"
       "  ./upswing export fast --c policy.h                     a shipped policy as C\n"
       "  ./upswing export tvlqr --c tvlqr.h                     a controller as C\n"
+      "  ./upswing export sac --plant cm5.toml --c policy.h     for a plant of another size\n"
       "  ./upswing export runs/d3qn-seed1 --page web/public/agents    for every visitor\n"
       "  ./upswing export runs/* --page build/web/agents        in the page built here\n"
       "  ./upswing export policy.safetensors --id mine --page build/web/agents\n"
