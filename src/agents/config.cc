@@ -54,7 +54,8 @@ void Config::Describe(Options& o) {
 void Config::DescribeEnvironment(Options& o) {
   o.Section("task");
   o.Add(&control_period, "control_period", {kShortestPeriod, kLongestPeriod}, "s",
-        "time for which the agent holds a torque; gamma follows it unless you give one");
+        "time for which the agent holds a torque; gamma and SAC's n_step follow it unless you give "
+        "them");
   constexpr Range kScale{1e-6, 1e6};
   o.Add(&time_scale, "time_scale", kScale, "",
         "natural time of the plant over that of the built-in plant; by it, times and velocities in "

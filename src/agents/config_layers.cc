@@ -146,14 +146,21 @@ void FitToPlant(const Options& options, const Scale& ratio,
   multiply("torque_scale", ratio.torque);
 }
 
-/// Keeps the time that the agent looks ahead, 1 / (1 - gamma) control periods, if the user gives
-/// another control period than `usual` (s) and no gamma.
+/// Keeps times of the agent that the user does not give, at another control period than `usual`
+/// (s): the time that it looks ahead, 1 / (1 - gamma) control periods, and the length of SAC's
+/// n-step returns. Returns of DQN keep their n: longer ones hold more random actions of its
+/// exploration.
 void FitToPeriod(const Options& options, double usual,
                  const std::function<bool(const Option&)>& is_given, const Config& config) {
+  const double ratio = config.control_period / usual;
+  if (ratio == 1) return;
   const Option& gamma = *options.Get("gamma");
-  if (config.control_period == usual || is_given(gamma)) return;
-  gamma.Set(FormatNumber(std::pow(gamma.number(), config.control_period / usual)),
-            "control_period");
+  if (!is_given(gamma)) gamma.Set(FormatNumber(std::pow(gamma.number(), ratio)), "control_period");
+  if (config.algorithm != "sac" || is_given(*options.Get("n_step"))) return;
+  const Option& n_step = *options.Get("n_step");
+  const auto steps = static_cast<double>(*std::get<int64_t*>(n_step.target));
+  const double kept = std::clamp(std::round(steps / ratio), n_step.range.low, n_step.range.high);
+  n_step.Set(FormatNumber(kept), "control_period");
 }
 
 /// Rounds the times that the user does not give to whole control periods.

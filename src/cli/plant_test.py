@@ -107,6 +107,13 @@ class PlantTest(ProgramTest):
         self.assertRegex(config, r"(?m)^random_start_velocity = 3 ")
         self.assertRegex(config, r"(?m)^gamma = 0.992")
 
+    def test_the_steps_of_sacs_returns_follow_the_control_period(self):
+        for agent, period, given, n_step in (("sac-fast", 0.005, (), 12), ("sac", 0.05, (), 1), ("fast", 0.005, (), 4),
+                                             ("sac", 0.02, (), 3), ("sac", 0.001, (), 60),
+                                             ("sac", 0.005, ("--n-step", 7), 7)):
+            config = self.succeed("train", "--agent", agent, "--control-period", period, "--print-config", *given)
+            self.assertRegex(config, rf"(?m)^n_step = {n_step} ")
+
     def test_links_of_50_m_have_a_decision_every_200_ms(self):
         self.write_size(100, 1)
         done = self.run_here("eval", "sac", "--plant", "size.toml", "--episodes", 5, "--physics",
