@@ -65,7 +65,7 @@ void SayIfOtherMotor(const LoadedPolicy& loaded, const Plant& plant) {
 LoadedPolicy GetPolicyIn(const TrialArguments& trial, PolicyArguments a) {
   a.control_period = trial.control_period;
   const LoadedPolicy known = GetPolicy(a);
-  const LoadedPolicy loaded = UsedIn(trial, known);
+  LoadedPolicy loaded = UsedIn(trial, known);
   SayIfOtherMotor(loaded, PlantIn(trial, known));
   SayIfCarriedOver(loaded);
   return loaded;

@@ -10,6 +10,7 @@
 #include "agents/loaded_policy.h"
 #include "base/csv.h"
 #include "base/error.h"
+#include "base/format.h"
 #include "base/text.h"
 #include "cli/commands.h"
 #include "cli/say.h"
