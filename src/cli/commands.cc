@@ -52,7 +52,8 @@ void SayIfCarriedOver(const LoadedPolicy& loaded) {
                        loaded.control_period()));
 }
 
-/// Says that the motor of a plant is at another joint than a policy or controller knows.
+/// Says that the motor of a plant is at another joint than a policy or controller knows. `loaded`
+/// has its own plant still.
 void SayIfOtherMotor(const LoadedPolicy& loaded, const Plant& plant) {
   const double known = loaded.plant.actuated_joint, here = plant.actuated_joint;
   if (known == here) return;
@@ -64,11 +65,14 @@ void SayIfOtherMotor(const LoadedPolicy& loaded, const Plant& plant) {
 
 LoadedPolicy GetPolicyIn(const TrialArguments& trial, PolicyArguments a) {
   a.control_period = trial.control_period;
-  const LoadedPolicy known = GetPolicy(a);
-  LoadedPolicy loaded = UsedIn(trial, known);
-  SayIfOtherMotor(loaded, PlantIn(trial, known));
-  SayIfCarriedOver(loaded);
-  return loaded;
+  LoadedPolicy loaded = GetPolicy(a);
+  if (loaded.is_foreign()) return loaded;
+  const Plant plant = PlantIn(trial, loaded);
+  LoadedPolicy used = ForOtherSize(loaded, plant).value_or(loaded);
+  const bool is_designed = used.design_for && used.carried_over != Scale();
+  if (!is_designed) SayIfOtherMotor(loaded, plant);
+  SayIfCarriedOver(used);
+  return used;
 }
 
 std::vector<LoadedPolicy> GetPoliciesIn(const TrialArguments& trial,
@@ -79,17 +83,18 @@ std::vector<LoadedPolicy> GetPoliciesIn(const TrialArguments& trial,
   std::vector<LoadedPolicy> policies;
   for (LoadedPolicy& loaded : GetPolicies(names, controllers, undesigned)) {
     const Plant plant = PlantIn(trial, loaded);
+    LoadedPolicy used = loaded;
     try {
-      loaded = ForOtherSize(loaded, plant).value_or(loaded);
+      used = ForOtherSize(loaded, plant).value_or(loaded);
     } catch (const Error& error) {
       if (undesigned == nullptr || !loaded.design_for) throw;
       undesigned->push_back({loaded.name, error.what()});
       continue;
     }
-    const bool has_own_designs = trial.known_plant && loaded.design_for;
-    if (!has_own_designs) SayIfOtherMotor(loaded, plant);
-    SayIfCarriedOver(loaded);
-    policies.push_back(loaded);
+    const bool is_designed = used.design_for && (trial.known_plant || used.carried_over != Scale());
+    if (!is_designed) SayIfOtherMotor(loaded, plant);
+    SayIfCarriedOver(used);
+    policies.push_back(std::move(used));
   }
   return policies;
 }
