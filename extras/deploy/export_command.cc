@@ -132,13 +132,12 @@ int RunExport(const ExportArguments& a) {
     throw BadInput(
         "settings of a controller: expected --c with them, the only export of controllers");
   }
-  for (const auto& [flag, is_given] :
-       {std::pair("--control-period", a.controller.control_period > 0),
-        {"--plant", !a.plant.empty()}}) {
-    if (!a.page.empty() && is_given) {
-      throw BadInput(Concat(flag, ": expected --c or --onnx with it, got --page"));
-    }
-  }
+  const auto expect_no_page = [&](const char* flag, bool is_given) {
+    if (a.page.empty() || !is_given) return;
+    throw BadInput(Concat(flag, ": expected --c or --onnx with it, got --page"));
+  };
+  expect_no_page("--control-period", a.controller.control_period > 0);
+  expect_no_page("--plant", !a.plant.empty());
   if (!a.onnx.empty()) return ExportOnnx(a);
   if (!a.c.empty()) return ExportC(a);
   return ExportPage(a);

@@ -156,8 +156,9 @@ void FitToPeriod(const Options& options, double usual,
   if (ratio == 1) return;
   const Option& gamma = *options.Get("gamma");
   if (!is_given(gamma)) gamma.Set(FormatNumber(std::pow(gamma.number(), ratio)), "control_period");
-  if (config.algorithm != "sac" || is_given(*options.Get("n_step"))) return;
+  if (config.algorithm != "sac") return;
   const Option& n_step = *options.Get("n_step");
+  if (is_given(n_step)) return;
   const auto steps = static_cast<double>(*std::get<int64_t*>(n_step.target));
   const double kept = std::clamp(std::round(steps / ratio), n_step.range.low, n_step.range.high);
   n_step.Set(FormatNumber(kept), "control_period");

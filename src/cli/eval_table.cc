@@ -219,8 +219,9 @@ void PrintEvalComparison(std::span<const EvalReport> reports,
 
   fmt::print("The same {} for all\n", Counted(first.figures.episodes, "episode"));
   PrintConditions(first);
-  for (const EvalReport& report : reports)
+  for (const EvalReport& report : reports) {
     PrintNotes(report, first, Printable(report.title) + ": ");
+  }
   fmt::print("\n");
   const size_t figures = 1 + reports.size();  // rows before those of the differences
   for (const ComparisonRow& row : std::span(rows).first(figures)) PrintRow(row, widths);

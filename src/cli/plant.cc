@@ -74,9 +74,9 @@ double PeriodFor(const Plant& plant) {
   return std::clamp(kControlPeriod * ScaleOf(plant).time, kShortestPeriod, kLongestPeriod);
 }
 
-/// Largest difference (rad) between the motions of a plant in this program and those of the model.
-/// `read` has the start states, torques and angles.
-double LargestDifference(const Plant& plant, const nlohmann::json& read) {
+/// Largest difference (rad) between the motions of a plant in this program and those of the model,
+/// with control periods of `period` (s). `read` has the start states, torques and angles.
+double LargestDifference(const Plant& plant, double period, const nlohmann::json& read) {
   double largest = 0;
   for (size_t n = 0; n < read["starts"].size(); ++n) {
     const auto start = read["starts"][n].get<std::array<double, 4>>();
@@ -85,8 +85,8 @@ double LargestDifference(const Plant& plant, const nlohmann::json& read) {
     config.env.plants = {plant};
     config.start = PendulumState{start[0], start[1], start[2], start[3]};
     config.schedule = read["torques"][n].get<std::vector<double>>();
-    config.env.control_period = PeriodFor(plant);
-    config.seconds = static_cast<double>(config.schedule.size()) * config.env.control_period;
+    config.env.control_period = period;
+    config.seconds = static_cast<double>(config.schedule.size()) * period;
     const Rollout rollout = RunRollout(config);
     for (size_t k = 0; k < angles.size(); ++k) {
       const PendulumState& s = rollout.rows.at(k).state;
@@ -137,7 +137,7 @@ int RunPlant(const PlantArguments& a) {
   ExpectNoPart(a.out, (*read)["files"]);
 
   const size_t motions = (*read)["starts"].size();
-  const double difference = LargestDifference(plant, *read);
+  const double difference = LargestDifference(plant, period, *read);
   const double seconds = static_cast<double>((*read)["torques"].at(0).size()) * period;
   const std::string check =
       fmt::format("{} random motions of {:.2g} s differ from MuJoCo's by at most {:.2g} rad",
@@ -176,14 +176,16 @@ void AddPlantCommand(CommandLine& line) {
   line.Flag(
       "--convert-friction", a.convert_friction,
       "write MuJoCo's frictionloss c as the dry friction c·2/π·atan(100 w), which is c at speed");
+  const Options of_plant = OptionsOf(Plant());
   Options own;
   Option& motor = own.Add(&a.motor, "motor", {1, 2}, "",
                           "joint whose motor the plant has; the other joint's motor is left out");
   motor.step = 1;
   motor.usual = "the only motor";
-  own.Add(&a.torque_limit, "torque_limit", {1e-3, 1e6}, "N·m", "largest torque of the motor")
+  own.Add(&a.torque_limit, "torque_limit", of_plant.Get("torque_limit")->range, "N·m",
+          "largest torque of the motor")
       .usual = "as in the file";
-  own.Add(&a.length2, "length2", {0.01, 100}, "m",
+  own.Add(&a.length2, "length2", of_plant.Get("length2")->range, "m",
           "length of link 2, which only the task's heights need")
       .usual = "the distance to its farthest site, else to the end of its farthest shape";
   line.Arguments(own);

@@ -145,9 +145,8 @@ void AddSimulate(CommandLine& line) {
       "each joint, torque1 and torque2 [N·m]. The torque\n"
       "is what the motor applies over the next control period, after its delay and within its\n"
       "limit. The reward is that of this period: of this torque and the next row's state, 0\n"
-      "in the last row. The rewards of the first 10 s add up to the return of `eval`; with "
-      "another\n"
-      "control period than the usual one, the return is this sum times their ratio.\n\n"
+      "in the last row. The rewards of the first 10 s add up to the return of `eval`; with\n"
+      "another control period than the usual one, the return is this sum times their ratio.\n\n"
       "`machine check` and `machine identify` read this file as a log.\n");
   line.Examples(
       "  ./upswing simulate runs/d3qn-seed1 --csv rollout.csv\n"

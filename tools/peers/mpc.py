@@ -3,8 +3,8 @@
 
 `mpc` improves its previous plan in two iterations. Fatrop solves the same problem from the same states to its end:
 the same cost over 2.5 s, the same torque limit, the equations of motion in the steps of MuJoCo. Both swing up and
-balance the links in a loop from the start states of `eval`. The cost of a motion is that of 10 s. Needs `pip install casadi` and a
-C compiler.
+balance the links in a loop from the start states of `eval`. The cost of a motion is that of 10 s. Needs
+`pip install casadi` and a C compiler.
 
     python3 tools/peers/mpc.py                 five episodes
     python3 tools/peers/mpc.py --episodes 20
